@@ -1,0 +1,180 @@
+"""Cameras: right-handed, looking along -Z of their own frame, +Y up. Row 0 of every image is the top row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A perspective or orthographic view.
+
+    Parameters
+    ----------
+    pose : (4, 4) float64
+        Camera to world, rigid: the columns are right, up, backward and the eye.
+    fov_y : float, optional
+        Full vertical angle of view in degrees, between 0 and 180: a perspective camera.
+    height : float, optional
+        Height of the view in metres: an orthographic camera.
+    """
+
+    pose: Array
+    fov_y: float | None = 45.0
+    height: float | None = None
+
+    def __post_init__(self) -> None:
+        pose = np.array(self.pose, dtype=np.float64)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+            raise InputError("camera pose", "not a finite 4x4 matrix", "use Camera.look_at")
+        rotation = pose[:3, :3]
+        if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+            raise InputError("camera pose", "it scales, shears or mirrors", "use Camera.look_at, or remove the scale")
+        if (self.fov_y is None) == (self.height is None):
+            raise InputError("camera", "needs either fov_y or height", "give fov_y for perspective, height for orthographic")
+        if self.fov_y is not None and not 0 < self.fov_y < 180:
+            raise InputError(f"camera fov_y {self.fov_y}", "not between 0 and 180 degrees", "give for example 45")
+        if self.height is not None and not (0 < self.height < np.inf):
+            raise InputError(f"camera height {self.height}", "not positive and finite", "give the view's height in metres")
+        pose.setflags(write=False)
+        object.__setattr__(self, "pose", pose)
+
+    @classmethod
+    def look_at(
+        cls, eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0), fov_y: float = 45.0
+    ) -> Camera:
+        """Perspective camera at `eye` that looks at `target`, with `up` upwards in the picture.
+
+        Raises
+        ------
+        InputError
+            If the eye is at the target, `up` is along the view, or a number is not finite.
+        """
+        return cls(_look_at(eye, target, up), fov_y=fov_y)
+
+    @classmethod
+    def orthographic(
+        cls, eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0), height: float = 1.0
+    ) -> Camera:
+        """Orthographic camera that shows `height` metres from bottom to top."""
+        return cls(_look_at(eye, target, up), fov_y=None, height=height)
+
+    @classmethod
+    def framing(
+        cls,
+        bounds: npt.ArrayLike,
+        size: tuple[int, int] = (1, 1),
+        direction: npt.ArrayLike = (-0.45, -0.35, -1.0),
+        fov_y: float = 30.0,
+    ) -> Camera:
+        """Perspective camera that sees the whole box `bounds` (2, 3), looking along `direction`.
+
+        Parameters
+        ----------
+        bounds : array_like (2, 3)
+            Smallest and largest corner in metres.
+        size : (width, height)
+            Size of the picture in pixels: a narrow one needs more distance.
+        direction : array_like (3,)
+            In which the camera looks.
+        fov_y : float
+            Full vertical angle of view in degrees.
+        """
+        low, high = np.asarray(bounds, dtype=np.float64)
+        center, radius = 0.5 * low + 0.5 * high, 0.5 * float(np.linalg.norm(high - low))
+        radius = radius if radius > 0 else 1.0
+        look = np.asarray(direction, dtype=np.float64)
+        look = look / np.linalg.norm(look)
+        corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)]) - center
+        probe = cls.look_at(center - look * radius, center, fov_y=fov_y)
+        side = corners @ probe.pose[:3, :2]
+        depth = corners @ look
+        half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0])
+        distance = float((np.abs(side) / (half * 0.92) - depth[:, None]).max())
+        return cls.look_at(center - look * max(distance, 1e-3 * radius), center, fov_y=fov_y)
+
+    @property
+    def eye(self) -> Array:
+        """(3,): position in metres."""
+        return self.pose[:3, 3]
+
+    @property
+    def right(self) -> Array:
+        """(3,): unit vector to the right of the picture."""
+        return self.pose[:3, 0]
+
+    @property
+    def up(self) -> Array:
+        """(3,): unit vector upwards in the picture."""
+        return self.pose[:3, 1]
+
+    @property
+    def forward(self) -> Array:
+        """(3,): unit vector of the view."""
+        return -self.pose[:3, 2]
+
+    def half_extent(self, size: tuple[int, int]) -> tuple[float, float]:
+        """Half width and half height of the view: at distance 1 for a perspective camera, in metres for the other."""
+        half_height = np.tan(np.radians(self.fov_y) / 2) if self.fov_y is not None else (self.height or 0.0) / 2
+        return float(half_height * size[0] / size[1]), float(half_height)
+
+    def rays(self, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> tuple[Array, Array]:
+        """Rays through the pixel centres.
+
+        Parameters
+        ----------
+        size : (width, height)
+            In pixels.
+        offset : (right, down)
+            Shift from the pixel centres, in pixels.
+
+        Returns
+        -------
+        origins, directions : (h, w, 3) float64
+            Directions have unit length; all origins of a perspective camera are the eye.
+        """
+        half_width, half_height = self.half_extent(size)
+        x = ((np.arange(size[0]) + 0.5 + offset[0]) / size[0] * 2 - 1) * half_width
+        y = (1 - (np.arange(size[1]) + 0.5 + offset[1]) / size[1] * 2) * half_height
+        across = x[None, :, None] * self.right + y[:, None, None] * self.up
+        if self.fov_y is None:
+            return self.eye + across, np.broadcast_to(self.forward, across.shape).copy()
+        directions = across + self.forward
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        return np.broadcast_to(self.eye, across.shape).copy(), directions
+
+
+def check_size(size: tuple[int, int]) -> tuple[int, int]:
+    """`size` as two ints; raises `InputError` where it is not a positive (width, height)."""
+    try:
+        width, height = (int(v) for v in size)
+        exact = (width, height) == tuple(size)
+    except (TypeError, ValueError):
+        raise InputError(f"frame size {size!r}", "not (width, height)", "give two whole numbers, for example (1280, 720)") from None
+    if not exact or width < 1 or height < 1:
+        raise InputError(f"frame size {size!r}", "not two whole numbers above 0", "give for example (1280, 720)")
+    return width, height
+
+
+def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Array:
+    e, t, u = (np.asarray(v, dtype=np.float64) for v in (eye, target, up))
+    if any(v.shape != (3,) or not np.isfinite(v).all() for v in (e, t, u)):
+        raise InputError("camera eye, target or up", "not three finite numbers", "give (x, y, z) for each")
+    backward = e - t
+    if not (distance := float(np.linalg.norm(backward))) > 0:
+        raise InputError("camera", f"eye and target are both at {tuple(e.tolist())}", "move one of them")
+    backward /= distance
+    right = np.cross(u, backward)
+    if not (length := float(np.linalg.norm(right))) > 1e-9 * float(np.linalg.norm(u)) or length == 0:
+        raise InputError("camera", f"up {tuple(u.tolist())} is along the view", "choose another up")
+    right /= length
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(backward, right), backward, e
+    return pose

@@ -1,0 +1,159 @@
+"""The one result type of every renderer, and how it is written to disk."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.color import linear_to_srgb
+from translucent.errors import InputError, RenderError
+from translucent.plan import RenderPlan
+
+#: The arrays of a frame, under the names that .npz files use.
+ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage", "valid")
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A rendered picture with its physical quantities. Row 0 is the top row; arrays are contiguous and the caller's.
+
+    Attributes
+    ----------
+    radiance, transmittance, optical_depth : (h, w, 3) float
+        Linear RGB.
+    thickness : (h, w) float
+        Path length inside media along the pixel's ray, in metres.
+    coverage : (h, w) bool
+        A medium was crossed.
+    valid : (h, w) bool
+        The numbers can be trusted.
+    plan : RenderPlan
+        What ran and why.
+    seconds : dict of str to float
+        Time per pass, and ``total`` for the whole call.
+    provenance : dict of str to str
+        Backend, driver and versions.
+    """
+
+    radiance: npt.NDArray[Any]
+    transmittance: npt.NDArray[Any]
+    optical_depth: npt.NDArray[Any]
+    thickness: npt.NDArray[Any]
+    coverage: npt.NDArray[np.bool_]
+    valid: npt.NDArray[np.bool_]
+    plan: RenderPlan
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        return self.thickness.shape[1], self.thickness.shape[0]
+
+    def to_srgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
+        """(h, w, 3) uint8: the radiance, `exposure` stops brighter, clamped to 0..1 and sRGB-encoded."""
+        linear = np.clip(np.asarray(self.radiance, dtype=np.float64) * 2.0**exposure, 0.0, 1.0)
+        return np.rint(linear_to_srgb(linear) * 255.0).astype(np.uint8)
+
+    def save(self, path: str | Path) -> None:
+        """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).
+
+        The file appears complete or not at all.
+
+        Raises
+        ------
+        InputError
+            If the suffix is none of these.
+        RenderError
+            If the file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
+        """
+        path = Path(path)
+        check_output(path)
+        write_atomically(path, _WRITERS[path.suffix.lower()].__get__(self))
+
+    def _write_png(self, path: Path) -> None:
+        from PIL import Image
+
+        Image.fromarray(self.to_srgb8()).save(path, format="PNG")
+
+    def _write_npz(self, path: Path) -> None:
+        with path.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **{name: getattr(self, name) for name in ARRAYS})
+
+    def _write_exr(self, path: Path) -> None:
+        import OpenEXR
+
+        channels = {"RGB": np.ascontiguousarray(self.radiance, dtype=np.float32)}
+        for name, layer in (("transmittance", self.transmittance), ("optical_depth", self.optical_depth)):
+            for i, channel in enumerate("RGB"):
+                channels[f"{name}.{channel}"] = np.ascontiguousarray(layer[..., i], dtype=np.float32)
+        channels["thickness.Z"] = np.ascontiguousarray(self.thickness, dtype=np.float32)
+        for name in ("coverage", "valid"):
+            channels[f"{name}.A"] = getattr(self, name).astype(np.float32)
+        header = {
+            "compression": OpenEXR.ZIP_COMPRESSION,
+            "type": OpenEXR.scanlineimage,
+            "comments": "linear Rec.709; thickness in metres",
+        }
+        with OpenEXR.File(header, channels) as file:
+            file.write(str(path))
+
+    def _repr_png_(self) -> bytes:
+        """The picture, for notebooks."""
+        import io
+
+        from PIL import Image
+
+        stream = io.BytesIO()
+        Image.fromarray(self.to_srgb8()).save(stream, format="PNG")
+        return stream.getvalue()
+
+
+_WRITERS: dict[str, Callable[[Frame, Path], None]] = {
+    ".png": Frame._write_png,
+    ".exr": Frame._write_exr,
+    ".npz": Frame._write_npz,
+}
+
+
+def check_output(path: Path) -> None:
+    """Raise before any work is done where a frame could not be written to `path`."""
+    if path.suffix.lower() not in _WRITERS:
+        raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
+    if not path.parent.is_dir():
+        raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
+    if path.suffix.lower() == ".exr":
+        try:
+            import OpenEXR  # noqa: F401
+        except ImportError:
+            raise RenderError(
+                f"output {str(path)!r}", "the OpenEXR package is not installed", "pip install 'translucent-shading[exr]'"
+            ) from None
+
+
+def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was."""
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise RenderError(f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder") from error
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        # mkstemp makes private files; a result has the permissions of any other new file.
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        write(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise RenderError(f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", "check the disk") from error
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,149 @@
+"""What shines: point and directional lights, and the environment behind everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.color import parse_color
+from translucent.errors import InputError
+
+Array = npt.NDArray[np.float64]
+ColorLike = str | npt.ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class PointLight:
+    """Light that shines alike in all directions and falls off with the inverse square (KHR_lights_punctual).
+
+    Parameters
+    ----------
+    position : array_like (3,)
+        In metres.
+    intensity : array_like (3,)
+        Radiant intensity in W/sr, linear RGB; one number stands for all channels.
+    """
+
+    position: npt.ArrayLike
+    intensity: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", _vector("light position", self.position))
+        object.__setattr__(self, "intensity", _positive("light intensity", self.intensity))
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionalLight:
+    """Light from infinitely far away (KHR_lights_punctual).
+
+    Parameters
+    ----------
+    direction : array_like (3,)
+        In which the light travels; any length but 0.
+    irradiance : array_like (3,)
+        On a surface that faces the light, in W/m^2, linear RGB.
+    """
+
+    direction: npt.ArrayLike
+    irradiance: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        direction = _vector("light direction", self.direction)
+        if not (length := float(np.linalg.norm(direction))) > 0:
+            raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
+        object.__setattr__(self, "direction", direction / length)
+        object.__setattr__(self, "irradiance", _positive("light irradiance", self.irradiance))
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """Radiance from far behind everything. Made by `constant`, `gradient` or `checkerboard`.
+
+    Attributes
+    ----------
+    kind : {"constant", "gradient", "checkerboard"}
+    first, second : (3,)
+        Linear radiance: bottom and top of a gradient, the two squares of a checkerboard.
+    tiles : float
+        Squares of a checkerboard along the height of the picture.
+    """
+
+    kind: Literal["constant", "gradient", "checkerboard"]
+    first: Array
+    second: Array
+    tiles: float = 8.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "first", _positive("environment radiance", self.first))
+        object.__setattr__(self, "second", _positive("environment radiance", self.second))
+        if not 0 < self.tiles < np.inf:
+            raise InputError(f"checkerboard of {self.tiles} tiles", "not above 0", "give for example 8")
+
+    @classmethod
+    def constant(cls, radiance: ColorLike) -> Environment:
+        """The same radiance from everywhere."""
+        return cls("constant", _radiance(radiance), _radiance(radiance))
+
+    @classmethod
+    def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
+        """From `bottom` for rays straight down (-Y) to `top` for rays straight up (+Y), linear in the sine between."""
+        return cls("gradient", _radiance(bottom), _radiance(top))
+
+    @classmethod
+    def checkerboard(cls, first: ColorLike, second: ColorLike, tiles: float = 8.0) -> Environment:
+        """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
+        return cls("checkerboard", _radiance(first), _radiance(second), tiles)
+
+    def radiance(self, directions: npt.ArrayLike, backdrop: npt.ArrayLike) -> Array:
+        """Radiance along rays, (..., 3); the twin of ``shaders/lib/environment.glsl``.
+
+        Parameters
+        ----------
+        directions : array_like (..., 3)
+            Unit vectors.
+        backdrop : array_like (..., 2)
+            Position in the picture, right and down from the top left corner, in heights of the picture.
+        """
+        if self.kind == "checkerboard":
+            share = checkerboard_share(backdrop, self.tiles)
+        elif self.kind == "gradient":
+            share = gradient_share(directions)
+        else:
+            share = np.zeros(np.asarray(directions).shape[:-1])
+        return self.first + (self.second - self.first) * share[..., None]
+
+
+def gradient_share(direction: npt.ArrayLike) -> Array:
+    """Share of a gradient's top in direction (..., 3): (1 + y) / 2."""
+    return np.asarray(0.5 + 0.5 * np.asarray(direction, dtype=np.float64)[..., 1])
+
+
+def checkerboard_share(backdrop: npt.ArrayLike, tiles: npt.ArrayLike) -> Array:
+    """1 in the second squares of a checkerboard at backdrop (..., 2), else 0; the top left square is a first one."""
+    cell = np.floor(np.asarray(backdrop, dtype=np.float64) * np.asarray(tiles, dtype=np.float64)[..., None])
+    return np.asarray(np.mod(cell[..., 0] + cell[..., 1], 2.0))
+
+
+def _vector(what: str, value: npt.ArrayLike) -> Array:
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        vector = np.zeros(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f"{what} {value!r}", "not three finite numbers", "give (x, y, z)")
+    vector.setflags(write=False)
+    return vector
+
+
+def _positive(what: str, value: npt.ArrayLike) -> Array:
+    triple = _vector(what, np.broadcast_to(np.asarray(value, dtype=np.float64), (3,)))
+    if (triple < 0).any():
+        raise InputError(f"{what} {tuple(triple.tolist())}", "negative", "give values of 0 and above")
+    return triple
+
+
+def _radiance(color: ColorLike) -> Array:
+    return parse_color(color) if isinstance(color, str) else _positive("environment radiance", color)

@@ -1,0 +1,132 @@
+"""Homogeneous media: what light meets between the entry and the exit of a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.color import parse_color
+from translucent.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Channels = npt.ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Medium:
+    """A homogeneous participating medium. Triples are linear Rec.709 channels; a single number stands for all three.
+
+    Parameters
+    ----------
+    absorption : array_like (3,)
+        sigma_a in 1/m, >= 0.
+    scattering : array_like (3,)
+        sigma_s in 1/m, >= 0: light that leaves the ray sideways.
+    emission : array_like (3,)
+        q in radiance per metre, >= 0.
+    anisotropy : float
+        Henyey-Greenstein g, -1 < g < 1.
+    ior : float
+        Index of refraction, >= 1; 1 is index-matched.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range or not finite.
+    """
+
+    absorption: Channels = (0.0, 0.0, 0.0)
+    scattering: Channels = (0.0, 0.0, 0.0)
+    emission: Channels = (0.0, 0.0, 0.0)
+    anisotropy: float = 0.0
+    ior: float = 1.0
+
+    def __post_init__(self) -> None:
+        for field in ("absorption", "scattering", "emission"):
+            object.__setattr__(self, field, _channels(field, getattr(self, field)))
+        if not -1 < self.anisotropy < 1:
+            raise InputError(f"medium anisotropy {self.anisotropy}", "not between -1 and 1", "give for example 0.8")
+        if not 1 <= self.ior < np.inf:
+            raise InputError(f"medium ior {self.ior}", "below 1 or not finite", "give for example 1.5 for glass")
+
+    @classmethod
+    def from_color(cls, color: str | npt.ArrayLike, distance: float, ior: float = 1.0) -> Medium:
+        """Absorbing medium that turns white light into `color` after `distance`: sigma_a = -log(t_c) / d.
+
+        Parameters
+        ----------
+        color : str or array_like (3,)
+            Transmitted colour: hex and names are sRGB, bare triples linear; each channel in 0 < t_c <= 1.
+        distance : float
+            In metres, > 0. Infinity leaves white light white, as an absent glTF attenuationDistance does.
+        ior : float
+            Index of refraction.
+
+        Raises
+        ------
+        InputError
+            If a channel is 0 (no finite extinction makes it), above 1 or not finite, or the distance is not positive.
+        """
+        triple = parse_color(color)
+        for channel, value in zip(("red", "green", "blue"), triple, strict=True):
+            if not 0 < value <= 1:
+                raise InputError(
+                    f"color {color!r}" if isinstance(color, str) else f"color {tuple(triple.tolist())}",
+                    f"{channel} = {value:g} is not in 0 < t <= 1",
+                    "no finite extinction gives 0 or above 1; use for example 0.001 for nearly black" if value <= 0
+                    else "a medium cannot add light; scale the color to at most 1",
+                )
+        try:
+            metres = float(distance)
+        except (TypeError, ValueError):
+            metres = np.nan
+        if not metres > 0:
+            raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
+        with np.errstate(over="ignore"):
+            extinction = optics.extinction_from_color(triple, metres)
+        if not np.isfinite(extinction).all():
+            raise InputError(f"distance {metres:g} m", "so short that the extinction overflows", "check the unit")
+        return cls(absorption=extinction, ior=ior)
+
+    @property
+    def extinction(self) -> Array:
+        """(3,): sigma_t = sigma_a + sigma_s in 1/m."""
+        return np.asarray(self.absorption) + np.asarray(self.scattering)
+
+    def transmittance(self, distance: npt.ArrayLike) -> Array:
+        """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
+        return optics.transmittance(np.asarray(distance, dtype=np.float64)[..., None] * self.extinction)
+
+    @property
+    def emits(self) -> bool:
+        """Whether any channel emits."""
+        return bool(np.any(np.asarray(self.emission) > 0))
+
+    @property
+    def scatters(self) -> bool:
+        """Whether any channel scatters."""
+        return bool(np.any(np.asarray(self.scattering) > 0))
+
+    def _key(self) -> tuple[object, ...]:
+        triples = (np.asarray(v) for v in (self.absorption, self.scattering, self.emission))
+        return (*(tuple(t.tolist()) for t in triples), self.anisotropy, self.ior)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Medium) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+
+def _channels(field: str, value: Channels) -> Array:
+    try:
+        triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,)).copy()
+    except (TypeError, ValueError):
+        raise InputError(f"medium {field} {value!r}", "not one or three numbers", "give (r, g, b)") from None
+    if not (np.isfinite(triple).all() and (triple >= 0).all()):
+        raise InputError(f"medium {field} {tuple(triple.tolist())}", "negative or not finite", "give values of 0 and above")
+    triple.setflags(write=False)
+    return triple

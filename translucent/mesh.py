@@ -1,0 +1,229 @@
+"""Triangle meshes: a frozen value, its geometry in float64, and the way in from a file."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.diagnosis import Diagnosis, diagnose
+from translucent.errors import InputError, TranslucentWarning
+from translucent.repair import WELD_TOLERANCE, orient, weld
+from translucent.units import metres_per_unit
+
+Array = npt.NDArray[np.float64]
+
+#: Largest coordinate in metres whose square still fits into float32.
+MAX_COORDINATE = 1e18
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with shared vertices. Compared by identity; its arrays are read-only.
+
+    Parameters
+    ----------
+    vertices : array_like (n, 3)
+        Positions in metres.
+    faces : array_like (m, 3)
+        Vertex indices, counter-clockwise seen from outside.
+    uv : array_like (n, 2), optional
+        Texture coordinates, v upwards.
+    name : str
+        What messages call the mesh.
+    repairs : tuple of str
+        What `load_mesh` has mended, for the record.
+
+    Raises
+    ------
+    InputError
+        If a shape is wrong, there is no face, or an index points at no vertex.
+    """
+
+    vertices: Array
+    faces: npt.NDArray[np.int32]
+    uv: Array | None = None
+    name: str = "mesh"
+    repairs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        vertices = self._array("vertices", self.vertices, np.float64, 3)
+        faces = self._array("faces", self.faces, np.int32, 3)
+        if len(faces) == 0:
+            raise InputError(f"mesh {self.name!r}", "it has no faces", "give a triangle mesh")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            bad = int(np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(vertices)).any(axis=1))[0])
+            raise InputError(
+                f"mesh {self.name!r}",
+                f"face {bad} = {tuple(faces[bad].tolist())} points outside the {len(vertices)} vertices",
+                "export the mesh again",
+            )
+        self._freeze("vertices", vertices)
+        self._freeze("faces", faces)
+        if self.uv is not None:
+            uv = self._array("uv", self.uv, np.float64, 2)
+            if len(uv) != len(vertices):
+                raise InputError(f"mesh {self.name!r}", f"{len(uv)} uv for {len(vertices)} vertices", "give one per vertex")
+            self._freeze("uv", uv)
+
+    def _array(self, field: str, value: Any, dtype: Any, columns: int) -> npt.NDArray[Any]:
+        try:
+            array = np.array(value, dtype=dtype, order="C")
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(f"mesh {self.name!r}", f"{field} are not numbers of {np.dtype(dtype)}", "check the arrays") from None
+        if array.size == 0:
+            array = array.reshape(0, columns)
+        if array.ndim != 2 or array.shape[1] != columns:
+            raise InputError(f"mesh {self.name!r}", f"{field} of shape {array.shape}", f"give shape (n, {columns})")
+        return array
+
+    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
+        array.setflags(write=False)
+        object.__setattr__(self, field, array)
+
+    @cached_property
+    def diagnosis(self) -> Diagnosis:
+        """What is wrong with the mesh, and whether it bounds a solid."""
+        return diagnose(self.vertices, self.faces)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3): smallest and largest coordinates of the vertices that faces use."""
+        used = self.vertices[np.unique(self.faces)]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @property
+    def center(self) -> Array:
+        """(3,): centre of the bounding box."""
+        return np.asarray(0.5 * self.bounds[0] + 0.5 * self.bounds[1])
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the diagonal of the bounding box in metres."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+    @property
+    def volume(self) -> float:
+        """Signed volume in cubic metres."""
+        return self.diagnosis.volume
+
+    @cached_property
+    def vertex_normals(self) -> Array:
+        """(n, 3): unit normals, the mean of the face normals weighted by the angle at the vertex."""
+        corners = self.vertices[self.faces]
+        normals = np.zeros_like(self.vertices)
+        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        face_normals /= np.maximum(np.linalg.norm(face_normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        for i in range(3):
+            a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
+            angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+            np.add.at(normals, self.faces[:, i], face_normals * angle[:, None])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.where(length > 0, normals / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0))
+
+    def winding_number(self, point: npt.ArrayLike) -> float:
+        """How often the surface winds around `point`: 0 outside, 1 inside, a fraction on it or near a hole.
+
+        The sum of the solid angles of all faces over 4 pi (van Oosterom & Strackee 1983).
+        """
+        a, b, c = (self.vertices[self.faces] - np.asarray(point, dtype=np.float64)).transpose(1, 0, 2)
+        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+        with np.errstate(under="ignore"):
+            triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+            dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
+            half_angle = np.arctan2(triple, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+        return float(half_angle.sum() / (2.0 * np.pi))
+
+    def require_finite(self) -> None:
+        """Raise `InputError` where coordinates are not finite, or too large for float32 arithmetic."""
+        if bad := self.diagnosis.nonfinite_vertices:
+            raise InputError(
+                f"mesh {self.name!r}", f"{bad.count} vertices are not finite (first: {bad.first[0]})", "export the mesh again"
+            )
+        if (largest := float(np.abs(self.vertices).max())) > MAX_COORDINATE:
+            raise InputError(
+                f"mesh {self.name!r}",
+                f"a coordinate of {largest:.3g} m, beyond {MAX_COORDINATE:g} m",
+                "give the file's unit (--unit), or scale the mesh",
+            )
+
+
+def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
+    """Read a triangle mesh from a file, weld it and wind it consistently.
+
+    Parameters
+    ----------
+    path : path
+        What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
+    unit : str
+        Unit of the file's coordinates; glTF is in metres by definition.
+
+    Returns
+    -------
+    Mesh
+        In metres. Vertices within 1e-6 of the diagonal are one (with equal uv: seams stay); faces are wound alike per
+        part, and closed parts outwards. `repairs` says what was done; a changed winding is also a `TranslucentWarning`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, has no faces, or has coordinates that are not finite.
+    """
+    path = Path(path)
+    scale = metres_per_unit(unit)
+    vertices, faces, uv = _read(path)
+    raw = Mesh(vertices * scale, faces, uv, name=path.name)
+    raw.require_finite()
+    return _mended(raw)
+
+
+def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
+    import trimesh
+
+    asked = f"mesh {str(path)!r}"
+    if not path.is_file():
+        raise InputError(asked, "no such file", "check the path")
+    if path.suffix[1:].lower() not in trimesh.available_formats():
+        raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", "use obj, stl, ply, off or glb")
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            scene = trimesh.load_scene(path, process=False)
+            geometry = scene.to_mesh()
+    except Exception as error:  # noqa: BLE001 - each of trimesh's readers raises its own kinds
+        raise InputError(asked, f"it cannot be read ({type(error).__name__}: {error})", "export the mesh again") from error
+    if len(geometry.faces) == 0:
+        raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
+    coordinates = getattr(geometry.visual, "uv", None)
+    uv = None if coordinates is None or len(coordinates) != len(geometry.vertices) else np.array(coordinates)
+    return np.array(geometry.vertices, dtype=np.float64), np.array(geometry.faces, dtype=np.int32), uv
+
+
+def _mended(raw: Mesh) -> Mesh:
+    """`raw` welded and consistently wound, with its repairs on record."""
+    same = weld(raw.vertices, WELD_TOLERANCE * raw.diagonal)
+    faces, flipped, turned = orient(raw.vertices, same[raw.faces].astype(np.int32))
+    reversed_face = (faces != same[raw.faces]).any(axis=1)
+    split_faces = np.where(reversed_face[:, None], raw.faces[:, ::-1], raw.faces)
+    repairs = []
+    positions = raw.vertices[same]
+    if raw.uv is None:
+        index, vertices, uv = same, positions, None
+    else:
+        _, first, inverse = np.unique(np.column_stack([same, raw.uv]), axis=0, return_index=True, return_inverse=True)
+        index, vertices, uv = first[inverse.ravel()], positions, raw.uv
+    kept, faces = np.unique(index[split_faces], return_inverse=True)
+    if (merged := len(raw.vertices) - len(kept)) > 0:
+        repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
+    if flipped:
+        repairs.append(f"turned {flipped} of {len(faces)} faces to agree with their neighbours")
+    if turned:
+        repairs.append(f"turned {turned} closed part{'s' if turned > 1 else ''} outwards")
+    if flipped or turned:
+        warnings.warn(f"mesh {raw.name!r}: {'; '.join(repairs[-(bool(flipped) + bool(turned)):])}", TranslucentWarning, stacklevel=3)
+    return Mesh(vertices[kept], faces.reshape(-1, 3), None if uv is None else uv[kept], name=raw.name, repairs=tuple(repairs))

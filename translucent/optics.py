@@ -1,0 +1,146 @@
+"""Formulas of light in a medium, in float64. Each has a twin of the same name in ``shaders/lib/optics.glsl``.
+
+All functions are pure and broadcast over arrays. Symbols: extinction sigma_t in 1/m, distance d in m,
+optical depth tau = sigma_t d without unit, transmittance T = exp(-tau), emission q in radiance per metre.
+
+References
+----------
+Beer 1852; Henyey & Greenstein 1941; Max 1995, "Optical models for direct volume rendering";
+Porter & Duff 1984; Born & Wolf 1999 (Fresnel, section 1.5.2); Drobot 2017 (thin layer).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+#: Smallest cosine that the thin-layer formula divides by (Drobot 2017): a sheet seen edge-on is 1000 times its thickness.
+MIN_THIN_LAYER_COSINE = 0.001
+
+
+def transmittance(optical_depth: npt.ArrayLike) -> Array:
+    """Share of light that passes, T = exp(-tau) (Beer-Lambert); underflows to exactly 0."""
+    with np.errstate(under="ignore"):
+        return np.exp(-np.asarray(optical_depth, dtype=np.float64))
+
+
+def opacity(optical_depth: npt.ArrayLike) -> Array:
+    """Share of light that is lost, alpha = 1 - exp(-tau), without cancellation at small tau."""
+    with np.errstate(under="ignore"):
+        return -np.expm1(-np.asarray(optical_depth, dtype=np.float64))
+
+
+def extinction_from_color(color: npt.ArrayLike, distance: npt.ArrayLike) -> Array:
+    """Extinction that leaves `color` of white light after `distance`: sigma_t = -log(t_c) / d, in 1/m.
+
+    Parameters
+    ----------
+    color : array_like
+        Transmitted linear colour, 0 < t_c <= 1; t_c = 1 gives exactly 0.
+    distance : array_like
+        Distance in metres, > 0.
+
+    Notes
+    -----
+    Conditioning: a relative error e in t_c is an absolute error e / d in sigma_t, that is e / -log(t_c) relative.
+    A colour near white therefore says little about sigma_t.
+    """
+    # Adding 0 turns the -0 of a white channel into 0.
+    return -np.log(np.asarray(color, dtype=np.float64)) / np.asarray(distance, dtype=np.float64) + 0.0
+
+
+def mean_opacity_slope(optical_depth: npt.ArrayLike) -> Array:
+    """(1 - exp(-x)) / x, the mean transmittance over a path of optical depth x; 1 at x = 0."""
+    x = np.asarray(optical_depth, dtype=np.float64)
+    safe = np.where(x == 0, 1.0, x)
+    return np.where(x == 0, 1.0, opacity(safe) / safe)
+
+
+def emitted_radiance(emission: npt.ArrayLike, extinction: npt.ArrayLike, distance: npt.ArrayLike) -> Array:
+    """Radiance that a homogeneous, emitting interval adds: q / sigma_t (1 - exp(-sigma_t d)); q d at sigma_t = 0.
+
+    Max 1995, eq. 11 with a constant source term.
+    """
+    d = np.asarray(distance, dtype=np.float64)
+    return np.asarray(emission, dtype=np.float64) * d * mean_opacity_slope(np.asarray(extinction, dtype=np.float64) * d)
+
+
+def opacity_for_step(opacity_at_reference: npt.ArrayLike, step_ratio: npt.ArrayLike) -> Array:
+    """Opacity of a step that is `step_ratio` times the reference step: 1 - (1 - alpha)^ratio (opacity correction)."""
+    alpha = np.asarray(opacity_at_reference, dtype=np.float64)
+    with np.errstate(divide="ignore", under="ignore"):
+        return -np.expm1(np.asarray(step_ratio, dtype=np.float64) * np.log1p(-alpha))
+
+
+def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: npt.ArrayLike) -> Array:
+    """Front over behind for associated (premultiplied) colours: F + (1 - alpha) B (Porter & Duff 1984)."""
+    return np.asarray(front, np.float64) + (1.0 - np.asarray(front_opacity, np.float64)) * np.asarray(behind, np.float64)
+
+
+def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
+    """Unpolarised reflectance of a smooth dielectric boundary; 1 under total internal reflection.
+
+    Parameters
+    ----------
+    cos_incident : array_like
+        Cosine of the angle of incidence, 0..1.
+    ior : array_like
+        Index of refraction behind the boundary relative to the one in front of it.
+    """
+    c = np.asarray(cos_incident, dtype=np.float64)
+    n = np.asarray(ior, dtype=np.float64)
+    k = n * n - (1.0 - c) * (1.0 + c)
+    root = np.sqrt(np.maximum(k, 0.0))
+    parallel_sum, normal_sum = n * n * c + root, c + root
+    with np.errstate(invalid="ignore", divide="ignore"):
+        parallel = (n * n * c - root) / parallel_sum
+        normal = (c - root) / normal_sum
+    reflectance = 0.5 * (parallel * parallel + normal * normal)
+    # n = 1 seen edge-on is 0/0; the boundary does not exist, so nothing is reflected.
+    reflectance = np.where(n == 1.0, 0.0, reflectance)
+    return np.where(k <= 0.0, np.where(n == 1.0, 0.0, 1.0), reflectance)
+
+
+def refracted_cosine(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
+    """Cosine of the refracted angle (Snell): sqrt(1 - (1 - c^2) / n^2); 0 under total internal reflection."""
+    c = np.asarray(cos_incident, dtype=np.float64)
+    n = np.asarray(ior, dtype=np.float64)
+    return np.sqrt(np.maximum(1.0 - (1.0 - c) * (1.0 + c) / (n * n), 0.0))
+
+
+def thin_layer_thickness(thickness: npt.ArrayLike, cos_view: npt.ArrayLike, ior: npt.ArrayLike = 1.0) -> Array:
+    """Path through a thin sheet: t / max(0.001, n.v) (Drobot 2017), with the refracted cosine where ior > 1.
+
+    Parameters
+    ----------
+    thickness : array_like
+        Thickness t of the sheet in metres.
+    cos_view : array_like
+        n.v, cosine between the sheet's normal and the direction to the viewer; below 0.001 it counts as 0.001.
+    ior : array_like
+        Index of refraction; 1 means index-matched: the ray goes straight through.
+    """
+    cosine = refracted_cosine(np.maximum(np.asarray(cos_view, np.float64), 0.0), ior)
+    return np.asarray(thickness, np.float64) / np.maximum(cosine, MIN_THIN_LAYER_COSINE)
+
+
+def henyey_greenstein(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
+    """Henyey & Greenstein 1941 phase function in 1/sr: (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2)).
+
+    Parameters
+    ----------
+    cos_scatter : array_like
+        Cosine between the directions of travel before and after the event: 1 is straight on.
+    anisotropy : array_like
+        g, the mean cosine, -1 < g < 1.
+    """
+    g = np.asarray(anisotropy, dtype=np.float64)
+    # (1 - g)^2 + 2 g (1 - cos) is 1 + g^2 - 2 g cos without its cancellation at g -> 1, cos -> 1.
+    base = (1.0 - g) ** 2 + 2.0 * g * (1.0 - np.asarray(cos_scatter, dtype=np.float64))
+    return (1.0 - g) * (1.0 + g) / (4.0 * np.pi * base * np.sqrt(base))
+
+

@@ -1,0 +1,219 @@
+"""The planner: from a scene to the cheapest passes that are exact for it, each with its reason. Pure; needs no GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from translucent.errors import InputError
+from translucent.scene import Object, Scene
+from translucent.thickness import BackFaceDepth, Method, SignedDepth, ThinLayer
+
+#: An open mesh that was declared solid is drawn, where it is not closed, as a sheet of this share of its diagonal.
+FALLBACK_SHEET = 0.01
+
+
+@dataclass(frozen=True)
+class PassSpec:
+    """One pass of a plan.
+
+    Attributes
+    ----------
+    name : str
+        What the pass is called in `Frame.seconds`.
+    reason : str
+        Why the scene needs it.
+    objects : tuple of int
+        Indices into `Scene.objects` of what it draws; empty for a pass over pixels.
+    geometry_passes : int
+        How often it draws them.
+    """
+
+    name: str
+    reason: str
+    objects: tuple[int, ...] = ()
+    geometry_passes: int = 0
+
+
+@dataclass(frozen=True)
+class RenderPlan:
+    """What runs and why.
+
+    Attributes
+    ----------
+    method : Method
+        How thickness is found.
+    passes : tuple of PassSpec
+        In order.
+    spectral : bool
+        The passes add up optical depth per channel, since media differ, and not only thickness.
+    limits : tuple of str
+        Where the result is not exact, and why; empty for an exact plan.
+    """
+
+    method: Method
+    passes: tuple[PassSpec, ...]
+    spectral: bool = False
+    limits: tuple[str, ...] = ()
+
+    @property
+    def exact(self) -> bool:
+        """Whether the result is exact for the meshes as given, up to float32."""
+        return not self.limits
+
+    @property
+    def geometry_passes(self) -> int:
+        """How often geometry is drawn in all."""
+        return sum(step.geometry_passes for step in self.passes)
+
+    def __str__(self) -> str:
+        lines = [f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}"]
+        lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
+        lines += [f"  limit: {limit}" for limit in self.limits]
+        return "\n".join(lines)
+
+
+def plan(scene: Scene, method: Method | None = None) -> RenderPlan:
+    """Choose the passes for a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    method : Method, optional
+        How to find thickness; None picks the cheapest way that is exact.
+
+    Raises
+    ------
+    InputError
+        If no available method can render the scene.
+    """
+    _refuse_unsupported(scene)
+    if isinstance(method, BackFaceDepth):
+        return _plan_back_face_depth(scene, method)
+    if isinstance(method, ThinLayer):
+        return _plan_thin_layer(scene, method)
+    sheets = _indices(scene, lambda body: body.sheet_thickness is not None)
+    if method is None and len(sheets) == len(scene.objects):
+        return _plan_thin_layer(scene, ThinLayer())
+    return _plan_signed_depth(scene, method or SignedDepth())
+
+
+def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
+    solids = _indices(scene, lambda body: body.sheet_thickness is None)
+    sheets = _indices(scene, lambda body: body.sheet_thickness is not None)
+    open_bodies = _indices(scene, lambda body: body.sheet_thickness is None and not body.mesh.diagnosis.solid)
+    spectral = _media_differ(scene)
+    what = "optical depth per channel, since media differ" if spectral else "thickness, since all bodies share one medium"
+    passes = [
+        PassSpec(
+            "signed_depth",
+            f"{_count(solids, 'body', 'bodies')} without order in one draw each: sum of exits minus entries gives {what}",
+            solids,
+            1,
+        )
+    ]
+    limits = []
+    if sheets:
+        passes.append(_sheet_pass(sheets, "declared thin: their paths add up"))
+    if open_bodies:
+        names = ", ".join(repr(scene.objects[i].mesh.name) for i in open_bodies)
+        passes.append(
+            PassSpec(
+                "thin_layer_fallback",
+                f"{names} not closed: pixels that enter and leave unequally often get sheets of "
+                f"{FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid",
+                open_bodies,
+                1,
+            )
+        )
+        limits.append(f"{names}: {'; '.join(p for i in open_bodies for p in scene.objects[i].mesh.diagnosis.problems)}")
+    if not method.anchored:
+        limits.append("distances count from the camera: float32 loses digits with distance")
+    return _finished(scene, method, passes, limits, spectral)
+
+
+def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
+    if _media_differ(scene):
+        raise InputError("BackFaceDepth", "bodies with different media", "use SignedDepth, which tells them apart")
+    everything = tuple(range(len(scene.objects)))
+    passes = [PassSpec("back_face_depth", "asked for: nearest front face, then farthest back face", everything, 2)]
+    limits = []
+    if len(scene.objects) > 1:
+        limits.append("several bodies: pixels that cross more than one are marked invalid")
+    if concave := [body.mesh.name for body in scene.objects if not body.mesh.diagnosis.convex]:
+        limits.append(f"{', '.join(concave)} not convex: pixels with more than one entry are marked invalid")
+    return _finished(scene, method, passes, limits, spectral=False)
+
+
+def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
+    everything = tuple(range(len(scene.objects)))
+    return _finished(scene, method, [_sheet_pass(everything, "every face a sheet: their paths add up")], [], _media_differ(scene))
+
+
+def _sheet_pass(objects: tuple[int, ...], reason: str) -> PassSpec:
+    return PassSpec("thin_layer", f"{_count(objects, 'sheet', 'sheets')} {reason}, t / max(0.001, n.v) each", objects, 1)
+
+
+def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list[str], spectral: bool) -> RenderPlan:
+    """The plan with its last pass, and with the limits that any method has in this scene."""
+    media = [body.medium for body in scene.bodies if body.medium is not None]
+    if any(medium.emits for medium in media):
+        reason = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
+    else:
+        reason = "Beer-Lambert: the background through exp(-optical depth)"
+    passes.append(PassSpec("transmittance", reason))
+    if any(medium.scatters for medium in media):
+        limits.append("scattering only removes light here: in-scattered light is not modelled")
+    if any(medium.ior > 1 and body.sheet_thickness is None for body, medium in zip(scene.bodies, media, strict=True)) and not isinstance(
+        method, ThinLayer
+    ):
+        limits.append("ior above 1: rays go straight, refraction and reflection are not modelled")
+    return RenderPlan(method, tuple(passes), spectral, tuple(limits))
+
+
+def _refuse_unsupported(scene: Scene) -> None:
+    if opaque := [body.mesh.name for body in scene.objects if body.medium is None]:
+        raise InputError(
+            f"rendering {', '.join(map(repr, opaque))}", "opaque objects are not supported yet", "give each object a medium"
+        )
+    if _media_differ(scene) and any(body.medium is not None and body.medium.emits for body in scene.bodies):
+        raise InputError(
+            "rendering emission among several media",
+            "their order along the ray matters, and ordered intervals are not supported yet",
+            "use one medium, or no emission",
+        )
+    if scene.overlap != "add" and (pair := _touching_pair(scene)) is not None:
+        names = " and ".join(repr(scene.objects[i].mesh.name) for i in pair)
+        raise InputError(
+            f'overlap="{scene.overlap}"',
+            f"{names} may overlap, which needs ordered intervals, and these are not supported yet",
+            'use overlap="add", or move the bodies apart',
+        )
+
+
+def _touching_pair(scene: Scene) -> tuple[int, int] | None:
+    """Two bodies whose bounds share a point, if there are any."""
+    for j, later in enumerate(scene.objects):
+        for i, earlier in enumerate(scene.objects[:j]):
+            if (later.bounds[0] <= earlier.bounds[1]).all() and (later.bounds[1] >= earlier.bounds[0]).all():
+                return i, j
+    return None
+
+
+def _media_differ(scene: Scene) -> bool:
+    media = [body.medium for body in scene.bodies]
+    return any(
+        not np.array_equal(a.extinction, b.extinction) or not np.array_equal(a.emission, b.emission)
+        for a, b in zip(media, media[1:], strict=False)
+        if a is not None and b is not None
+    )
+
+
+def _indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
+    return tuple(i for i, body in enumerate(scene.objects) if keep(body))
+
+
+def _count(items: tuple[int, ...], one: str, many: str) -> str:
+    return f"{len(items)} {one if len(items) == 1 else many}"

@@ -1,0 +1,141 @@
+"""Scenes: bodies, a camera, lights and what is behind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera
+from translucent.errors import InputError
+from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.medium import Medium
+from translucent.mesh import Mesh
+
+Array = npt.NDArray[np.float64]
+Overlap = Literal["add", "union", "priority"]
+Light = PointLight | DirectionalLight
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """A mesh in the scene, filled with a medium.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Bounds the body; its coordinates must be finite.
+    medium : Medium or None
+        What fills it; None makes the object opaque.
+    transform : array_like (4, 4), optional
+        Object to world, affine, for column vectors; may mirror and scale each axis, not flatten. Default: none.
+    priority : int
+        With ``overlap="priority"`` the higher one displaces the lower.
+    sheet_thickness : float, optional
+        Declares the mesh a thin sheet of this thickness in metres, not the border of a solid.
+    """
+
+    mesh: Mesh
+    medium: Medium | None = None
+    transform: npt.ArrayLike | None = None
+    priority: int = 0
+    sheet_thickness: float | None = None
+
+    def __post_init__(self) -> None:
+        self.mesh.require_finite()
+        matrix = np.eye(4) if self.transform is None else np.array(self.transform, dtype=np.float64)
+        where = f"transform of {self.mesh.name!r}"
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+            raise InputError(where, "not a finite 4x4 matrix", "give a 4x4 matrix for column vectors")
+        if not np.array_equal(matrix[3], (0, 0, 0, 1)):
+            raise InputError(where, f"last row {tuple(matrix[3].tolist())}", "give an affine matrix with last row 0 0 0 1")
+        if np.linalg.matrix_rank(matrix[:3, :3]) < 3:
+            raise InputError(where, "it flattens the mesh (a scale of 0)", "give every axis a scale other than 0")
+        matrix.setflags(write=False)
+        object.__setattr__(self, "transform", matrix)
+        if self.sheet_thickness is not None and not 0 < self.sheet_thickness < np.inf:
+            raise InputError(
+                f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}", "not above 0", "give metres, for example 1e-3"
+            )
+
+    @property
+    def matrix(self) -> Array:
+        """(4, 4): object to world."""
+        return np.asarray(self.transform)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the transform turns the winding around."""
+        return bool(np.linalg.det(self.matrix[:3, :3]) < 0)
+
+    @cached_property
+    def faces_inwards(self) -> bool:
+        """Whether the faces, as drawn, look into the body: mirrored, or inverted, but not both."""
+        return self.mirrored != self.mesh.diagnosis.inverted
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3): smallest and largest world coordinates."""
+        low, high = self.mesh.bounds
+        corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+        world = corners @ self.matrix[:3, :3].T + self.matrix[:3, 3]
+        return np.stack([world.min(axis=0), world.max(axis=0)])
+
+    def winding_number(self, point: npt.ArrayLike) -> float:
+        """How often the body contains a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
+        local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
+        if (local < self.mesh.bounds[0]).any() or (local > self.mesh.bounds[1]).any():
+            return 0.0
+        number = self.mesh.winding_number(local)
+        return -number if self.mesh.diagnosis.inverted else number
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that a picture needs.
+
+    Parameters
+    ----------
+    objects : sequence of Object
+        At least one.
+    camera : Camera
+    lights : sequence of PointLight or DirectionalLight
+    environment : Environment
+        Default: white from everywhere.
+    overlap : {"add", "union", "priority"}
+        What fills a place that several bodies claim: the mixture of all, each medium once, or the highest priority.
+    """
+
+    objects: Sequence[Object]
+    camera: Camera
+    lights: Sequence[Light] = ()
+    environment: Environment = field(default_factory=lambda: Environment.constant((1.0, 1.0, 1.0)))
+    overlap: Overlap = "add"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "objects", tuple(self.objects))
+        object.__setattr__(self, "lights", tuple(self.lights))
+        if not self.objects:
+            raise InputError("scene", "it has no objects", "add a tl.Object")
+        if self.overlap not in get_args(Overlap):
+            raise InputError(f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}")
+
+    @property
+    def bodies(self) -> tuple[Object, ...]:
+        """Objects that are filled with a medium."""
+        return tuple(body for body in self.objects if body.medium is not None)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3): smallest and largest world coordinates of all objects."""
+        boxes = np.stack([body.bounds for body in self.objects])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the diagonal of the bounds in metres."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))

@@ -1,0 +1,54 @@
+"""Lengths with units. Inside the toolkit every length is in metres; files and the command line take a unit."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from translucent.errors import InputError
+
+METRES_PER_UNIT = {
+    "um": 1e-6,
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "dm": 1e-1,
+    "m": 1.0,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+}
+
+_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?inf|nan)\s*([a-zA-Zµ]*)\s*")
+
+
+def metres_per_unit(unit: str) -> float:
+    """Length of one `unit` in metres.
+
+    Raises
+    ------
+    InputError
+        If the unit is not known.
+    """
+    try:
+        return METRES_PER_UNIT[unit.replace("µ", "u")]
+    except KeyError:
+        raise InputError(
+            f"unit {unit!r}", "not a known unit of length", f"use one of {', '.join(METRES_PER_UNIT)}"
+        ) from None
+
+
+def parse_length(text: str, default_unit: str = "m") -> float:
+    """Metres of a length such as ``2cm``, ``0.8 in`` or, in `default_unit`, ``0.02``.
+
+    Raises
+    ------
+    InputError
+        If the text is not a positive, finite number with an optional unit.
+    """
+    match = _LENGTH.fullmatch(text)
+    if match is None:
+        raise InputError(f"length {text!r}", "not a number with a unit", "write for example 2cm, 0.8in or 0.02")
+    metres = float(match[1]) * metres_per_unit(match[2] or default_unit)
+    if not (math.isfinite(metres) and metres > 0):
+        raise InputError(f"length {text!r}", "not positive and finite", "give a distance above zero, for example 2cm")
+    return metres
