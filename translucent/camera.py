@@ -178,3 +178,24 @@ def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Ar
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(backward, right), backward, e
     return pose
+
+
+def view_ray(
+    pixel: npt.ArrayLike, size: npt.ArrayLike, right: npt.ArrayLike, up: npt.ArrayLike, forward: npt.ArrayLike
+) -> Array:
+    """Ray through points of a picture, not normalised: it advances 1 m along `forward`.
+
+    Parameters
+    ----------
+    pixel : array_like (..., 2)
+        Right and down from the top left corner, in pixels.
+    size : array_like (..., 2)
+        Width and height in pixels.
+    right, up : array_like (..., 3)
+        The camera's axes times half the extent of the view at distance 1; zero for an orthographic camera.
+    forward : array_like (..., 3)
+        Unit vector of the view.
+    """
+    ndc = 2.0 * np.asarray(pixel, np.float64) / np.asarray(size, np.float64) - 1.0
+    across = ndc[..., :1] * np.asarray(right, np.float64) - ndc[..., 1:] * np.asarray(up, np.float64)
+    return np.asarray(np.asarray(forward, np.float64) + across)

@@ -1,0 +1,24 @@
+// Vertices of a body, given as offsets from its center so that float32 resolves them whatever their place in the world.
+
+#include <Body>
+
+in vec3 offset;
+#if WITH_NORMAL
+in vec3 normal;
+out vec3 world_normal;
+#endif
+
+// Meters along the camera's forward axis, from the body's anchor. All points of one pixel lie on one ray, so the ray's
+// length is this, times a factor of the pixel: one interpolated number carries the whole distance.
+out float axial;
+
+// Neighboring faces must agree on their shared vertices to the last bit, or pixels between them would leak.
+invariant gl_Position;
+
+void main() {
+    gl_Position = clip_from_offset * vec4(offset, 1.0);
+    axial = dot(axis.xyz, offset) + axis.w;
+#if WITH_NORMAL
+    world_normal = mat3(world_from_normal) * normal;
+#endif
+}

@@ -1,0 +1,14 @@
+// The procedural environments, as shares between two radiances. Pure.
+// Each function is the float32 twin of the same name in translucent/lights.py.
+
+// Share of a gradient's top in a unit direction, +Y up: (1 + y) / 2.
+float gradient_share(vec3 direction) {
+    return 0.5 + 0.5 * direction.y;
+}
+
+// 1 in the second squares of a checkerboard, else 0. backdrop: right and down from the top left corner of the picture,
+// in heights of the picture.
+float checkerboard_share(vec2 backdrop, float tiles) {
+    vec2 cell = floor(backdrop * tiles);
+    return mod(cell.x + cell.y, 2.0);
+}

@@ -1,0 +1,99 @@
+// From the accumulated path to what the frame holds: thickness, optical depth, transmittance, radiance, and the mask.
+// Row 0 of the output is the top row.
+
+#include <View>
+#include <Shade>
+#include "lib/optics.glsl"
+#include "lib/environment.glsl"
+#include "lib/ray.glsl"
+
+uniform sampler2D accumulated;
+#if SPECTRAL
+uniform sampler2D accumulated_path;
+#endif
+#if FALLBACK
+uniform sampler2D fallback;
+#if SPECTRAL
+uniform sampler2D fallback_path;
+#endif
+#endif
+
+layout(location = 0) out vec4 out_radiance;
+layout(location = 1) out vec4 out_transmittance;
+#if !AVERAGE
+layout(location = 2) out vec4 out_optical_depth;
+layout(location = 3) out float out_thickness;
+layout(location = 4) out float out_flags;
+#endif
+
+struct Path {
+    float thickness;
+    vec3 optical_depth;
+    float count;
+};
+
+// advance: meters along the ray per meter along the camera's forward axis.
+#if SPECTRAL
+Path read_path(sampler2D depths, sampler2D lengths, ivec2 texel, float advance) {
+    vec4 sum = texelFetch(depths, texel, 0);
+    return Path(texelFetch(lengths, texel, 0).r * advance, sum.rgb * advance, sum.a);
+}
+#else
+Path read_path(sampler2D sums, ivec2 texel, float advance) {
+    vec2 sum = texelFetch(sums, texel, 0).rg;
+    return Path(sum.r * advance, sum.r * advance * extinction.rgb, sum.g);
+}
+#endif
+
+vec3 background(vec2 pixel, vec3 ray) {
+    float share = 0.0;
+    if (environment_kind == ENVIRONMENT_GRADIENT) {
+        share = gradient_share(normalize(ray));
+    } else if (environment_kind == ENVIRONMENT_CHECKERBOARD) {
+        share = checkerboard_share(pixel / frame_size.y, environment_tiles);
+    }
+    return mix(environment_first.rgb, environment_second.rgb, share);
+}
+
+void main() {
+    vec2 pixel = gl_FragCoord.xy + frame_size.zw;
+    ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
+    vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
+    float advance = length(ray);
+
+#if SPECTRAL
+    Path path = read_path(accumulated, accumulated_path, texel, advance);
+#else
+    Path path = read_path(accumulated, texel, advance);
+#endif
+    bool covered = path.thickness != 0.0 || path.count != 0.0;
+    bool balanced = path.count >= expected_count.x && path.count <= expected_count.y;
+    // NaN fails every comparison, so this refuses it, too.
+    bool valid = balanced && path.thickness >= -negative_tolerance && path.thickness < NOTHING;
+    if (!valid) {
+#if FALLBACK
+#if SPECTRAL
+        path = read_path(fallback, fallback_path, texel, advance);
+#else
+        path = read_path(fallback, texel, advance);
+#endif
+#else
+        path = Path(0.0, vec3(0.0), 0.0);
+#endif
+    }
+    path.thickness = max(path.thickness, 0.0);
+    path.optical_depth = max(path.optical_depth, vec3(0.0));
+
+    vec3 through = transmittance(path.optical_depth);
+    vec3 radiance = background(pixel, ray) * through;
+#if EMISSION
+    radiance += emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
+#endif
+    out_radiance = vec4(radiance, 1.0);
+    out_transmittance = vec4(through, 1.0);
+#if !AVERAGE
+    out_optical_depth = vec4(path.optical_depth, 1.0);
+    out_thickness = path.thickness;
+    out_flags = ((covered ? FLAG_COVERED : 0.0) + (valid ? FLAG_VALID : 0.0)) / 255.0;
+#endif
+}

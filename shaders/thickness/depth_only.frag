@@ -1,0 +1,4 @@
+// Writes nothing but the depth buffer: the floor of what drawing this geometry costs.
+
+void main() {
+}

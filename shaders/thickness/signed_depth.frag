@@ -1,0 +1,23 @@
+// Signed depth (Baker & Boyd 2001): exits count up, entries count down, in any order, added up by blending.
+// The sum is the path inside the body; a count that does not balance betrays a hole or a flipped face.
+
+#include <Body>
+
+in float axial;
+
+#if SPECTRAL
+layout(location = 0) out vec4 optical_depth_and_count;  // per meter of ray advance
+layout(location = 1) out float path;
+#else
+layout(location = 0) out vec2 path_and_count;
+#endif
+
+void main() {
+    float side = gl_FrontFacing ? -1.0 : 1.0;
+#if SPECTRAL
+    optical_depth_and_count = vec4(side * axial * extinction.rgb, side);
+    path = side * axial;
+#else
+    path_and_count = vec2(side * axial, side);
+#endif
+}

@@ -1,0 +1,44 @@
+"""The single door to ``shaders/`` and ``meshes/``: beside the package in an installed wheel, else in the checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from translucent.errors import InputError
+
+_PACKAGE = Path(__file__).parent
+
+
+def shader_path(name: str) -> Path:
+    """Path of a shader file such as ``lib/optics.glsl``; raises `InputError` where there is none."""
+    path = _folder("shaders") / name
+    if not path.is_file():
+        raise InputError(f"shader {name!r}", f"no such file in {_folder('shaders')}", "reinstall translucent-shading")
+    return path
+
+
+def shader_library() -> list[Path]:
+    """The files of ``shaders/lib``, sorted."""
+    return sorted((_folder("shaders") / "lib").glob("*.glsl"))
+
+
+def mesh_path(name: str) -> Path:
+    """Path of a mesh that comes with the toolkit, such as ``goblet``; raises `InputError` where there is none."""
+    for path in _mesh_files():
+        if path.stem == name:
+            return path
+    raise InputError(f"mesh {name!r}", "not one of the toolkit's own", f"use one of {', '.join(mesh_names())}")
+
+
+def mesh_names() -> list[str]:
+    """Names of the meshes that come with the toolkit."""
+    return [path.stem for path in _mesh_files()]
+
+
+def _mesh_files() -> list[Path]:
+    return sorted(path for path in _folder("meshes").iterdir() if path.suffix in {".ply", ".glb", ".obj"})
+
+
+def _folder(kind: str) -> Path:
+    installed = _PACKAGE / kind
+    return installed if installed.is_dir() else _PACKAGE.parent / kind

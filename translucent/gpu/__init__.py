@@ -1,0 +1,1 @@
+"""The GPU ring: the only code that touches OpenGL."""

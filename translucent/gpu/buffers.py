@@ -1,0 +1,66 @@
+"""Meshes on the GPU: uploaded once, shared by all passes, gone when the mesh is."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import moderngl
+import numpy as np
+
+from translucent.mesh import Mesh
+
+
+class MeshBuffers:
+    """Vertex and index buffers of one mesh; vertices are offsets from the center of the mesh, in float32.
+
+    The offsets are taken in float64, so float32 resolves the body's size, not its place in the world. Nothing here
+    refers to the mesh: its end must be able to end these buffers.
+    """
+
+    def __init__(self, gl: moderngl.Context, mesh: Mesh) -> None:
+        self._gl = gl
+        self.offsets = gl.buffer((mesh.vertices - mesh.center).astype(np.float32))
+        self.indices = gl.buffer(mesh.faces)
+        self._normals: moderngl.Buffer | None = None
+        self._arrays: dict[int, moderngl.VertexArray] = {}
+
+    def vertex_array(self, program: moderngl.Program, mesh: Mesh) -> moderngl.VertexArray:
+        """The mesh bound to the inputs that `program` has: ``offset``, and ``normal`` where it asks for it."""
+        if (array := self._arrays.get(program.glo)) is None:
+            content = [(self.offsets, "3f", "offset")]
+            if "normal" in program:
+                if self._normals is None:
+                    self._normals = self._gl.buffer(mesh.vertex_normals.astype(np.float32))
+                content.append((self._normals, "3f", "normal"))
+            array = self._gl.vertex_array(program, content, self.indices, index_element_size=4)
+            self._arrays[program.glo] = array
+        return array
+
+    def release(self) -> None:
+        """Free the OpenGL objects now."""
+        for resource in (*self._arrays.values(), self.offsets, self.indices, self._normals):
+            if resource is not None:
+                resource.release()
+        self._arrays.clear()
+
+
+class MeshCache:
+    """Buffers of each mesh that has been drawn and is still alive."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._buffers: WeakKeyDictionary[Mesh, MeshBuffers] = WeakKeyDictionary()
+
+    def __getitem__(self, mesh: Mesh) -> MeshBuffers:
+        if (buffers := self._buffers.get(mesh)) is None:
+            buffers = self._buffers[mesh] = MeshBuffers(self._gl, mesh)
+        return buffers
+
+    def __len__(self) -> int:
+        return len(self._buffers)
+
+    def release(self) -> None:
+        """Free all buffers."""
+        for buffers in list(self._buffers.values()):
+            buffers.release()
+        self._buffers.clear()

@@ -1,0 +1,184 @@
+"""Where OpenGL comes from: one place that opens contexts, and records what it tried.
+
+``python -m translucent.gpu.context --probe`` prints as JSON which backend works here.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any, Literal, get_args
+
+import moderngl
+
+from translucent.errors import InputError, RenderError
+from translucent.gpu.osmesa import OSMesaContext
+
+Backend = Literal["egl", "window", "osmesa"]
+
+#: OpenGL 3.3 core is what every raster path needs.
+REQUIRED = 330
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One backend that was tried, and why it failed; None if it did not."""
+
+    backend: str
+    error: str | None
+
+
+class NoContextError(RenderError):
+    """There is no OpenGL to draw with; `attempts` says what was tried."""
+
+    def __init__(self, attempts: tuple[Attempt, ...]) -> None:
+        tried = "; ".join(f"{attempt.backend}: {attempt.error}" for attempt in attempts)
+        super().__init__(
+            "OpenGL 3.3 context",
+            f"none; tried {tried}",
+            "apt-get install libegl1 libgl1 libgl1-mesa-dri, or pip install 'translucent-shading[osmesa]'; "
+            "`translucent doctor` explains this machine",
+        )
+        self.attempts = attempts
+
+
+@dataclass(frozen=True, eq=False)
+class GpuContext:
+    """An OpenGL context with its origin.
+
+    Attributes
+    ----------
+    gl : moderngl.Context
+    backend : str
+        ``egl``, ``window``, ``osmesa`` or ``adopted``.
+    attempts : tuple of Attempt
+        What was tried before, ending with this one.
+    """
+
+    gl: moderngl.Context
+    backend: str
+    attempts: tuple[Attempt, ...] = ()
+
+    @property
+    def owned(self) -> bool:
+        """Whether we made the context, and so release it."""
+        return self.backend != "adopted"
+
+    @property
+    def renderer(self) -> str:
+        """Name of the driver's device; a software rasteriser is named as such."""
+        name = str(self.gl.info["GL_RENDERER"])
+        software = any(word in name.lower() for word in ("llvmpipe", "softpipe", "swrast"))
+        return f"{name} (software rasteriser)" if software else name
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Backend, device, driver and versions, for the record."""
+        return {
+            "backend": self.backend,
+            "renderer": self.renderer,
+            "driver": str(self.gl.info["GL_VERSION"]),
+            "moderngl": version("moderngl"),
+        }
+
+    @contextmanager
+    def current(self) -> Iterator[moderngl.Context]:
+        """Make the context current; an adopted one is current already, by contract."""
+        if not self.owned:
+            yield self.gl
+            return
+        with self.gl:
+            yield self.gl
+
+    def drain(self) -> None:
+        """Free what has been dropped since the last call; at a safe moment, with the context current."""
+        queue = self.gl.objects
+        while queue:
+            # moderngl's own gc() trips over objects that were released before they were dropped.
+            if (release := getattr(queue.popleft(), "release", None)) is not None:
+                release()
+
+
+def open_context(backend: str | None = None) -> GpuContext:
+    """Open an OpenGL context.
+
+    Parameters
+    ----------
+    backend : {"egl", "window", "osmesa"}, optional
+        None tries EGL, then OSMesa. ``window`` attaches to the context that is current in this thread.
+
+    Raises
+    ------
+    InputError
+        If the backend is not known.
+    NoContextError
+        If none of the backends works.
+    """
+    if backend is not None and backend not in get_args(Backend):
+        raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(get_args(Backend))}")
+    attempts: list[Attempt] = []
+    for name in (backend,) if backend else ("egl", "osmesa"):
+        try:
+            gl = _OPENERS[name]()
+        except Exception as error:  # noqa: BLE001 - glcontext raises bare Exception, and each platform its own kinds
+            attempts.append(Attempt(name, str(error) or type(error).__name__))
+            continue
+        attempts.append(Attempt(name, None))
+        gl.gc_mode = "context_gc"
+        return GpuContext(gl, name, tuple(attempts))
+    raise NoContextError(tuple(attempts))
+
+
+def adopt_context(gl: moderngl.Context) -> GpuContext:
+    """Use a context that somebody else owns: it is never released, and must be current whenever we draw.
+
+    Where it has no ``gc_mode`` it gets ``"context_gc"``, or what we drop would stay in its memory.
+    """
+    if gl.gc_mode is None:
+        gl.gc_mode = "context_gc"
+    return GpuContext(gl, "adopted")
+
+
+def _open_egl() -> moderngl.Context:
+    # Without explicit names glcontext looks for development symlinks that a runtime installation lacks.
+    names = {
+        "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL", "libGL.so.1"),
+        "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL", "libEGL.so.1"),
+    }
+    settings: dict[str, Any] = names if sys.platform.startswith("linux") else {}
+    return moderngl.create_context(require=REQUIRED, standalone=True, backend="egl", **settings)
+
+
+def _open_window() -> moderngl.Context:
+    return moderngl.create_context(require=REQUIRED)
+
+
+def _open_osmesa() -> moderngl.Context:
+    return moderngl.create_context(require=REQUIRED, context=OSMesaContext())
+
+
+_OPENERS: dict[str, Callable[[], moderngl.Context]] = {"egl": _open_egl, "window": _open_window, "osmesa": _open_osmesa}
+
+
+def _probe() -> int:
+    try:
+        context = open_context()
+    except NoContextError as error:
+        attempts = [vars(attempt) for attempt in error.attempts]
+        print(json.dumps({"backend": None, "renderer": None, "attempts": attempts, "message": str(error)}))
+        return 1
+    attempts = [vars(attempt) for attempt in context.attempts]
+    print(json.dumps({"backend": context.backend, "renderer": context.renderer, "attempts": attempts}))
+    context.gl.release()
+    return 0
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] != ["--probe"]:
+        sys.exit("usage: python -m translucent.gpu.context --probe")
+    sys.exit(_probe())

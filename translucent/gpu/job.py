@@ -1,0 +1,130 @@
+"""One frame under way: the scene, its plan, and what the passes share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import moderngl
+import numpy as np
+
+from translucent.gpu.buffers import MeshCache
+from translucent.gpu.layout import BODY, SHADE, VIEW
+from translucent.gpu.placement import MAX_SCENE_OPTICAL_DEPTH, Placement, depth_range, view_uniforms
+from translucent.gpu.shaders import CONSTANTS
+from translucent.gpu.targets import Targets
+from translucent.plan import FALLBACK_SHEET, RenderPlan
+from translucent.scene import Object, Scene
+from translucent.thickness import SignedDepth, ThinLayer
+
+#: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
+_ALIGNMENT = 256
+
+#: A path may be negative by rounding only; more than this share of the diagonal means that faces look the wrong way.
+_NEGATIVE_TOLERANCE = 1e-4
+
+
+class FrameJob:
+    """What a pass needs: bodies placed before the camera, uniform buffers, targets.
+
+    Parameters
+    ----------
+    gl, scene, plan, targets, meshes
+    """
+
+    def __init__(
+        self, gl: moderngl.Context, scene: Scene, plan: RenderPlan, targets: Targets, meshes: MeshCache
+    ) -> None:
+        self.gl = gl
+        self.scene = scene
+        self.plan = plan
+        self.targets = targets
+        self.meshes = meshes
+        self.average = False
+        self._placements = [Placement.of(body, scene.camera) for body in scene.objects]
+        self._stride = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
+        self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
+        self._bodies = gl.buffer(reserve=self._stride * len(scene.objects))
+        self._shade = gl.buffer(self._shade_uniforms())
+        self._cleared: set[str] = set()
+        self.place((0.0, 0.0))
+
+    def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
+        """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
+        camera, size = self.scene.camera, self.targets.size
+        depths = depth_range(self.scene) if with_depth else None
+        anchored = not (isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored)
+        limit = MAX_SCENE_OPTICAL_DEPTH / max(self.scene.diagonal, np.finfo(np.float64).tiny)
+        for i, placement in enumerate(self._placements):
+            record = placement.uniforms(
+                camera,
+                size,
+                shift,
+                anchored=anchored,
+                sheet_thickness=self._sheet_thickness(placement.body),
+                max_extinction=limit,
+                depth_range=depths,
+            )
+            self._bodies.write(record, offset=i * self._stride)
+        self._view.write(view_uniforms(camera, size, shift))
+        self._view.bind_to_uniform_block(VIEW.binding)
+        self._shade.bind_to_uniform_block(SHADE.binding)
+        self._cleared.clear()
+
+    def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
+        """Target in which thickness passes add up, cleared when a frame first asks for it."""
+        framebuffer = self.targets.path_and_count(self.plan.spectral, name)
+        if name not in self._cleared:
+            framebuffer.clear()
+            self._cleared.add(name)
+        return framebuffer
+
+    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+        """Draw objects with the current state; front faces are those where a ray enters."""
+        for i in objects:
+            body = self.scene.objects[i]
+            self._bodies.bind_to_uniform_block(BODY.binding, offset=i * self._stride, size=BODY.dtype.itemsize)
+            self.gl.front_face = "cw" if body.faces_inwards else "ccw"
+            self.meshes[body.mesh].vertex_array(program, body.mesh).render()
+        self.gl.front_face = "ccw"
+
+    def release(self) -> None:
+        """Free the uniform buffers."""
+        for buffer in (self._view, self._bodies, self._shade):
+            buffer.release()
+
+    def _sheet_thickness(self, body: Object) -> float:
+        if body.sheet_thickness is not None:
+            return body.sheet_thickness
+        if isinstance(self.plan.method, ThinLayer):
+            return self.plan.method.thickness
+        return FALLBACK_SHEET * float(np.linalg.norm(body.bounds[1] - body.bounds[0]))
+
+    def _expected_counts(self) -> tuple[float, float]:
+        """Least and greatest sum of signed counts of a pixel that can be trusted."""
+        if isinstance(self.plan.method, ThinLayer):
+            return 0.0, 0.0
+        pairs: Iterator[tuple[float, float]] = (
+            placement.expected_count(self.scene.camera)
+            for placement in self._placements
+            if placement.body.sheet_thickness is None
+        )
+        low, high = zip(*pairs, strict=True)
+        return sum(low), sum(high)
+
+    def _shade_uniforms(self) -> bytes:
+        environment = self.scene.environment
+        medium = next((body.medium for body in self.scene.bodies), None)
+        limit = MAX_SCENE_OPTICAL_DEPTH / max(self.scene.diagonal, np.finfo(np.float64).tiny)
+        distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements)
+        raw = isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored
+        return SHADE.pack(
+            extinction=[*(np.zeros(3) if medium is None else np.minimum(medium.extinction, limit)), 0.0],
+            emission=[*(np.zeros(3) if medium is None else np.asarray(medium.emission)), 0.0],
+            environment_first=[*environment.first, 0.0],
+            environment_second=[*environment.second, 0.0],
+            expected_count=self._expected_counts(),
+            # Distances from the camera cancel with an error that grows with them: that is not a flipped face.
+            negative_tolerance=_NEGATIVE_TOLERANCE * (self.scene.diagonal + (distance if raw else 0.0)),
+            environment_tiles=environment.tiles,
+            environment_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
+        )

@@ -1,0 +1,32 @@
+"""One technique per file; the table maps a plan's pass names to them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import moderngl
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
+from translucent.gpu.passes.signed_depth import SignedDepthPass
+from translucent.gpu.passes.thin_layer import ThinLayerPass
+from translucent.gpu.passes.transmittance import TransmittancePass
+from translucent.plan import PassSpec
+
+
+class Pass(Protocol):
+    """A step of a plan. It compiles its shaders when made, and sets all state that it relies on when run."""
+
+    def __init__(self, gl: moderngl.Context) -> None: ...
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Do what `spec` says."""
+
+
+PASSES: dict[str, type[Pass]] = {
+    "signed_depth": SignedDepthPass,
+    "thin_layer": ThinLayerPass,
+    "thin_layer_fallback": ThinLayerPass,
+    "back_face_depth": BackFaceDepthPass,
+    "transmittance": TransmittancePass,
+}

@@ -1,0 +1,40 @@
+"""Back-face depth: nearest front face, then farthest back face."""
+
+from __future__ import annotations
+
+import moderngl
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.shaders import CONSTANTS, build_program
+from translucent.plan import PassSpec
+
+
+class BackFaceDepthPass:
+    """Keeps the extreme distances by maximum blending and counts the faces, so that concave pixels are found out."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._faces = build_program(gl, "geometry/body.vert", "thickness/back_face_depth.frag", {"WITH_NORMAL": 0})
+        self._combine = build_program(
+            gl, "geometry/fullscreen.vert", "thickness/back_face_combine.frag", nearest_and_farthest=0
+        )
+        self._fullscreen = gl.vertex_array(self._combine, [])
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Draw front faces, then back faces, then turn both into a path."""
+        gl = job.gl
+        nothing = -float(CONSTANTS["NOTHING"])
+        faces = job.targets.nearest_and_farthest()
+        faces.use()
+        faces.clear(nothing, nothing, 0.0, 0.0)
+        gl.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        gl.blend_equation = moderngl.MAX, moderngl.FUNC_ADD
+        for culled in ("back", "front"):
+            gl.cull_face = culled
+            job.draw(self._faces, spec.objects)
+        gl.cull_face = "back"
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.enable_only(moderngl.NOTHING)
+        job.accumulator().use()
+        faces.color_attachments[0].use(0)
+        self._fullscreen.render(moderngl.TRIANGLES, vertices=3)

@@ -1,0 +1,24 @@
+"""A finished frame on a display."""
+
+from __future__ import annotations
+
+import moderngl
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.shaders import build_program, set_uniform
+
+
+class PresentPass:
+    """Exposure and sRGB encoding of the frame's radiance, into any framebuffer of the same size."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._program = build_program(gl, "geometry/fullscreen.vert", "present/present.frag", picture=0)
+        self._fullscreen = gl.vertex_array(self._program, [])
+
+    def run(self, job: FrameJob, framebuffer: moderngl.Framebuffer, stops: float) -> None:
+        """Draw the radiance, `stops` brighter."""
+        framebuffer.use()
+        job.gl.enable_only(moderngl.NOTHING)
+        job.targets.result().color_attachments[0].use(0)
+        set_uniform(self._program, "stops", stops)
+        self._fullscreen.render(moderngl.TRIANGLES, vertices=3)

@@ -1,0 +1,161 @@
+"""Where bodies are in a frame: float64 matrices on the CPU, rounded to float32 only as offsets from each body's center."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera
+from translucent.gpu.layout import BODY, VIEW
+from translucent.scene import Object, Scene
+
+Array = npt.NDArray[np.float64]
+
+#: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
+MAX_SCENE_OPTICAL_DEPTH = 1e30
+
+#: Least and greatest signed count where a body is cut by the image plane of an orthographic camera: each pixel starts
+#: its own ray there, inside or outside, so any count that is not negative may be right.
+_CUT_COUNT = (0.0, 1e3)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """One object as seen by a camera.
+
+    Attributes
+    ----------
+    cut : bool
+        The eye, or an orthographic image plane, is within the body's bounds: distances count from there.
+    anchor : (3,) float64
+        World-space vector from the eye to the center of the mesh.
+    """
+
+    body: Object
+    cut: bool
+    anchor: Array
+
+    @classmethod
+    def of(cls, body: Object, camera: Camera) -> Placement:
+        """Place `body` before `camera`."""
+        anchor = body.matrix[:3, :3] @ body.mesh.center + (body.matrix[:3, 3] - camera.eye)
+        low, high = body.bounds - camera.eye
+        if camera.fov_y is None:
+            # The corner of the bounds that is farthest behind decides.
+            forward = camera.forward
+            cut = bool(np.where(forward > 0, low, high) @ forward < 0)
+        else:
+            cut = bool((low <= 0).all() and (high >= 0).all())
+        return cls(body, cut, anchor)
+
+    def expected_count(self, camera: Camera) -> tuple[float, float]:
+        """Least and greatest signed count that a ray of this body may have: exits minus entries ahead of its origin."""
+        if not self.cut:
+            return 0.0, 0.0
+        if camera.fov_y is None:
+            return _CUT_COUNT
+        number = self.body.winding_number(camera.eye)
+        if self.body.mesh.diagnosis.solid and abs(number - round(number)) > 1e-6:
+            # Only on its surface does a solid have a fraction: rays inwards leave once more than rays outwards.
+            return float(np.floor(number)), float(np.ceil(number))
+        return float(round(number)), float(round(number))
+
+    def uniforms(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        shift: tuple[float, float],
+        *,
+        anchored: bool,
+        sheet_thickness: float,
+        max_extinction: float,
+        depth_range: tuple[float, float] | None = None,
+    ) -> bytes:
+        """Contents of the Body block.
+
+        Parameters
+        ----------
+        camera, size
+        shift : (right, down)
+            Of the sample points from the pixel centers, in pixels.
+        anchored : bool
+            Count distances from the body's center, not from the camera.
+        sheet_thickness : float
+            In metres, for passes that draw the body as a sheet.
+        max_extinction : float
+            In 1/m.
+        depth_range : (near, far), optional
+            Write depth between these; else all depths are alike, so that nothing is clipped but what is behind.
+        """
+        linear = self.body.matrix[:3, :3]
+        rows = np.stack([camera.right, camera.up, camera.forward])
+        seen = np.column_stack([rows @ linear, rows @ self.anchor])  # camera space, from offsets
+        half_width, half_height = camera.half_extent(size)
+        clip = np.zeros((4, 4))
+        clip[0], clip[1] = seen[0] / half_width, seen[1] / half_height
+        if camera.fov_y is None:
+            clip[3, 3] = 1.0
+        else:
+            clip[3] = seen[2]
+        clip[0] -= 2.0 * shift[0] / size[0] * clip[3]
+        clip[1] += 2.0 * shift[1] / size[1] * clip[3]
+        clip[2] = self._depth_row(camera, clip[3], seen[2], depth_range)
+        medium = self.body.medium
+        extinction = np.zeros(3) if medium is None else np.minimum(medium.extinction, max_extinction)
+        from_normal = np.eye(4)
+        from_normal[:3, :3] = np.linalg.inv(linear).T * (-1.0 if self.body.faces_inwards else 1.0)
+        # The scale of a normal is lost when it is normalised; unit scale keeps it within float32.
+        from_normal[:3, :3] /= np.abs(from_normal[:3, :3]).max()
+        axis = seen[2].copy()
+        if anchored and not self.cut:
+            axis[3] = 0.0
+        return BODY.pack(
+            clip_from_offset=clip,
+            world_from_normal=from_normal,
+            axis=axis,
+            extinction=[*extinction, 0.0],
+            sheet_thickness=sheet_thickness,
+            sheet_ior=1.0 if medium is None else medium.ior,
+        )
+
+    def _depth_row(
+        self, camera: Camera, w_row: Array, axial_row: Array, depth_range: tuple[float, float] | None
+    ) -> Array:
+        if depth_range is not None:
+            near, far = depth_range
+            if camera.fov_y is None:
+                return np.asarray((2.0 * axial_row - (near + far) * w_row) / (far - near))
+            return np.asarray(w_row * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near))
+        if camera.fov_y is None and self.cut:
+            # -1 on the image plane, growing ahead of it and never reaching 1: clips what is behind.
+            reach = float(np.abs(axial_row[3]) + np.linalg.norm(axial_row[:3]) * self.body.mesh.diagonal)
+            return np.asarray(axial_row / reach - w_row)
+        return np.zeros(4)
+
+
+def view_uniforms(camera: Camera, size: tuple[int, int], shift: tuple[float, float]) -> bytes:
+    """Contents of the View block."""
+    half_width, half_height = camera.half_extent(size)
+    perspective = camera.fov_y is not None
+    return VIEW.pack(
+        frame_size=[*size, *shift],
+        ray_right=[*(camera.right * half_width * perspective), 0.0],
+        ray_up=[*(camera.up * half_height * perspective), 0.0],
+        ray_forward=[*camera.forward, 0.0],
+    )
+
+
+def depth_range(scene: Scene) -> tuple[float, float]:
+    """Nearest and farthest distance along the view axis that a depth buffer must hold, in metres."""
+    camera = scene.camera
+    low, high = scene.bounds - camera.eye
+    corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+    axial = corners @ camera.forward
+    far = float(axial.max())
+    near = float(axial.min())
+    margin = 1e-3 * scene.diagonal
+    if camera.fov_y is None:
+        return near - margin, far + margin
+    return max(near - margin, 1e-4 * scene.diagonal), max(far + margin, scene.diagonal)

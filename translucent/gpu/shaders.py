@@ -1,0 +1,181 @@
+"""From files in ``shaders/`` to programs: includes, constants from Python, and compiler messages with file and line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+
+from translucent.assets import shader_path
+from translucent.color import LUMINANCE_WEIGHTS
+from translucent.errors import RenderError
+from translucent.gpu.layout import BLOCKS
+from translucent.optics import MIN_THIN_LAYER_COSINE
+
+#: Numbers that shaders share; Python is the only place where they are written.
+CONSTANTS: dict[str, str] = {
+    "PI": "3.14159265358979",
+    "LUMINANCE_WEIGHTS": f"vec3{LUMINANCE_WEIGHTS}",
+    "MIN_THIN_LAYER_COSINE": repr(MIN_THIN_LAYER_COSINE),
+    "MAX_OPTICAL_DEPTH": "1e4",  # exp of its negative is 0 with a wide margin
+    "SERIES_LIMIT": "0.5",
+    "NOTHING": "1e30",  # beyond every distance: coordinates end at 1e18
+    "UNEXPECTED": "1e6",  # a count that no pixel expects
+    "FLAG_COVERED": "1.0",
+    "FLAG_VALID": "2.0",
+    "ENVIRONMENT_CONSTANT": "0",
+    "ENVIRONMENT_GRADIENT": "1",
+    "ENVIRONMENT_CHECKERBOARD": "2",
+}
+
+_INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
+_CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")
+# "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (others)
+_LOCATION = re.compile(r"\b(\d+)(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+):)")
+
+
+@dataclass(frozen=True)
+class ShaderSource:
+    """Complete text of one stage.
+
+    Attributes
+    ----------
+    text : str
+        What the compiler gets.
+    files : tuple of str
+        Names of the parts; the compiler's source string number indexes them.
+    """
+
+    text: str
+    files: tuple[str, ...]
+
+    def locate(self, log: str) -> str:
+        """Compiler `log` with ``shaders/<file>:<line>`` in place of source string numbers."""
+
+        def place(match: re.Match[str]) -> str:
+            number, line = int(match[1]), match[2] or match[3] or match[4]
+            return f"shaders/{self.files[number]}:{line}" if number < len(self.files) else match[0]
+
+        return _LOCATION.sub(place, log)
+
+
+def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int = 330) -> ShaderSource:
+    """Text of the shader file `name` with its includes, each once.
+
+    Parameters
+    ----------
+    name : str
+        File under ``shaders/``.
+    defines : dict of str to int, optional
+        Switches for ``#if``; each must be one that the source asks for, and none that it asks for may be missing.
+
+    Raises
+    ------
+    RenderError
+        If an include is missing or goes in circles, or the switches do not match the source.
+    """
+    collector = _Collector()
+    collector.add(name, ())
+    body = "\n".join(collector.lines)
+    given = dict(defines or {})
+    if unknown := sorted(given.keys() - collector.switches):
+        raise RenderError(f"shader {name!r}", f"defines {unknown} that it does not ask for", "check the spelling")
+    if missing := sorted(collector.switches - given.keys()):
+        raise RenderError(f"shader {name!r}", f"it asks for {missing}, which are not defined", "define them as 0 or 1")
+    head = [f"#version {version} core", *(f"#define {key} {int(value)}" for key, value in given.items())]
+    return ShaderSource("\n".join([*head, body, ""]), tuple(collector.files))
+
+
+class _Collector:
+    """Gathers the lines of a file and of what it includes."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.files: list[str] = []
+        self.switches: set[str] = set()
+
+    def add(self, name: str, parents: tuple[str, ...]) -> None:
+        if name in parents:
+            raise RenderError(f"shader {parents[0]!r}", f"includes go in circles: {' -> '.join([*parents, name])}", "cut one")
+        if name in self.files:
+            return
+        number = len(self.files)
+        self.files.append(name)
+        self.lines.append(f"#line 1 {number}")
+        for line_number, line in enumerate(_text(name, parents).splitlines(), 1):
+            if match := _INCLUDE.match(line):
+                self.add(match[1] or f"<{match[2]}>", (*parents, name))
+                self.lines.append(f"#line {line_number + 1} {number}")
+                continue
+            if match := _CONDITION.match(line):
+                self.switches.update(re.findall(r"[A-Z_][A-Z0-9_]*", match[1]))
+            self.lines.append(line)
+
+
+def _text(name: str, parents: tuple[str, ...]) -> str:
+    if name == "<constants>":
+        return "\n".join(f"#define {key} {value}" for key, value in CONSTANTS.items())
+    if name.startswith("<"):
+        if (block := BLOCKS.get(name[1:-1])) is None:
+            raise RenderError(f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(BLOCKS)}, constants")
+        return block.glsl
+    return shader_path(name).read_text(encoding="utf-8")
+
+
+def build_program(
+    gl: moderngl.Context, vertex: str, fragment: str, defines: Mapping[str, int] | None = None, **samplers: int
+) -> moderngl.Program:
+    """Compile and link two files.
+
+    Parameters
+    ----------
+    vertex, fragment : str
+        Files under ``shaders/``.
+    defines : dict, optional
+        Switches; each stage gets those that it asks for, and at least one stage must ask for each.
+    samplers : int
+        Texture unit of each sampler.
+
+    Raises
+    ------
+    RenderError
+        With the compiler's message, by file and line.
+    """
+    given = dict(defines or {})
+    stages = [_stage(name, given) for name in (vertex, fragment)]
+    used = {key for stage in stages for key in given if f"#define {key} " in stage.text}
+    if unused := sorted(given.keys() - used):
+        raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither asks for {unused}", "check the spelling")
+    try:
+        program = gl.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
+    except moderngl.Error as error:
+        log = str(error)
+        stage = stages[1] if "fragment_shader" in log else stages[0]
+        raise RenderError(f"shader {stage.files[0]!r}", stage.locate(log).strip(), "mend the GLSL") from error
+    for name, block in BLOCKS.items():
+        if name in program:
+            program[name].binding = block.binding
+    for name, unit in samplers.items():
+        # A sampler that this variant declares but does not need is gone from the linked program.
+        if name in program or not any(re.search(rf"\b{name}\b", stage.text) for stage in stages):
+            set_uniform(program, name, unit)
+    return program
+
+
+def _stage(name: str, defines: Mapping[str, int]) -> ShaderSource:
+    """The stage with those of the defines that it asks for."""
+    collector = _Collector()
+    collector.add(name, ())
+    return preprocess(name, {key: value for key, value in defines.items() if key in collector.switches})
+
+
+def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
+    """Set a loose uniform; a name that the program does not have is an error, not a black picture."""
+    try:
+        program[name].value = value
+    except KeyError:
+        known = ", ".join(sorted(program))
+        raise RenderError(f"uniform {name!r}", f"the program has only {known}", "check the spelling") from None
