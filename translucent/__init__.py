@@ -19,7 +19,9 @@ from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.metrics import Errors, compare
 from translucent.plan import RenderPlan, plan
+from translucent.presets import Preset, preset, presets
 from translucent.scene import Object, Scene
+from translucent.showcase import showcase
 from translucent.thickness import BackFaceDepth, SignedDepth, ThinLayer
 
 if TYPE_CHECKING:
@@ -37,6 +39,7 @@ __all__ = [
     "Mesh",
     "Object",
     "PointLight",
+    "Preset",
     "RenderError",
     "RenderPlan",
     "Renderer",
@@ -48,7 +51,10 @@ __all__ = [
     "compare",
     "load_mesh",
     "plan",
+    "preset",
+    "presets",
     "reference",
+    "showcase",
 ]
 
 

@@ -11,6 +11,9 @@ from translucent.errors import InputError
 
 Array = npt.NDArray[np.float64]
 
+#: A framed object is smaller than the picture by this factor.
+FRAMING_MARGIN = 1.12
+
 
 @dataclass(frozen=True, eq=False)
 class Camera:
@@ -38,11 +41,15 @@ class Camera:
         if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
             raise InputError("camera pose", "it scales, shears or mirrors", "use Camera.look_at, or remove the scale")
         if (self.fov_y is None) == (self.height is None):
-            raise InputError("camera", "needs either fov_y or height", "give fov_y for perspective, height for orthographic")
+            raise InputError(
+                "camera", "needs either fov_y or height", "give fov_y for perspective, height for orthographic"
+            )
         if self.fov_y is not None and not 0 < self.fov_y < 180:
             raise InputError(f"camera fov_y {self.fov_y}", "not between 0 and 180 degrees", "give for example 45")
         if self.height is not None and not (0 < self.height < np.inf):
-            raise InputError(f"camera height {self.height}", "not positive and finite", "give the view's height in metres")
+            raise InputError(
+                f"camera height {self.height}", "not positive and finite", "give the view's height in metres"
+            )
         pose.setflags(write=False)
         object.__setattr__(self, "pose", pose)
 
@@ -69,17 +76,17 @@ class Camera:
     @classmethod
     def framing(
         cls,
-        bounds: npt.ArrayLike,
+        points: npt.ArrayLike,
         size: tuple[int, int] = (1, 1),
         direction: npt.ArrayLike = (-0.45, -0.35, -1.0),
         fov_y: float = 30.0,
     ) -> Camera:
-        """Perspective camera that sees the whole box `bounds` (2, 3), looking along `direction`.
+        """Perspective camera that sees all points, looking along `direction`, with a small margin.
 
         Parameters
         ----------
-        bounds : array_like (2, 3)
-            Smallest and largest corner in metres.
+        points : array_like (n, 3)
+            In metres: the vertices of what is to be seen, or the corners of its box.
         size : (width, height)
             Size of the picture in pixels: a narrow one needs more distance.
         direction : array_like (3,)
@@ -87,18 +94,22 @@ class Camera:
         fov_y : float
             Full vertical angle of view in degrees.
         """
-        low, high = np.asarray(bounds, dtype=np.float64)
-        center, radius = 0.5 * low + 0.5 * high, 0.5 * float(np.linalg.norm(high - low))
-        radius = radius if radius > 0 else 1.0
-        look = np.asarray(direction, dtype=np.float64)
-        look = look / np.linalg.norm(look)
-        corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)]) - center
-        probe = cls.look_at(center - look * radius, center, fov_y=fov_y)
-        side = corners @ probe.pose[:3, :2]
-        depth = corners @ look
-        half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0])
-        distance = float((np.abs(side) / (half * 0.92) - depth[:, None]).max())
-        return cls.look_at(center - look * max(distance, 1e-3 * radius), center, fov_y=fov_y)
+        seen = np.asarray(points, dtype=np.float64)
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        reach = float(np.linalg.norm(high - low)) or 1.0
+        axis = np.asarray(direction, dtype=np.float64)
+        pose = cls.look_at(low - axis, low, fov_y=fov_y).pose
+        local = (seen - 0.5 * (low + high)) @ pose[:3, :3]  # right, up, backward
+        half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
+        # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
+        upper, lower = (
+            (local[:, :2] + half * local[:, 2:]).max(axis=0),
+            (half * local[:, 2:] - local[:, :2]).max(axis=0),
+        )
+        center, distance = (upper - lower) / 2, float(((upper + lower) / (2 * half)).max())
+        distance = max(distance, float(local[:, 2].max()) + 1e-3 * reach)
+        target = 0.5 * (low + high) + pose[:3, :2] @ center
+        return cls.look_at(target + pose[:3, 2] * distance, target, fov_y=fov_y)
 
     @property
     def eye(self) -> Array:
@@ -157,7 +168,9 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
         width, height = (int(v) for v in size)
         exact = (width, height) == tuple(size)
     except (TypeError, ValueError):
-        raise InputError(f"frame size {size!r}", "not (width, height)", "give two whole numbers, for example (1280, 720)") from None
+        raise InputError(
+            f"frame size {size!r}", "not (width, height)", "give two whole numbers, for example (1280, 720)"
+        ) from None
     if not exact or width < 1 or height < 1:
         raise InputError(f"frame size {size!r}", "not two whole numbers above 0", "give for example (1280, 720)")
     return width, height

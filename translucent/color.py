@@ -36,7 +36,7 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Array:
 
 def luminance(linear: npt.ArrayLike) -> Array:
     """Relative luminance Y of linear Rec.709 colours, over the last axis."""
-    return np.asarray(linear, dtype=np.float64) @ np.asarray(LUMINANCE_WEIGHTS)
+    return np.asarray(np.asarray(linear, dtype=np.float64) @ np.asarray(LUMINANCE_WEIGHTS))
 
 
 def exposure_scale(stops: npt.ArrayLike) -> Array:
@@ -67,7 +67,9 @@ def parse_color(color: str | npt.ArrayLike) -> Array:
     try:
         triple = np.array(color, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"color {color!r}", "not three numbers", "give a linear (r, g, b) triple or a hex string") from None
+        raise InputError(
+            f"color {color!r}", "not three numbers", "give a linear (r, g, b) triple or a hex string"
+        ) from None
     if triple.shape != (3,):
         raise InputError(f"color {color!r}", f"shape {triple.shape}, not (3,)", "give one number each for r, g and b")
     return _finite(triple, str(color))

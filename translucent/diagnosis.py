@@ -102,10 +102,7 @@ class Diagnosis:
         return tuple(lines)
 
     def __str__(self) -> str:
-        if self.solid:
-            kind = "closed, convex" if self.convex else "closed"
-        else:
-            kind = "not a solid"
+        kind = ("closed, convex" if self.convex else "closed") if self.solid else "not a solid"
         return "; ".join([f"{kind}, {self.components} component{'s' if self.components != 1 else ''}", *self.problems])
 
 
@@ -127,17 +124,17 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
     faces : (m, 3) int32
         Valid indices into `vertices`.
     """
-    finite = np.isfinite(vertices).all(axis=1)
+    finite = np.asarray(np.isfinite(vertices).all(axis=1))
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     corners = np.where(finite[:, None], vertices, 0.0)[faces]
     with np.errstate(over="ignore", under="ignore"):
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        degenerate = ~(np.abs(normals).max(axis=1) > 0)
+        degenerate = np.asarray(~(np.abs(normals).max(axis=1) > 0))
     shared = position_ids(vertices)[faces]
     edges = _Edges(shared[~_collapsed(shared)])
-    open_edges = edges.total % 2 == 1
-    mixed = ~open_edges & (edges.net != 0)
+    open_edges = np.asarray(edges.total % 2 == 1)
+    mixed = np.asarray(~open_edges & (edges.net != 0))
     closed = not open_edges.any()
     solid = bool(closed and not mixed.any() and finite[used].all() and len(edges.total) > 0)
     volume = _signed_volume(corners)
@@ -206,7 +203,7 @@ class _Edges:
 
 def _collapsed(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Faces with two corners at one position: they have no side and no part in the cycle."""
-    return (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    return np.asarray((faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1))
 
 
 def _found(mask: npt.NDArray[np.bool_]) -> Finding:

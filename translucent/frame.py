@@ -57,6 +57,19 @@ class Frame:
         """(width, height) in pixels."""
         return self.thickness.shape[1], self.thickness.shape[0]
 
+    def summary(self) -> dict[str, Any]:
+        """What happened, in numbers that JSON can hold; thickness in metres over the valid, covered pixels."""
+        seen = self.thickness[self.coverage & self.valid]
+        return {
+            "size": list(self.size),
+            "plan": self.plan.summary(),
+            "seconds": dict(self.seconds),
+            "provenance": dict(self.provenance),
+            "covered_pixels": int(self.coverage.sum()),
+            "invalid_pixels": int((~self.valid).sum()),
+            "thickness": {"median": float(np.median(seen)), "max": float(seen.max())} if seen.size else None,
+        }
+
     def to_srgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: the radiance, `exposure` stops brighter, clamped to 0..1 and sRGB-encoded."""
         linear = np.clip(np.asarray(self.radiance, dtype=np.float64) * 2.0**exposure, 0.0, 1.0)
@@ -134,7 +147,9 @@ def check_output(path: Path) -> None:
             import OpenEXR  # noqa: F401
         except ImportError:
             raise RenderError(
-                f"output {str(path)!r}", "the OpenEXR package is not installed", "pip install 'translucent-shading[exr]'"
+                f"output {str(path)!r}",
+                "the OpenEXR package is not installed",
+                "pip install 'translucent-shading[exr]'",
             ) from None
 
 
@@ -143,7 +158,9 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
     except OSError as error:
-        raise RenderError(f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder") from error
+        raise RenderError(
+            f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder"
+        ) from error
     os.close(handle)
     temporary = Path(name)
     try:
@@ -154,6 +171,8 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
         write(temporary)
         temporary.replace(path)
     except OSError as error:
-        raise RenderError(f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", "check the disk") from error
+        raise RenderError(
+            f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", "check the disk"
+        ) from error
     finally:
         temporary.unlink(missing_ok=True)

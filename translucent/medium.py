@@ -76,7 +76,8 @@ class Medium:
                 raise InputError(
                     f"color {color!r}" if isinstance(color, str) else f"color {tuple(triple.tolist())}",
                     f"{channel} = {value:g} is not in 0 < t <= 1",
-                    "no finite extinction gives 0 or above 1; use for example 0.001 for nearly black" if value <= 0
+                    "no finite extinction gives 0 or above 1; use for example 0.001 for nearly black"
+                    if value <= 0
                     else "a medium cannot add light; scale the color to at most 1",
                 )
         try:
@@ -94,7 +95,7 @@ class Medium:
     @property
     def extinction(self) -> Array:
         """(3,): sigma_t = sigma_a + sigma_s in 1/m."""
-        return np.asarray(self.absorption) + np.asarray(self.scattering)
+        return np.asarray(np.add(self.absorption, self.scattering))
 
     def transmittance(self, distance: npt.ArrayLike) -> Array:
         """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
@@ -127,6 +128,8 @@ def _channels(field: str, value: Channels) -> Array:
     except (TypeError, ValueError):
         raise InputError(f"medium {field} {value!r}", "not one or three numbers", "give (r, g, b)") from None
     if not (np.isfinite(triple).all() and (triple >= 0).all()):
-        raise InputError(f"medium {field} {tuple(triple.tolist())}", "negative or not finite", "give values of 0 and above")
+        raise InputError(
+            f"medium {field} {tuple(triple.tolist())}", "negative or not finite", "give values of 0 and above"
+        )
     triple.setflags(write=False)
     return triple

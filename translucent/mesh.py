@@ -68,14 +68,18 @@ class Mesh:
         if self.uv is not None:
             uv = self._array("uv", self.uv, np.float64, 2)
             if len(uv) != len(vertices):
-                raise InputError(f"mesh {self.name!r}", f"{len(uv)} uv for {len(vertices)} vertices", "give one per vertex")
+                raise InputError(
+                    f"mesh {self.name!r}", f"{len(uv)} uv for {len(vertices)} vertices", "give one per vertex"
+                )
             self._freeze("uv", uv)
 
     def _array(self, field: str, value: Any, dtype: Any, columns: int) -> npt.NDArray[Any]:
         try:
             array = np.array(value, dtype=dtype, order="C")
         except (TypeError, ValueError, OverflowError):
-            raise InputError(f"mesh {self.name!r}", f"{field} are not numbers of {np.dtype(dtype)}", "check the arrays") from None
+            raise InputError(
+                f"mesh {self.name!r}", f"{field} are not numbers of {np.dtype(dtype)}", "check the arrays"
+            ) from None
         if array.size == 0:
             array = array.reshape(0, columns)
         if array.ndim != 2 or array.shape[1] != columns:
@@ -139,11 +143,29 @@ class Mesh:
             half_angle = np.arctan2(triple, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
         return float(half_angle.sum() / (2.0 * np.pi))
 
+    def summary(self) -> dict[str, object]:
+        """What is known about the mesh, in values that JSON can hold; lengths in metres."""
+        found = self.diagnosis
+        return {
+            "name": self.name,
+            "vertices": len(self.vertices),
+            "faces": len(self.faces),
+            "bounds": self.bounds.tolist(),
+            "volume": found.volume if found.solid else None,
+            "solid": found.solid,
+            "convex": found.convex,
+            "components": found.components,
+            "problems": list(found.problems),
+            "repairs": list(self.repairs),
+        }
+
     def require_finite(self) -> None:
         """Raise `InputError` where coordinates are not finite, or too large for float32 arithmetic."""
         if bad := self.diagnosis.nonfinite_vertices:
             raise InputError(
-                f"mesh {self.name!r}", f"{bad.count} vertices are not finite (first: {bad.first[0]})", "export the mesh again"
+                f"mesh {self.name!r}",
+                f"{bad.count} vertices are not finite (first: {bad.first[0]})",
+                "export the mesh again",
             )
         if (largest := float(np.abs(self.vertices).max())) > MAX_COORDINATE:
             raise InputError(
@@ -189,14 +211,18 @@ def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
     if not path.is_file():
         raise InputError(asked, "no such file", "check the path")
     if path.suffix[1:].lower() not in trimesh.available_formats():
-        raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", "use obj, stl, ply, off or glb")
+        raise InputError(
+            asked, f"format {path.suffix or 'without suffix'!r} is not known", "use obj, stl, ply, off or glb"
+        )
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             scene = trimesh.load_scene(path, process=False)
             geometry = scene.to_mesh()
-    except Exception as error:  # noqa: BLE001 - each of trimesh's readers raises its own kinds
-        raise InputError(asked, f"it cannot be read ({type(error).__name__}: {error})", "export the mesh again") from error
+    except Exception as error:  # each of trimesh's readers raises its own kinds
+        raise InputError(
+            asked, f"it cannot be read ({type(error).__name__}: {error})", "export the mesh again"
+        ) from error
     if len(geometry.faces) == 0:
         raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
     coordinates = getattr(geometry.visual, "uv", None)
@@ -217,7 +243,7 @@ def _mended(raw: Mesh) -> Mesh:
     else:
         _, first, inverse = np.unique(np.column_stack([same, raw.uv]), axis=0, return_index=True, return_inverse=True)
         index, vertices, uv = first[inverse.ravel()], positions, raw.uv
-    kept, faces = np.unique(index[split_faces], return_inverse=True)
+    kept, renumbered = np.unique(index[split_faces], return_inverse=True)
     if (merged := len(raw.vertices) - len(kept)) > 0:
         repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
     if flipped:
@@ -225,5 +251,15 @@ def _mended(raw: Mesh) -> Mesh:
     if turned:
         repairs.append(f"turned {turned} closed part{'s' if turned > 1 else ''} outwards")
     if flipped or turned:
-        warnings.warn(f"mesh {raw.name!r}: {'; '.join(repairs[-(bool(flipped) + bool(turned)):])}", TranslucentWarning, stacklevel=3)
-    return Mesh(vertices[kept], faces.reshape(-1, 3), None if uv is None else uv[kept], name=raw.name, repairs=tuple(repairs))
+        warnings.warn(
+            f"mesh {raw.name!r}: {'; '.join(repairs[-(bool(flipped) + bool(turned)) :])}",
+            TranslucentWarning,
+            stacklevel=3,
+        )
+    return Mesh(
+        vertices[kept],
+        renumbered.reshape(-1, 3).astype(np.int32),
+        None if uv is None else uv[kept],
+        name=raw.name,
+        repairs=tuple(repairs),
+    )

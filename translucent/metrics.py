@@ -50,8 +50,8 @@ class Errors:
 
     def __str__(self) -> str:
         return (
-            f"{self.quantity} error: median {self.median:.2g}, p99 {self.p99:.2g}, p99.9 {self.p999:.2g}, max {self.max:.2g}, "
-            f"rms {self.rms:.2g}, bias {self.bias:+.2g}; invalid {self.invalid:.4%}; coverage differs on "
+            f"{self.quantity}: median {self.median:.2g}, p99 {self.p99:.2g}, p99.9 {self.p999:.2g}, "
+            f"max {self.max:.2g}, rms {self.rms:.2g}, bias {self.bias:+.2g}; invalid {self.invalid:.4%}; coverage differs on "
             f"{self.coverage_mismatch:.4%} ({self.pixels} pixels: {self.mask})"
         )
 
@@ -84,7 +84,9 @@ def compare(
         words += ", within the given mask"
     if not used.any():
         raise InputError("compare", f"no pixel is {words}", "check that both frames show the body")
-    error = np.asarray(getattr(frame, quantity), np.float64)[used] - np.asarray(getattr(truth, quantity), np.float64)[used]
+    error = (
+        np.asarray(getattr(frame, quantity), np.float64)[used] - np.asarray(getattr(truth, quantity), np.float64)[used]
+    )
     size = np.abs(error)
     median, p99, p999 = np.quantile(size, (0.5, 0.99, 0.999))
     return Errors(
@@ -111,4 +113,4 @@ def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     padded = np.pad(hit_counts, 1, mode="edge")
     height, width = hit_counts.shape
     shifted = [padded[i : i + height, j : j + width] for i in range(3) for j in range(3)]
-    return np.all([layer == hit_counts for layer in shifted], axis=0)
+    return np.asarray(np.all([layer == hit_counts for layer in shifted], axis=0))

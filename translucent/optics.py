@@ -11,14 +11,12 @@ Porter & Duff 1984; Born & Wolf 1999 (Fresnel, section 1.5.2); Drobot 2017 (thin
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-#: Smallest cosine that the thin-layer formula divides by (Drobot 2017): a sheet seen edge-on is 1000 times its thickness.
+#: Smallest cosine that the thin-layer formula divides by (Drobot 2017): a sheet seen edge-on is 1000 times as thick.
 MIN_THIN_LAYER_COSINE = 0.001
 
 
@@ -78,7 +76,9 @@ def opacity_for_step(opacity_at_reference: npt.ArrayLike, step_ratio: npt.ArrayL
 
 def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: npt.ArrayLike) -> Array:
     """Front over behind for associated (premultiplied) colours: F + (1 - alpha) B (Porter & Duff 1984)."""
-    return np.asarray(front, np.float64) + (1.0 - np.asarray(front_opacity, np.float64)) * np.asarray(behind, np.float64)
+    return np.asarray(front, np.float64) + (1.0 - np.asarray(front_opacity, np.float64)) * np.asarray(
+        behind, np.float64
+    )
 
 
 def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
@@ -142,5 +142,3 @@ def henyey_greenstein(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike) -> 
     # (1 - g)^2 + 2 g (1 - cos) is 1 + g^2 - 2 g cos without its cancellation at g -> 1, cos -> 1.
     base = (1.0 - g) ** 2 + 2.0 * g * (1.0 - np.asarray(cos_scatter, dtype=np.float64))
     return (1.0 - g) * (1.0 + g) / (4.0 * np.pi * base * np.sqrt(base))
-
-

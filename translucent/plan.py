@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -68,6 +69,18 @@ class RenderPlan:
         """How often geometry is drawn in all."""
         return sum(step.geometry_passes for step in self.passes)
 
+    def summary(self) -> dict[str, object]:
+        """The plan in values that JSON can hold."""
+        return {
+            "method": str(self.method),
+            "exact": self.exact,
+            "passes": [
+                {"name": step.name, "reason": step.reason, "geometry_passes": step.geometry_passes}
+                for step in self.passes
+            ],
+            "limits": list(self.limits),
+        }
+
     def __str__(self) -> str:
         lines = [f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
@@ -105,11 +118,13 @@ def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
     sheets = _indices(scene, lambda body: body.sheet_thickness is not None)
     open_bodies = _indices(scene, lambda body: body.sheet_thickness is None and not body.mesh.diagnosis.solid)
     spectral = _media_differ(scene)
-    what = "optical depth per channel, since media differ" if spectral else "thickness, since all bodies share one medium"
+    what = (
+        "optical depth per channel, since media differ" if spectral else "thickness, since all bodies share one medium"
+    )
     passes = [
         PassSpec(
             "signed_depth",
-            f"{_count(solids, 'body', 'bodies')} without order in one draw each: sum of exits minus entries gives {what}",
+            f"{_count(solids, 'body', 'bodies')} in any order, one draw each: exits minus entries add up to {what}",
             solids,
             1,
         )
@@ -149,11 +164,15 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
 
 def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
     everything = tuple(range(len(scene.objects)))
-    return _finished(scene, method, [_sheet_pass(everything, "every face a sheet: their paths add up")], [], _media_differ(scene))
+    return _finished(
+        scene, method, [_sheet_pass(everything, "every face a sheet: their paths add up")], [], _media_differ(scene)
+    )
 
 
 def _sheet_pass(objects: tuple[int, ...], reason: str) -> PassSpec:
-    return PassSpec("thin_layer", f"{_count(objects, 'sheet', 'sheets')} {reason}, t / max(0.001, n.v) each", objects, 1)
+    return PassSpec(
+        "thin_layer", f"{_count(objects, 'sheet', 'sheets')} {reason}, t / max(0.001, n.v) each", objects, 1
+    )
 
 
 def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list[str], spectral: bool) -> RenderPlan:
@@ -166,9 +185,9 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     passes.append(PassSpec("transmittance", reason))
     if any(medium.scatters for medium in media):
         limits.append("scattering only removes light here: in-scattered light is not modelled")
-    if any(medium.ior > 1 and body.sheet_thickness is None for body, medium in zip(scene.bodies, media, strict=True)) and not isinstance(
-        method, ThinLayer
-    ):
+    if any(
+        medium.ior > 1 and body.sheet_thickness is None for body, medium in zip(scene.bodies, media, strict=True)
+    ) and not isinstance(method, ThinLayer):
         limits.append("ior above 1: rays go straight, refraction and reflection are not modelled")
     return RenderPlan(method, tuple(passes), spectral, tuple(limits))
 
@@ -176,7 +195,9 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
 def _refuse_unsupported(scene: Scene) -> None:
     if opaque := [body.mesh.name for body in scene.objects if body.medium is None]:
         raise InputError(
-            f"rendering {', '.join(map(repr, opaque))}", "opaque objects are not supported yet", "give each object a medium"
+            f"rendering {', '.join(map(repr, opaque))}",
+            "opaque objects are not supported yet",
+            "give each object a medium",
         )
     if _media_differ(scene) and any(body.medium is not None and body.medium.emits for body in scene.bodies):
         raise InputError(
@@ -206,7 +227,7 @@ def _media_differ(scene: Scene) -> bool:
     media = [body.medium for body in scene.bodies]
     return any(
         not np.array_equal(a.extinction, b.extinction) or not np.array_equal(a.emission, b.emission)
-        for a, b in zip(media, media[1:], strict=False)
+        for a, b in itertools.pairwise(media)
         if a is not None and b is not None
     )
 

@@ -42,7 +42,7 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
     groups, label = connected_components(graph, directed=False)
     representative = np.full(groups, len(vertices), dtype=np.int64)
     np.minimum.at(representative, label, first)
-    return representative[label][inverse.ravel()]
+    return np.asarray(representative[label][inverse.ravel()])
 
 
 def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
@@ -96,7 +96,10 @@ def _spread_winding(faces: Faces) -> tuple[npt.NDArray[np.int64], npt.NDArray[np
     count = len(faces)
     start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
     _, edge, uses = np.unique(
-        np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1), axis=0, return_inverse=True, return_counts=True
+        np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1),
+        axis=0,
+        return_inverse=True,
+        return_counts=True,
     )
     edge = edge.ravel()
     order = np.argsort(edge, kind="stable")

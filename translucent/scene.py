@@ -52,14 +52,18 @@ class Object:
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
             raise InputError(where, "not a finite 4x4 matrix", "give a 4x4 matrix for column vectors")
         if not np.array_equal(matrix[3], (0, 0, 0, 1)):
-            raise InputError(where, f"last row {tuple(matrix[3].tolist())}", "give an affine matrix with last row 0 0 0 1")
+            raise InputError(
+                where, f"last row {tuple(matrix[3].tolist())}", "give an affine matrix with last row 0 0 0 1"
+            )
         if np.linalg.matrix_rank(matrix[:3, :3]) < 3:
             raise InputError(where, "it flattens the mesh (a scale of 0)", "give every axis a scale other than 0")
         matrix.setflags(write=False)
         object.__setattr__(self, "transform", matrix)
         if self.sheet_thickness is not None and not 0 < self.sheet_thickness < np.inf:
             raise InputError(
-                f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}", "not above 0", "give metres, for example 1e-3"
+                f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}",
+                "not above 0",
+                "give metres, for example 1e-3",
             )
 
     @property
@@ -122,7 +126,9 @@ class Scene:
         if not self.objects:
             raise InputError("scene", "it has no objects", "add a tl.Object")
         if self.overlap not in get_args(Overlap):
-            raise InputError(f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}")
+            raise InputError(
+                f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
+            )
 
     @property
     def bodies(self) -> tuple[Object, ...]:

@@ -1,4 +1,4 @@
-"""Where bodies are in a frame: float64 matrices on the CPU, rounded to float32 only as offsets from each body's center."""
+"""Where bodies are in a frame: float64 on the CPU, rounded to float32 only relative to each body's center."""
 
 from __future__ import annotations
 

@@ -170,14 +170,17 @@ class Renderer:
             self._targets = Targets(self._gpu.gl, size)
         return FrameJob(self._gpu.gl, scene, plans[method], self._targets, self._meshes)
 
-    def run(self, job: FrameJob) -> None:
-        """Run the passes of the job's plan, each timed."""
+    def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
+        """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
         gl = self._gpu.gl
         gl.viewport = (0, 0, *job.targets.size)
         self._timer.begin_frame()
         for spec in job.plan.passes:
+            if geometry_only and not spec.geometry_passes:
+                continue
+            step = self._pass(PASSES[spec.name])  # compiles on first use, which is no part of the frame
             with self._timer.measure(spec.name):
-                self._pass(PASSES[spec.name]).run(job, spec)
+                step.run(job, spec)
 
     def close(self) -> None:
         """Free all OpenGL objects, and the context if it is ours. Closing twice is fine."""

@@ -99,7 +99,9 @@ class _Collector:
 
     def add(self, name: str, parents: tuple[str, ...]) -> None:
         if name in parents:
-            raise RenderError(f"shader {parents[0]!r}", f"includes go in circles: {' -> '.join([*parents, name])}", "cut one")
+            raise RenderError(
+                f"shader {parents[0]!r}", f"includes go in circles: {' -> '.join([*parents, name])}", "cut one"
+            )
         if name in self.files:
             return
         number = len(self.files)
@@ -120,7 +122,9 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
         return "\n".join(f"#define {key} {value}" for key, value in CONSTANTS.items())
     if name.startswith("<"):
         if (block := BLOCKS.get(name[1:-1])) is None:
-            raise RenderError(f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(BLOCKS)}, constants")
+            raise RenderError(
+                f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(BLOCKS)}, constants"
+            )
         return block.glsl
     return shader_path(name).read_text(encoding="utf-8")
 

@@ -15,7 +15,9 @@ class Targets:
     def __init__(self, gl: moderngl.Context, size: Size) -> None:
         limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
         if max(size) > limit:
-            raise RenderError(f"frame size {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "render in parts, or smaller")
+            raise RenderError(
+                f"frame size {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "render in parts, or smaller"
+            )
         self._gl = gl
         self.size = size
         self._framebuffers: dict[str, moderngl.Framebuffer] = {}

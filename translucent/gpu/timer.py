@@ -15,6 +15,15 @@ class PassTimer:
         self._gl = gl
         self._queries: dict[str, moderngl.Query] = {}
         self._used: list[str] = []
+        # Mesa's software rasteriser measures the first query of a context from the beginning of time.
+        texture = gl.texture((1, 1), 1)
+        framebuffer = gl.framebuffer([texture])
+        first = gl.query(time=True)
+        with first:
+            framebuffer.clear()
+        _ = first.elapsed
+        framebuffer.release()
+        texture.release()
 
     def begin_frame(self) -> None:
         """Forget the previous frame's times."""

@@ -42,7 +42,9 @@ class TransmittancePass:
         key = (spectral, fallback, average, emission)
         if key not in self._variants:
             defines = {"SPECTRAL": spectral, "FALLBACK": fallback, "AVERAGE": average, "EMISSION": emission}
-            used = [name for name in _SAMPLERS if (spectral or "path" not in name) and (fallback or "fallback" not in name)]
+            used = [
+                name for name in _SAMPLERS if (spectral or "path" not in name) and (fallback or "fallback" not in name)
+            ]
             program = build_program(
                 self._gl,
                 "geometry/fullscreen.vert",

@@ -1,0 +1,87 @@
+"""What this machine has: OpenGL, packages, and what is missing for what."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, get_args
+
+from translucent.gpu.context import Backend, NoContextError, open_context
+
+#: Packages beside the core, and what each is for.
+OPTIONAL = {
+    "OpenEXR": "writing .exr files (pip install 'translucent-shading[exr]')",
+    "lavavu-osmesa": "a software OpenGL where the system has none (pip install 'translucent-shading[osmesa]')",
+}
+CORE = ("numpy", "scipy", "trimesh", "moderngl", "glcontext", "pillow", "click", "pyrender", "embreex")
+
+
+@dataclass(frozen=True)
+class BackendReport:
+    """One backend: what it offers, or why it does not work."""
+
+    name: str
+    works: bool
+    detail: str
+
+
+def examine_backends(names: Sequence[str] = get_args(Backend)) -> list[BackendReport]:
+    """Try each backend in turn."""
+    reports = []
+    for name in names:
+        try:
+            context = open_context(name)
+        except NoContextError as error:
+            reports.append(BackendReport(name, False, error.attempts[-1].error or ""))
+            continue
+        info = context.gl.info
+        detail = f"{context.renderer}; {info['GL_VERSION']}; textures up to {info['GL_MAX_TEXTURE_SIZE']}"
+        reports.append(BackendReport(name, True, detail))
+        if name != "window":
+            context.gl.release()
+    return reports
+
+
+def examine() -> dict[str, Any]:
+    """Facts about this machine, ready for JSON."""
+    backends = examine_backends()
+    usable = [report.name for report in backends if report.works and report.name != "window"]
+    return {
+        "translucent": _version("translucent-shading"),
+        "python": sys.version.split()[0],
+        "platform": platform.platform(),
+        "packages": {name: _version(name) for name in CORE},
+        "optional": {name: _version(name) for name in OPTIONAL},
+        "backends": {report.name: {"works": report.works, "detail": report.detail} for report in backends},
+        "backend": usable[0] if usable else None,
+    }
+
+
+def report(facts: dict[str, Any]) -> str:
+    """The facts in words, with what to do about what is missing."""
+    lines = [
+        f"translucent {facts['translucent']}, Python {facts['python']}, {facts['platform']}",
+        "packages: " + ", ".join(f"{name} {found or 'MISSING'}" for name, found in facts["packages"].items()),
+    ]
+    for name, found in facts["optional"].items():
+        lines.append(f"optional: {name} {found or 'not installed'}: {OPTIONAL[name]}")
+    for name, state in facts["backends"].items():
+        lines.append(f"OpenGL {name}: {'works' if state['works'] else 'no'}: {state['detail']}")
+    if facts["backend"] is None:
+        lines.append(
+            "No OpenGL 3.3 without a window: apt-get install libegl1 libgl1 libgl1-mesa-dri, "
+            "or pip install 'translucent-shading[osmesa]' (Linux x86-64)."
+        )
+    else:
+        lines.append(f"Rendering uses {facts['backend']}.")
+    return "\n".join(lines)
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

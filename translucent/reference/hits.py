@@ -1,0 +1,226 @@
+"""All intersections of the pixel rays of a camera with a mesh, in float64.
+
+Every test is made in the plane of the picture: seen along its ray, a pixel sends each vertex to one 2D point, which all
+faces at that vertex share. The sign of each edge function of these points is exact, and exact ties are broken by moving
+the ray by a symbolic, infinitely small step. So each ray crosses a closed surface inwards as often as outwards,
+whatever vertices and edges it passes through.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera, check_size
+from translucent.mesh import Mesh
+from translucent.scene import Object
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+_Arrays = tuple[npt.NDArray[np.generic], ...]
+
+#: Pairs of a triangle and a pixel that are tested at a time: the working arrays stay below 20 MB.
+CHUNK = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Where rays cross a surface: flat arrays, sorted by pixel, then distance, entries before exits.
+
+    Attributes
+    ----------
+    pixel : (k,) int64
+        Number of the ray: row * width + column.
+    distance : (k,) float64
+        In metres along the unit ray from its origin.
+    sign : (k,) int8
+        +1 where the ray enters the body, -1 where it leaves.
+    face : (k,) int64
+        Index into the mesh's faces.
+    barycentric : (k, 3) float64
+        Weights of the face's corners, >= 0, with sum 1.
+    """
+
+    pixel: Integers
+    distance: Array
+    sign: npt.NDArray[np.int8]
+    face: Integers
+    barycentric: Array
+
+    def where(self, keep: npt.NDArray[np.bool_] | Integers) -> Hits:
+        """The hits that a mask (k,) or indices choose."""
+        return Hits(self.pixel[keep], self.distance[keep], self.sign[keep], self.face[keep], self.barycentric[keep])
+
+
+def camera_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[int, int]) -> Hits:
+    """All surfaces of a mesh in front of the origins of the pixel rays.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    matrix : array_like (4, 4)
+        Object to world.
+    camera : Camera
+    size : (width, height)
+        In pixels.
+    """
+    line = line_hits(mesh, matrix, camera, size)
+    return line.where(line.distance >= 0)
+
+
+def line_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[int, int]) -> Hits:
+    """As `camera_hits`, with the surfaces behind the origins too, at negative distances."""
+    size = check_size(size)
+    body = Object(mesh, transform=matrix)
+    corners = _camera_vertices(mesh, body.matrix, camera)[mesh.faces]
+    # Homogeneous: perspective divides by the depth, an orthographic camera by 1.
+    weight = corners[..., 2] if camera.fov_y is not None else np.ones(corners.shape[:2])
+    grid = _Grid.of(camera, size)
+    parts: list[_Arrays] = []
+    # What is behind the eye appears in the picture as well, turned around: the same box around the negated points.
+    for side in (1, -1):
+        for face, row, column in _candidates(grid, side * corners, side * weight, size):
+            keep, *found = _intersect(corners[face], weight[face], grid.points(row, column), camera.fov_y is not None)
+            parts.append(((row * size[0] + column)[keep], face[keep], *found))
+    return _sorted(parts, -1 if body.faces_inwards else 1)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Pixel centres in the picture's plane: at distance 1 for a perspective camera, in metres for the other."""
+
+    center: Array
+    scale: Array
+
+    @classmethod
+    def of(cls, camera: Camera, size: tuple[int, int]) -> _Grid:
+        extent = np.array(camera.half_extent(size)) * (2.0, -2.0)
+        return cls((np.array(size) - 1) / 2, extent / size)
+
+    def points(self, row: Integers, column: Integers) -> Array:
+        """(k, 2): right and up."""
+        return (np.stack([column, row], axis=-1) - self.center) * self.scale
+
+    def pixels(self, points: Array, weight: Array) -> Array:
+        """(..., 2): homogeneous column and row of homogeneous points (..., 2) with `weight` (...,)."""
+        return points / self.scale + weight[..., None] * self.center
+
+
+def _camera_vertices(mesh: Mesh, matrix: Array, camera: Camera) -> Array:
+    """(n, 3): vertices right of, above and in front of the eye, in metres."""
+    anchor = mesh.center
+    terms = np.column_stack([matrix[:3, :3] * anchor, matrix[:3, 3], -camera.eye])
+    # The mesh keeps its shape to the last digit wherever it is: only the one offset to the eye is large.
+    offset = np.array([math.fsum(row) for row in terms])
+    world = _rotate(matrix[:3, :3], mesh.vertices - anchor) + offset
+    return _rotate(np.stack([camera.right, camera.up, camera.forward]), world)
+
+
+def _rotate(matrix: Array, vectors: Array) -> Array:
+    """matrix @ v for each v; unlike a matrix product, equal vectors give bit-equal results wherever they stand."""
+    x, y, z = vectors.T
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=-1)
+
+
+def _candidates(
+    grid: _Grid, corners: Array, weight: Array, size: tuple[int, int]
+) -> Iterator[tuple[Integers, Integers, Integers]]:
+    """Chunks of face, row and column: all pixels in the box around what of each face has a positive weight."""
+    pixels = grid.pixels(corners[..., :2], weight)
+    first_column, columns = _span(pixels[..., 0], weight, size[0])
+    first_row, rows = _span(pixels[..., 1], weight, size[1])
+    ends = np.cumsum(columns * rows)
+    for begin in range(0, int(ends[-1]), CHUNK):
+        pair = np.arange(begin, min(begin + CHUNK, int(ends[-1])))
+        face = np.searchsorted(ends, pair, side="right")
+        inside = pair - (ends - columns * rows)[face]
+        yield face, first_row[face] + inside // columns[face], first_column[face] + inside % columns[face]
+
+
+def _span(coordinate: Array, weight: Array, count: int) -> tuple[Integers, Integers]:
+    """(m,), (m,): the first pixel and the number of pixels along one axis that faces (m, 3) may cover."""
+    front = weight > 0
+    with np.errstate(over="ignore"):
+        ratio = coordinate / np.where(front, weight, 1.0)
+    low = np.where(front, ratio, np.inf).min(axis=1)
+    high = np.where(front, ratio, -np.inf).max(axis=1)
+    # A face within the eye's plane is seen only from a point on it, and then everywhere.
+    around = (weight == 0).all(axis=1) & (coordinate.min(axis=1) <= 0) & (coordinate.max(axis=1) >= 0)
+    low[around], high[around] = -np.inf, np.inf
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        # An edge that passes the eye's plane runs to infinity, in the direction of the point where it does.
+        crosses = front[:, i] != front[:, j]
+        a, b = coordinate[:, i] * np.abs(weight[:, j]), coordinate[:, j] * np.abs(weight[:, i])
+        noise = 1e-12 * (np.abs(a) + np.abs(b))
+        low[crosses & (a + b <= noise)] = -np.inf
+        high[crosses & (a + b >= -noise)] = np.inf
+    margin = 1e-9 * (count + 1)
+    first = np.maximum(np.ceil(np.clip(low, -1, count) - margin), 0).astype(np.int64)
+    last = np.minimum(np.floor(np.clip(high, -1, count) + margin), count - 1).astype(np.int64)
+    return first, np.maximum(last - first + 1, 0)
+
+
+def _intersect(corners: Array, weight: Array, points: Array, perspective: bool) -> tuple[Integers, *_Arrays]:
+    """Cross triangles (k, 3, 3) with the lines through picture points (k, 2), pair by pair.
+
+    Returns the indices of the pairs that do, and for each its distance, sign and barycentric weights.
+    """
+    # Seen along the ray, relative to it. Only this step rounds, and alike for all faces at a vertex.
+    seen = corners[..., :2] - weight[..., None] * points[:, None, :]
+    a, b = seen[:, (1, 2, 0)], seen[:, (2, 0, 1)]
+    with np.errstate(under="ignore"):
+        rough = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+        maybe = np.flatnonzero((rough >= 0).all(axis=1) | (rough <= 0).all(axis=1))
+        sign, area = _edge_functions(a[maybe], b[maybe])
+    inside = np.abs(sign.sum(axis=1)) == 3
+    keep, area = maybe[inside], area[inside]
+    barycentric = area / area.sum(axis=1, keepdims=True)
+    depths = corners[keep, :, 2]
+    # From the first corner, so that it is exact where the depths are equal.
+    depth = depths[:, 0] + ((depths[:, 1:] - depths[:, :1]) * barycentric[:, 1:]).sum(axis=1)
+    length = np.sqrt(1.0 + (points[keep] ** 2).sum(axis=1)) if perspective else 1.0
+    return keep, depth * length, sign[inside, 0], barycentric
+
+
+def _edge_functions(a: Array, b: Array) -> tuple[npt.NDArray[np.int8], Array]:
+    """Exact sign of the cross product a x b (..., 2), and its size; a tie is decided by moving the ray.
+
+    Rounding is monotone, so the rounded products tell which is larger unless they are equal; then their errors do.
+    The ray moves by (e, e^2), e -> 0: a x b changes by -e (b - a)_y + e^2 (b - a)_x. The sign is 0 where a = b.
+    """
+    left, right = a[..., 0] * b[..., 1], a[..., 1] * b[..., 0]
+    rest = _product_error(a[..., 0], b[..., 1], left) - _product_error(a[..., 1], b[..., 0], right)
+    sign = np.sign(left - right)
+    for tie in (rest, a[..., 1] - b[..., 1], b[..., 0] - a[..., 0]):
+        sign = np.where(sign == 0, np.sign(tie), sign)
+    return sign.astype(np.int8), np.abs((left - right) + rest)
+
+
+def _product_error(a: Array, b: Array, product: Array) -> Array:
+    """a b - product, exactly (Dekker 1971)."""
+    a_high, a_low = _halves(a)
+    b_high, b_low = _halves(b)
+    return a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
+
+
+def _halves(value: Array) -> tuple[Array, Array]:
+    """`value` as a sum of two numbers of 26 bits (Veltkamp)."""
+    scaled = value * (2.0**27 + 1.0)
+    high = scaled - (scaled - value)
+    return high, value - high
+
+
+def _sorted(parts: list[_Arrays], outwards: int) -> Hits:
+    """The parts as one, each hit once; `outwards` is -1 where the faces look into the body."""
+    nothing = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int8), np.empty((0, 3)))
+    pixel, face, distance, sign, barycentric = (np.concatenate(arrays) for arrays in zip(nothing, *parts, strict=True))
+    sign = (sign * outwards).astype(np.int8)
+    order = np.lexsort((face, -sign, distance, pixel))
+    hits = Hits(pixel, distance, sign, face, barycentric).where(order)
+    # A face that passes the eye may have a pixel in both of its boxes.
+    new = (np.diff(hits.pixel, prepend=-1) != 0) | (np.diff(hits.face, prepend=-1) != 0)
+    return hits.where(new)
