@@ -48,7 +48,7 @@ def _failed(message: str, code: int) -> int:
     return code
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="translucent-shading", prog_name="translucent")
 def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""

@@ -86,7 +86,7 @@ class Medium:
             metres = np.nan
         if not metres > 0:
             raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", under="ignore"):
             extinction = optics.extinction_from_color(triple, metres)
         if not np.isfinite(extinction).all():
             raise InputError(f"distance {metres:g} m", "so short that the extinction overflows", "check the unit")
@@ -99,7 +99,9 @@ class Medium:
 
     def transmittance(self, distance: npt.ArrayLike) -> Array:
         """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
-        return optics.transmittance(np.asarray(distance, dtype=np.float64)[..., None] * self.extinction)
+        with np.errstate(under="ignore"):
+            optical_depth = np.asarray(distance, dtype=np.float64)[..., None] * self.extinction
+        return optics.transmittance(optical_depth)
 
     @property
     def emits(self) -> bool:

@@ -140,7 +140,10 @@ class Mesh:
         with np.errstate(under="ignore"):
             triple = np.einsum("ij,ij->i", a, np.cross(b, c))
             dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
-            half_angle = np.arctan2(triple, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+            lengths = la * lb * lc
+            half_angle = np.arctan2(triple, lengths + dots[0] * lc + dots[1] * la + dots[2] * lb)
+        # Across a face its solid angle jumps from 2 pi to -2 pi: on it, as far as rounding can tell, it is the mean.
+        half_angle[np.abs(triple) <= 16 * np.finfo(np.float64).eps * lengths] = 0.0
         return float(half_angle.sum() / (2.0 * np.pi))
 
     def summary(self) -> dict[str, object]:

@@ -32,6 +32,12 @@ def opacity(optical_depth: npt.ArrayLike) -> Array:
         return -np.expm1(-np.asarray(optical_depth, dtype=np.float64))
 
 
+def log_one_minus(x: npt.ArrayLike) -> Array:
+    """log(1 - x), without cancellation at small x; -inf at x = 1."""
+    with np.errstate(divide="ignore"):
+        return np.log1p(-np.asarray(x, dtype=np.float64))
+
+
 def extinction_from_color(color: npt.ArrayLike, distance: npt.ArrayLike) -> Array:
     """Extinction that leaves `color` of white light after `distance`: sigma_t = -log(t_c) / d, in 1/m.
 
@@ -58,6 +64,7 @@ def mean_opacity_slope(optical_depth: npt.ArrayLike) -> Array:
     return np.where(x == 0, 1.0, opacity(safe) / safe)
 
 
+@np.errstate(under="ignore")
 def emitted_radiance(emission: npt.ArrayLike, extinction: npt.ArrayLike, distance: npt.ArrayLike) -> Array:
     """Radiance that a homogeneous, emitting interval adds: q / sigma_t (1 - exp(-sigma_t d)); q d at sigma_t = 0.
 
@@ -69,11 +76,13 @@ def emitted_radiance(emission: npt.ArrayLike, extinction: npt.ArrayLike, distanc
 
 def opacity_for_step(opacity_at_reference: npt.ArrayLike, step_ratio: npt.ArrayLike) -> Array:
     """Opacity of a step that is `step_ratio` times the reference step: 1 - (1 - alpha)^ratio (opacity correction)."""
-    alpha = np.asarray(opacity_at_reference, dtype=np.float64)
-    with np.errstate(divide="ignore", under="ignore"):
-        return -np.expm1(np.asarray(step_ratio, dtype=np.float64) * np.log1p(-alpha))
+    alpha, ratio = np.asarray(opacity_at_reference, dtype=np.float64), np.asarray(step_ratio, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore", under="ignore"):
+        # A step of no length loses nothing, even where 1 - alpha = 0 makes it 0 log(0).
+        return np.where(ratio == 0, 0.0, -np.expm1(ratio * log_one_minus(alpha)))
 
 
+@np.errstate(under="ignore")
 def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: npt.ArrayLike) -> Array:
     """Front over behind for associated (premultiplied) colours: F + (1 - alpha) B (Porter & Duff 1984)."""
     return np.asarray(front, np.float64) + (1.0 - np.asarray(front_opacity, np.float64)) * np.asarray(
@@ -81,6 +90,7 @@ def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: n
     )
 
 
+@np.errstate(under="ignore")
 def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
     """Unpolarised reflectance of a smooth dielectric boundary; 1 under total internal reflection.
 
@@ -93,23 +103,24 @@ def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array
     """
     c = np.asarray(cos_incident, dtype=np.float64)
     n = np.asarray(ior, dtype=np.float64)
-    k = n * n - (1.0 - c) * (1.0 + c)
+    # Each amplitude is a difference of nearly equal terms where n is near 1; multiplied out, it holds n^2 - 1.
+    contrast = (n - 1.0) * (n + 1.0)
+    k = contrast + c * c
     root = np.sqrt(np.maximum(k, 0.0))
-    parallel_sum, normal_sum = n * n * c + root, c + root
     with np.errstate(invalid="ignore", divide="ignore"):
-        parallel = (n * n * c - root) / parallel_sum
-        normal = (c - root) / normal_sum
-    reflectance = 0.5 * (parallel * parallel + normal * normal)
-    # n = 1 seen edge-on is 0/0; the boundary does not exist, so nothing is reflected.
-    reflectance = np.where(n == 1.0, 0.0, reflectance)
-    return np.where(k <= 0.0, np.where(n == 1.0, 0.0, 1.0), reflectance)
+        parallel = contrast * (c * c * (n * n + 1.0) - 1.0) / (n * n * c + root) ** 2
+        normal = contrast / (c + root) ** 2
+        reflectance = 0.5 * (parallel * parallel + normal * normal)
+    # A boundary between equal media does not exist, also not edge-on, where the formula is 0/0.
+    return np.where(contrast == 0.0, 0.0, np.where(k <= 0.0, 1.0, reflectance))
 
 
 def refracted_cosine(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
-    """Cosine of the refracted angle (Snell): sqrt(1 - (1 - c^2) / n^2); 0 under total internal reflection."""
+    """Cosine of the refracted angle (Snell): sqrt(n^2 - 1 + c^2) / n; 0 under total internal reflection."""
     c = np.asarray(cos_incident, dtype=np.float64)
     n = np.asarray(ior, dtype=np.float64)
-    return np.sqrt(np.maximum(1.0 - (1.0 - c) * (1.0 + c) / (n * n), 0.0))
+    with np.errstate(under="ignore"):
+        return np.sqrt(np.maximum((n - 1.0) * (n + 1.0) + c * c, 0.0)) / n
 
 
 def thin_layer_thickness(thickness: npt.ArrayLike, cos_view: npt.ArrayLike, ior: npt.ArrayLike = 1.0) -> Array:
@@ -139,6 +150,7 @@ def henyey_greenstein(cos_scatter: npt.ArrayLike, anisotropy: npt.ArrayLike) -> 
         g, the mean cosine, -1 < g < 1.
     """
     g = np.asarray(anisotropy, dtype=np.float64)
-    # (1 - g)^2 + 2 g (1 - cos) is 1 + g^2 - 2 g cos without its cancellation at g -> 1, cos -> 1.
-    base = (1.0 - g) ** 2 + 2.0 * g * (1.0 - np.asarray(cos_scatter, dtype=np.float64))
-    return (1.0 - g) * (1.0 + g) / (4.0 * np.pi * base * np.sqrt(base))
+    a, c = np.abs(g), np.where(g < 0, -1.0, 1.0) * np.asarray(cos_scatter, dtype=np.float64)
+    # Turned around for g < 0, (1 - a)^2 + 2 a (1 - c) is 1 + g^2 - 2 g cos without its cancellation.
+    base = (1.0 - a) ** 2 + 2.0 * a * (1.0 - c)
+    return (1.0 - a) * (1.0 + a) / (4.0 * np.pi * base * np.sqrt(base))

@@ -185,6 +185,8 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     passes.append(PassSpec("transmittance", reason))
     if any(medium.scatters for medium in media):
         limits.append("scattering only removes light here: in-scattered light is not modelled")
+    if scene.overlap != "add" and any(not body.mesh.diagnosis.convex for body in scene.bodies):
+        limits.append(f'overlap="{scene.overlap}": where a mesh overlaps itself, its medium counts twice')
     if any(
         medium.ior > 1 and body.sheet_thickness is None for body, medium in zip(scene.bodies, media, strict=True)
     ) and not isinstance(method, ThinLayer):

@@ -65,11 +65,13 @@ class Solid(ABC):
         with np.errstate(over="ignore", under="ignore"):
             if not (np.abs(_dot(direction, direction) - 1.0) < 1e-6).all():
                 raise InputError("chord along rays", "directions that are not of unit length", "normalize them")
-            return self._length(*np.broadcast_arrays(origin, direction))
+            origin, direction = np.broadcast_arrays(origin, direction)
+            length = self._length(origin.reshape(-1, 3), direction.reshape(-1, 3))
+            return length.reshape(origin.shape[:-1])
 
     @abstractmethod
     def _length(self, origins: Array, directions: Array) -> Array:
-        """`chord` of checked arrays of one shape."""
+        """`chord` of checked arrays (n, 3)."""
 
 
 class _Intervals(Solid):
@@ -77,7 +79,7 @@ class _Intervals(Solid):
 
     def _length(self, origins: Array, directions: Array) -> Array:
         nearest, shift = _nearest_to_zero(origins - self._middle(), directions)
-        ends = np.maximum(self._inside(nearest, directions), -shift[..., None, None])
+        ends = np.maximum(self._inside(nearest, directions), -shift[:, None, None])
         return np.asarray(np.maximum(ends[..., 1] - ends[..., 0], 0.0).sum(axis=-1))
 
     def _middle(self) -> Array:
@@ -86,9 +88,9 @@ class _Intervals(Solid):
 
     @abstractmethod
     def _inside(self, point: Array, direction: Array) -> Array:
-        """(..., k, 2): where each line enters and leaves, as distances from `point`; start >= end says empty.
+        """(n, k, 2): where each line enters and leaves, as distances from `point`; start >= end says empty.
 
-        `point` (..., 3) is relative to the middle, and the line's nearest to it.
+        `point` (n, 3) is relative to the middle, and the line's nearest to it.
         """
 
 
@@ -141,7 +143,7 @@ class Sphere(_Round):
     radius: float = 1.0
 
     def __post_init__(self) -> None:
-        _require(self, self.radius > 0, self.radius)
+        _require(self, self.radius > 0, self.radius, *self.center)
 
     def _shape(self) -> tuple[Vector, Vector]:
         return self.center, (self.radius, self.radius, self.radius)
@@ -155,7 +157,7 @@ class Ellipsoid(_Round):
     radii: Vector = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
-        _require(self, min(self.radii) > 0, *self.radii)
+        _require(self, min(self.radii) > 0, *self.radii, *self.center)
 
     def _shape(self) -> tuple[Vector, Vector]:
         return self.center, self.radii
@@ -182,13 +184,13 @@ class Box(_Intervals):
         """Exact volume in cubic metres."""
         return prod(b - a for a, b in zip(self.low, self.high, strict=True))
 
-    def tessellate(self, segments: int = 1) -> Mesh:  # noqa: ARG002 - flat faces need no resolution
+    def tessellate(self, segments: int = 1) -> Mesh:
         """Closed mesh of 12 faces."""
         corners = np.array([[(self.low, self.high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
         quads = np.array([(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)], np.int32)
         return Mesh(corners, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), name="box")
 
-    def sagitta(self, segments: int = 1) -> float:  # noqa: ARG002
+    def sagitta(self, segments: int = 1) -> float:
         """Zero: flat faces are exact."""
         return 0.0
 
@@ -237,7 +239,6 @@ class Torus(_Intervals):
         The roots themselves are found in the surface's own equation, whose rounding is far below that of the quartic's
         coefficients. A double root that rounding hides costs less than sqrt(epsilon): a tangent has no more digits.
         """
-        shape, point, direction = point.shape[:-1], point.reshape(-1, 3), direction.reshape(-1, 3)
         # t^4 + c2 t^2 + c1 t + c0, without a cubic term because `point` is the nearest to the center.
         across = _dot(direction[:, :2], direction[:, :2])
         c2 = 2.0 * (_dot(point, point) + self.major**2 - self.minor**2) - 4.0 * self.major**2 * across
@@ -256,7 +257,7 @@ class Torus(_Intervals):
         leaves = within[ray, piece]
         pieces[ray, piece, leaves.astype(int)] = self._root(point[ray], direction[ray], pieces[ray, piece], leaves)
         pieces[~(within[:, :-1] | within[:, 1:])] = 0.0
-        return pieces.reshape(*shape, 4, 2)
+        return pieces
 
     def _implicit(self, point: Array, direction: Array, t: Array) -> tuple[Array, Array]:
         """Squared distance to the circle minus minor^2 at `point + t direction`, and its derivative by `t`."""
@@ -269,7 +270,8 @@ class Torus(_Intervals):
     def _root(self, point: Array, direction: Array, bracket: Array, leaves: npt.NDArray[np.bool_]) -> Array:
         """The root between each pair of ends: Newton's steps while they halve within the bracket, else bisection."""
         low, high = bracket.T.copy()
-        t, last = 0.5 * (low + high), high - low
+        t: Array = 0.5 * (low + high)
+        last = high - low
         tolerance = 4.0 * np.finfo(np.float64).eps * (self.major + self.minor)
         for _ in range(120):
             value, slope = self._implicit(point, direction, t)
@@ -370,7 +372,7 @@ class SphericalShell(_Spheres):
     center: Vector = ORIGIN
 
     def __post_init__(self) -> None:
-        _require(self, 0 < self.inner < self.outer, self.outer, self.inner)
+        _require(self, 0 < self.inner < self.outer, self.outer, self.inner, *self.center)
 
     def _parts(self) -> tuple[tuple[Sphere, int], ...]:
         return (Sphere(self.center, self.outer), 1), (Sphere(self.center, self.inner), -1)

@@ -4,11 +4,6 @@
 
 #include <constants>
 
-// T = exp(-tau). The clamp keeps infinities out of exp; float32 is 0 from tau = 104 on.
-vec3 transmittance(vec3 optical_depth) {
-    return exp(-min(optical_depth, vec3(MAX_OPTICAL_DEPTH)));
-}
-
 // (1 - exp(-x)) / x. Near 0 the difference cancels, so a Taylor series takes over: its first omitted term,
 // x^9 / 10!, is below float32 rounding up to the switch at 0.5.
 vec3 mean_opacity_slope(vec3 optical_depth) {
@@ -29,9 +24,29 @@ vec3 opacity(vec3 optical_depth) {
     return mix(vec3(1.0) - exp(-x), x * mean_opacity_slope(x), lessThan(x, vec3(SERIES_LIMIT)));
 }
 
-// sigma_t = -log(t_c) / d.
+// T = exp(-tau); 0 from tau = 104 on in float32. Near 1 drivers' exp is off by a rounding, 1 - opacity is not.
+vec3 transmittance(vec3 optical_depth) {
+    vec3 x = min(optical_depth, vec3(MAX_OPTICAL_DEPTH));
+    return mix(exp(-x), vec3(1.0) - x * mean_opacity_slope(x), lessThan(x, vec3(SERIES_LIMIT)));
+}
+
+// log(1 - x). Drivers' log has an absolute error, useless near 1; there it is 2 artanh(-x / (2 - x)) as a series whose
+// first omitted term, s^14 / 15, is below float32 rounding for |s| <= 1/3.
+float log_one_minus(float x) {
+    if (x > 0.5) { return log(1.0 - x); }
+    float s = -x / (2.0 - x);
+    float s2 = s * s;
+    float series = 1.0 / 13.0;
+    for (int k = 11; k >= 1; k -= 2) {
+        series = 1.0 / float(k) + s2 * series;
+    }
+    return 2.0 * s * series;
+}
+
+// sigma_t = -log(t_c) / d. For t_c >= 0.5 the difference 1 - t_c is exact.
 vec3 extinction_from_color(vec3 color, float distance_m) {
-    return -log(color) / distance_m;
+    vec3 near_white = vec3(log_one_minus(1.0 - color.r), log_one_minus(1.0 - color.g), log_one_minus(1.0 - color.b));
+    return -mix(log(color), near_white, greaterThanEqual(color, vec3(0.5))) / distance_m;
 }
 
 // q / sigma_t (1 - exp(-sigma_t d)), and q d where sigma_t = 0.
@@ -41,11 +56,9 @@ vec3 emitted_radiance(vec3 emission, vec3 extinction, float distance_m) {
 
 // Opacity of a step that is step_ratio times as long: 1 - (1 - alpha)^ratio.
 float opacity_for_step(float opacity_at_reference, float step_ratio) {
-    // log1p of a small alpha by Kahan's trick: (1 - alpha) has rounded, and dividing by what it rounded to undoes it.
-    float kept = 1.0 - opacity_at_reference;
-    float lost = 1.0 - kept;
-    float log_kept = lost == 0.0 ? -opacity_at_reference : log(kept) * (opacity_at_reference / lost);
-    return kept <= 0.0 ? (step_ratio > 0.0 ? 1.0 : 0.0) : opacity(vec3(-step_ratio * log_kept)).x;
+    if (step_ratio == 0.0) { return 0.0; }
+    if (opacity_at_reference >= 1.0) { return 1.0; }
+    return opacity(vec3(-step_ratio * log_one_minus(opacity_at_reference))).x;
 }
 
 // Front over behind, associated (premultiplied) colors.
@@ -54,19 +67,23 @@ vec3 composite_over(vec3 front, float front_opacity, vec3 behind) {
 }
 
 // Unpolarised reflectance of a smooth dielectric; ior is relative to the side that the ray comes from.
+// Multiplied out, each amplitude holds n^2 - 1 as a factor, so that nothing cancels where ior is near 1.
 float fresnel_dielectric(float cos_incident, float ior) {
-    float k = ior * ior - (1.0 - cos_incident) * (1.0 + cos_incident);
-    if (ior == 1.0) { return 0.0; }
+    float contrast = (ior - 1.0) * (ior + 1.0);
+    float k = contrast + cos_incident * cos_incident;
+    if (contrast == 0.0) { return 0.0; }
     if (k <= 0.0) { return 1.0; }  // total internal reflection
     float root = sqrt(k);
-    float parallel = (ior * ior * cos_incident - root) / (ior * ior * cos_incident + root);
-    float normal = (cos_incident - root) / (cos_incident + root);
+    float parallel_sum = ior * ior * cos_incident + root;
+    float normal_sum = cos_incident + root;
+    float parallel = contrast * (cos_incident * cos_incident * (ior * ior + 1.0) - 1.0) / (parallel_sum * parallel_sum);
+    float normal = contrast / (normal_sum * normal_sum);
     return 0.5 * (parallel * parallel + normal * normal);
 }
 
 // Snell: cosine inside; 0 under total internal reflection.
 float refracted_cosine(float cos_incident, float ior) {
-    return sqrt(max(1.0 - (1.0 - cos_incident) * (1.0 + cos_incident) / (ior * ior), 0.0));
+    return sqrt(max((ior - 1.0) * (ior + 1.0) + cos_incident * cos_incident, 0.0)) / ior;
 }
 
 // Path through a thin sheet: t / max(0.001, cosine inside).
@@ -74,9 +91,10 @@ float thin_layer_thickness(float thickness, float cos_view, float ior) {
     return thickness / max(refracted_cosine(max(cos_view, 0.0), ior), MIN_THIN_LAYER_COSINE);
 }
 
-// Phase function in 1/sr; cos_scatter = 1 is straight on. The form of the base avoids cancellation as g -> 1.
+// Phase function in 1/sr; cos_scatter = 1 is straight on. Turned around for g < 0, the base does not cancel.
 float henyey_greenstein(float cos_scatter, float anisotropy) {
-    float g = anisotropy;
-    float base = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos_scatter);
+    float g = abs(anisotropy);
+    float cos_turned = anisotropy < 0.0 ? -cos_scatter : cos_scatter;
+    float base = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos_turned);
     return (1.0 - g) * (1.0 + g) / (4.0 * PI * base * sqrt(base));
 }

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import moderngl
 import numpy as np
 
@@ -19,7 +17,7 @@ from translucent.thickness import SignedDepth, ThinLayer
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
 
-#: A path may be negative by rounding only; more than this share of the diagonal means that faces look the wrong way.
+#: Share of the diagonal that a path may be below 0 by rounding.
 _NEGATIVE_TOLERANCE = 1e-4
 
 
@@ -103,28 +101,33 @@ class FrameJob:
         """Least and greatest sum of signed counts of a pixel that can be trusted."""
         if isinstance(self.plan.method, ThinLayer):
             return 0.0, 0.0
-        pairs: Iterator[tuple[float, float]] = (
-            placement.expected_count(self.scene.camera)
-            for placement in self._placements
-            if placement.body.sheet_thickness is None
-        )
-        low, high = zip(*pairs, strict=True)
+        low, high = zip(*(placement.expected_count for placement in self._placements), strict=True)
         return sum(low), sum(high)
+
+    def _negative_tolerance(self) -> float:
+        """How far below 0 a thickness may be, in metres, before it betrays faces that look the wrong way.
+
+        A rasteriser decides coverage on a grid of 1/256 pixel, so at a silhouette a pixel center may lie that far off
+        both faces, which are extended to it. One pixel's size covers slopes up to 256.
+        """
+        camera, size = self.scene.camera, self.targets.size
+        distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements) + self.scene.diagonal
+        pixel = 2.0 * camera.half_extent(size)[1] / size[1] * (1.0 if camera.fov_y is None else distance)
+        # Distances from the camera cancel with an error that grows with them: that is not a flipped face.
+        rounding = distance if isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored else 0.0
+        return _NEGATIVE_TOLERANCE * (self.scene.diagonal + rounding) + pixel
 
     def _shade_uniforms(self) -> bytes:
         environment = self.scene.environment
         medium = next((body.medium for body in self.scene.bodies), None)
         limit = MAX_SCENE_OPTICAL_DEPTH / max(self.scene.diagonal, np.finfo(np.float64).tiny)
-        distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements)
-        raw = isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored
         return SHADE.pack(
             extinction=[*(np.zeros(3) if medium is None else np.minimum(medium.extinction, limit)), 0.0],
             emission=[*(np.zeros(3) if medium is None else np.asarray(medium.emission)), 0.0],
             environment_first=[*environment.first, 0.0],
             environment_second=[*environment.second, 0.0],
             expected_count=self._expected_counts(),
-            # Distances from the camera cancel with an error that grows with them: that is not a flipped face.
-            negative_tolerance=_NEGATIVE_TOLERANCE * (self.scene.diagonal + (distance if raw else 0.0)),
+            negative_tolerance=self._negative_tolerance(),
             environment_tiles=environment.tiles,
             environment_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
         )

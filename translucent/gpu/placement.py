@@ -20,6 +20,9 @@ MAX_SCENE_OPTICAL_DEPTH = 1e30
 #: its own ray there, inside or outside, so any count that is not negative may be right.
 _CUT_COUNT = (0.0, 1e3)
 
+#: With the eye on a surface, what is nearer than this share of the diagonal is clipped.
+_NEAR_ON_SURFACE = 1e-6
+
 
 @dataclass(frozen=True)
 class Placement:
@@ -31,11 +34,14 @@ class Placement:
         The eye, or an orthographic image plane, is within the body's bounds: distances count from there.
     anchor : (3,) float64
         World-space vector from the eye to the center of the mesh.
+    expected_count : (float, float)
+        Least and greatest signed count that a ray may have: exits minus entries ahead of its origin.
     """
 
     body: Object
     cut: bool
     anchor: Array
+    expected_count: tuple[float, float]
 
     @classmethod
     def of(cls, body: Object, camera: Camera) -> Placement:
@@ -48,19 +54,12 @@ class Placement:
             cut = bool(np.where(forward > 0, low, high) @ forward < 0)
         else:
             cut = bool((low <= 0).all() and (high >= 0).all())
-        return cls(body, cut, anchor)
+        return cls(body, cut, anchor, _expected_count(body, camera) if cut else (0.0, 0.0))
 
-    def expected_count(self, camera: Camera) -> tuple[float, float]:
-        """Least and greatest signed count that a ray of this body may have: exits minus entries ahead of its origin."""
-        if not self.cut:
-            return 0.0, 0.0
-        if camera.fov_y is None:
-            return _CUT_COUNT
-        number = self.body.winding_number(camera.eye)
-        if self.body.mesh.diagnosis.solid and abs(number - round(number)) > 1e-6:
-            # Only on its surface does a solid have a fraction: rays inwards leave once more than rays outwards.
-            return float(np.floor(number)), float(np.ceil(number))
-        return float(round(number)), float(round(number))
+    @property
+    def on_surface(self) -> bool:
+        """Whether the eye is on the surface: rays inwards leave once more than rays outwards."""
+        return self.expected_count[0] != self.expected_count[1]
 
     def uniforms(
         self,
@@ -132,7 +131,23 @@ class Placement:
             # -1 on the image plane, growing ahead of it and never reaching 1: clips what is behind.
             reach = float(np.abs(axial_row[3]) + np.linalg.norm(axial_row[:3]) * self.body.mesh.diagonal)
             return np.asarray(axial_row / reach - w_row)
+        if self.on_surface:
+            # Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
+            return np.array([0.0, 0.0, 0.0, -_NEAR_ON_SURFACE * self.body.mesh.diagonal])
         return np.zeros(4)
+
+
+def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:
+    """Signed counts that are right for a body whose bounds the eye, or the image plane, is in."""
+    if body.sheet_thickness is not None:
+        return 0.0, 0.0
+    if camera.fov_y is None:
+        return _CUT_COUNT
+    number = body.winding_number(camera.eye)
+    if body.mesh.diagnosis.solid and abs(number - round(number)) > 1e-6:
+        # Only on its surface does the winding number of a solid have a fraction.
+        return float(np.floor(number)), float(np.ceil(number))
+    return float(round(number)), float(round(number))
 
 
 def view_uniforms(camera: Camera, size: tuple[int, int], shift: tuple[float, float]) -> bytes:

@@ -112,6 +112,7 @@ class Renderer:
         started = time.perf_counter()
         if samples < 1:
             raise InputError(f"samples {samples}", "below 1", "give for example 16")
+        self._require_open()
         with self._gpu.current():
             job = self.prepare(scene, size, method)
             try:
@@ -143,6 +144,7 @@ class Renderer:
         exposure : float
             Stops brighter.
         """
+        self._require_open()
         with self._gpu.current():
             job = self.prepare(scene, framebuffer.size, method)
             try:
@@ -157,8 +159,6 @@ class Renderer:
 
     def prepare(self, scene: Scene, size: tuple[int, int], method: Method | None = None) -> FrameJob:
         """Everything that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
-        if self._closed:
-            raise RenderError("rendering", "the renderer is closed", "make a new one")
         size = check_size(size)
         plans = self._plans.setdefault(scene, {})
         if method not in plans:
@@ -196,6 +196,10 @@ class Renderer:
             self._gpu.drain()
         if self._gpu.owned:
             self._gpu.gl.release()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise RenderError("rendering", "the renderer is closed", "make a new one")
 
     def _pass(self, kind: type[Pass]) -> Pass:
         if kind not in self._passes:

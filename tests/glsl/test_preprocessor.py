@@ -1,0 +1,115 @@
+"""Includes, switches, compiler messages and uniform blocks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.gpu import shaders
+from translucent.gpu.layout import BLOCKS, UniformBlock
+from translucent.gpu.shaders import build_program, preprocess, set_uniform
+
+
+@pytest.fixture
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Shader files of a test's own, in place of the toolkit's."""
+    (tmp_path / "full.vert").write_text("void main() { gl_Position = vec4(0.0); }\n")
+
+    def path(name: str) -> Path:
+        if not (tmp_path / name).is_file():
+            raise tl.InputError(f"shader {name!r}", "no such file")
+        return tmp_path / name
+
+    monkeypatch.setattr(shaders, "shader_path", path)
+    return tmp_path
+
+
+def test_includes_are_recursive_and_happen_once(files: Path) -> None:
+    (files / "a.glsl").write_text('#include "b.glsl"\n#include "c.glsl"\nfloat a() { return b() + c(); }\n')
+    (files / "b.glsl").write_text('#include "c.glsl"\nfloat b() { return c(); }\n')
+    (files / "c.glsl").write_text("float c() { return PI; }\n")
+    source = preprocess("a.glsl")
+    assert source.files == ("a.glsl", "b.glsl", "c.glsl")
+    assert source.text.count("float c()") == 1
+    assert source.text.index("float c()") < source.text.index("float b()") < source.text.index("float a()")
+
+
+def test_circles_and_missing_includes_are_named(files: Path) -> None:
+    (files / "a.glsl").write_text('#include "b.glsl"\n')
+    (files / "b.glsl").write_text('#include "a.glsl"\n')
+    with pytest.raises(tl.RenderError, match=r"circles: a.glsl -> b.glsl -> a.glsl"):
+        preprocess("a.glsl")
+    (files / "b.glsl").write_text('#include "nowhere.glsl"\n')
+    with pytest.raises(tl.InputError, match=r"nowhere.glsl"):
+        preprocess("a.glsl")
+    (files / "b.glsl").write_text("#include <Nothing>\n")
+    with pytest.raises(tl.RenderError, match=r"<Nothing>; use one of View"):
+        preprocess("a.glsl")
+
+
+def test_switches_must_match_in_both_directions(files: Path) -> None:
+    (files / "a.glsl").write_text("#if FAST && !EXACT\nfloat a;\n#endif\n")
+    with pytest.raises(tl.RenderError, match=r"\['EXACT'\], which are not defined"):
+        preprocess("a.glsl", {"FAST": 1})
+    with pytest.raises(tl.RenderError, match=r"defines \['FASTER'\] that it does not ask for"):
+        preprocess("a.glsl", {"FAST": 1, "EXACT": 0, "FASTER": 1})
+    assert "#define FAST 1" in preprocess("a.glsl", {"FAST": True, "EXACT": 0}).text
+
+
+def test_a_compile_error_names_file_and_line(renderer: tl.Renderer, files: Path) -> None:
+    (files / "good.glsl").write_text("// one\n// two\nfloat good() { return 1.0; }\n")
+    (files / "bad.glsl").write_text("// one\n\nfloat bad() { return missing; }\n")
+    (files / "main.frag").write_text(
+        '#include "good.glsl"\n\n#include "bad.glsl"\nout vec4 c;\nvoid main() { c = vec4(oops); }\n'
+    )
+    with renderer.gpu.current() as gl, pytest.raises(tl.RenderError) as caught:
+        build_program(gl, "full.vert", "main.frag")
+    assert "shaders/bad.glsl:3" in str(caught.value)
+    assert "shaders/main.frag:5" in str(caught.value)
+
+
+def test_unknown_uniforms_and_defines_are_errors(renderer: tl.Renderer, files: Path) -> None:
+    (files / "main.frag").write_text("uniform float stops;\nout vec4 c;\nvoid main() { c = vec4(stops); }\n")
+    with renderer.gpu.current() as gl:
+        program = build_program(gl, "full.vert", "main.frag")
+        set_uniform(program, "stops", 1.0)
+        with pytest.raises(tl.RenderError, match="uniform 'stop'; the program has only stops"):
+            set_uniform(program, "stop", 1.0)
+        with pytest.raises(tl.RenderError, match=r"neither asks for \['FAST'\]"):
+            build_program(gl, "full.vert", "main.frag", {"FAST": 1})
+        with pytest.raises(tl.RenderError, match="uniform 'pictur'"):
+            build_program(gl, "full.vert", "main.frag", pictur=0)
+
+
+@pytest.mark.parametrize("block", BLOCKS.values(), ids=BLOCKS)
+def test_block_layout_is_what_the_driver_uses(renderer: tl.Renderer, block: UniformBlock) -> None:
+    """Write every field, read every component back through a shader that sums them with distinct weights."""
+    assert block.dtype.itemsize % 16 == 0
+    rng = np.random.default_rng(1)
+    values = {name: rng.integers(1, 9, size=shape) for name, _, shape in block.fields}
+    terms, expected = [], 0.0
+    weight = 1.0
+    for name, _, shape in block.fields:
+        for index in np.ndindex(*shape):
+            weight = weight * 1.25 % 7 + 0.5
+            # GLSL indexes a matrix by column first.
+            place = "".join(f"[{i}]" for i in index[::-1])
+            terms.append(f"{weight!r} * float({name}{place})")
+            expected += weight * float(np.asarray(values[name])[index])
+    code = f"#version 330 core\n{block.glsl}out float total;\nvoid main() {{ total = {' + '.join(terms)}; }}\n"
+    with renderer.gpu.current() as gl:
+        program = gl.program(vertex_shader=code, varyings=["total"])
+        program[block.name].binding = block.binding
+        uniforms, output = gl.buffer(block.pack(**values)), gl.buffer(reserve=4)
+        uniforms.bind_to_uniform_block(block.binding)
+        gl.vertex_array(program, []).transform(output, vertices=1)
+        total = np.frombuffer(output.read(), np.float32)[0]
+    assert total == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_block_wants_all_its_fields_and_no_others() -> None:
+    with pytest.raises(KeyError, match="frame_size"):
+        BLOCKS["View"].pack(frame=1.0)

@@ -1,0 +1,193 @@
+"""Each function in shaders/lib against its float64 twin in Python, over edge-heavy grids."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent import camera, color, lights, optics
+from translucent.assets import shader_library
+from translucent.gpu.probe import run_function, signatures
+
+MODULES: dict[str, ModuleType] = {"optics": optics, "color": color, "environment": lights, "ray": camera}
+
+#: Functions of these modules that are no formulas of light, and so have no twin.
+HOST_ONLY = {"color": {"parse_color", "to_hex"}, "camera": {"check_size"}}
+
+DEPTHS = np.concatenate(
+    [[0.0], np.geomspace(1e-30, 1e4, 200), [0.5, np.nextafter(0.5, 0), 87.0, 88.8, 104.0, 1e5, 1e30]]
+)
+COSINES = np.concatenate([np.linspace(-1, 1, 41), [1e-30, 1e-6, 1e-3, 1 - 1e-6]])
+UNIT = np.concatenate([np.linspace(0, 1, 33), np.geomspace(1e-30, 1, 40), 1 - np.geomspace(1e-7, 0.1, 20)])
+
+
+def _mixed(*grids: np.ndarray) -> list[np.ndarray]:
+    """All combinations, as one float32 array per parameter."""
+    return [axis.ravel().astype(np.float32) for axis in np.meshgrid(*grids, indexing="ij")]
+
+
+def _triples(values: np.ndarray) -> np.ndarray:
+    return np.stack([values, np.roll(values, 7), values[::-1]], axis=1).astype(np.float32)
+
+
+def _unit_vectors() -> np.ndarray:
+    vectors = np.random.default_rng(5).normal(size=(200, 3))
+    return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
+
+
+def _emission_arguments() -> list[np.ndarray]:
+    sigma, distance = _mixed(
+        np.concatenate([[0.0], np.geomspace(1e-12, 1e6, 60)]), np.concatenate([[0.0], np.geomspace(1e-6, 1e3, 25)])
+    )
+    return [_triples(np.full_like(sigma, 3.0)), _triples(sigma), distance]
+
+
+def _color_arguments() -> list[np.ndarray]:
+    value, distance = _mixed(
+        np.concatenate([np.geomspace(1e-30, 1, 80), 1 - np.geomspace(1e-7, 0.1, 20)]), np.geomspace(1e-6, 1e6, 13)
+    )
+    return [_triples(value), distance]
+
+
+def _ray_arguments() -> list[np.ndarray]:
+    pixels = np.stack(_mixed(np.array([0, 0.5, 320.25, 640.0]), np.array([0, 0.5, 240.0, 480.0])), axis=1)
+    repeat = lambda row: np.tile(np.float32(row), (len(pixels), 1))  # noqa: E731
+    return [pixels, repeat([640, 480]), repeat([0.55, 0, 0]), repeat([0, 0.41, 0.1]), repeat([0, 0, -1])]
+
+
+def _backdrop_arguments() -> list[np.ndarray]:
+    x, y, tiles = _mixed(np.linspace(0, 1.7, 60) + 1e-3, np.linspace(0, 1, 40) + 1e-3, np.array([1, 7, 8, 2.5]))
+    return [np.stack([x, y], axis=1), tiles]
+
+
+ARGUMENTS = {
+    "transmittance": [_triples(DEPTHS)],
+    "opacity": [_triples(DEPTHS)],
+    "mean_opacity_slope": [_triples(DEPTHS)],
+    "extinction_from_color": _color_arguments(),
+    "log_one_minus": [UNIT[UNIT < 0.999].astype(np.float32)],
+    "emitted_radiance": _emission_arguments(),
+    "opacity_for_step": _mixed(
+        np.concatenate([np.linspace(0, 1, 33), np.geomspace(1e-12, 0.5, 40)]), np.array([0.0, 1e-3, 0.5, 1, 2, 64])
+    ),
+    "composite_over": [_triples(UNIT), UNIT.astype(np.float32), _triples(UNIT[::-1])],
+    "fresnel_dielectric": _mixed(UNIT, np.array([0.5, 1 / 1.5, 0.9, 1.0, 1.0001, 1.33, 1.5, 2.4])),
+    "refracted_cosine": _mixed(UNIT, np.array([1 / 1.5, 1.0, 1.0001, 1.33, 1.5, 2.4])),
+    "thin_layer_thickness": _mixed(np.array([1e-6, 1e-3, 1.0]), COSINES, np.array([1.0, 1.33, 1.5])),
+    "henyey_greenstein": _mixed(np.clip(COSINES, -1, 1), np.array([-0.99, -0.5, 0, 1e-7, 0.3, 0.9, 0.999])),
+    "srgb_to_linear": [_triples(np.linspace(-1, 2, 301))],
+    "linear_to_srgb": [_triples(np.concatenate([np.linspace(-1, 2, 301), np.geomspace(1e-9, 1, 60)]))],
+    "luminance": [_triples(UNIT)],
+    "exposure_scale": [np.linspace(-12, 12, 49, dtype=np.float32)],
+    "gradient_share": [_unit_vectors()],
+    "checkerboard_share": _backdrop_arguments(),
+    "view_ray": _ray_arguments(),
+}
+
+#: Relative error in units of float32 rounding (6e-8), and absolute floor, by function. exp(-x) multiplies the rounding
+#: of x by x, which `_allowed` adds; what is listed covers the few roundings of a formula and the driver's exp and log.
+ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
+    "opacity_for_step": 64.0,  # log of a rounded 1 - alpha, restored by a quotient
+    "srgb_to_linear": 64.0,  # pow multiplies the error of the logarithm by 2.4 log(x)
+    "linear_to_srgb": 64.0,
+    "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
+}
+FLOOR = {
+    "fresnel_dielectric": 2e-7,
+    "refracted_cosine": 1e-7,
+    "composite_over": 1e-7,
+    "gradient_share": 1e-7,
+    "view_ray": 1e-7,
+    "luminance": 1e-9,
+    "extinction_from_color": 0.0,
+}
+
+
+def _library_functions() -> list[tuple[str, str]]:
+    return [(path.stem, name) for path in shader_library() for name in signatures(path)]
+
+
+def test_libraries_and_python_define_the_same_names() -> None:
+    found: dict[str, set[str]] = {path.stem: set(signatures(path)) for path in shader_library()}
+    assert found.keys() == MODULES.keys()
+    for library, module in MODULES.items():
+        name = module.__name__.rpartition(".")[2]
+        functions = {
+            key
+            for key, value in vars(module).items()
+            if callable(value)
+            and not key.startswith("_")
+            and getattr(value, "__module__", "") == module.__name__
+            and not isinstance(value, type)
+        }
+        assert found[library] == functions - HOST_ONLY.get(name, set()), library
+    assert {name for _, name in _library_functions()} == ARGUMENTS.keys()
+
+
+def test_libraries_are_pure() -> None:
+    for path in shader_library():
+        code = "\n".join(line.split("//")[0] for line in path.read_text().splitlines())
+        for word in ("uniform", "sampler", "gl_", " in vec", " out vec"):
+            assert word not in code, f"{path.name} has {word!r}"
+
+
+def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.ndarray:
+    eps = float(np.finfo(np.float32).eps) / 2
+    allowed = ROUNDINGS[name] * eps * np.abs(exact) + FLOOR.get(name, 0.0)
+    if name == "transmittance":
+        allowed = allowed + eps * np.minimum(arguments[0], 200.0) * exact * 4
+    if name == "emitted_radiance":
+        allowed = allowed + 1e-37
+    return allowed + 1.2e-38  # below the smallest normal number everything may flush to 0
+
+
+@pytest.mark.parametrize(("library", "name"), _library_functions())
+def test_function_equals_its_twin(renderer: tl.Renderer, library: str, name: str) -> None:
+    arguments = ARGUMENTS[name]
+    path = next(p for p in shader_library() if p.stem == library)
+    signature = signatures(path)[name]
+    with renderer.gpu.current() as gl:
+        found = run_function(gl, f"lib/{library}.glsl", signature, *arguments).astype(np.float64)
+    wide = [a.astype(np.float64) for a in arguments]
+    if library == "optics" and signature.returns == "vec3":
+        wide = [a[:, None] if a.ndim == 1 else a for a in wide]
+    with np.errstate(under="ignore"):
+        exact = np.asarray(getattr(MODULES[library], name)(*wide))
+    assert np.isfinite(found).all()
+    allowed = _allowed(name, exact, wide)
+    excess = np.abs(found - exact) / allowed
+    worst = np.unravel_index(excess.argmax(), excess.shape)
+    row = worst[0]
+    assert (excess <= 1).all(), (
+        f"{name}{tuple(np.asarray(a)[row].tolist() for a in arguments)} = {found[worst]:.9g}, exact {exact[worst]:.9g}, "
+        f"{excess[worst]:.1f} times the allowed error"
+    )
+
+
+def test_transmittance_underflows_to_exactly_zero_and_never_to_nan(renderer: tl.Renderer) -> None:
+    path = next(p for p in shader_library() if p.stem == "optics")
+    depths = np.array([[1e4, 1e30, np.inf], [0.0, 1e-12, 104.0]], np.float32)
+    with renderer.gpu.current() as gl:
+        found = run_function(gl, "lib/optics.glsl", signatures(path)["transmittance"], depths)
+    assert found[0].tolist() == [0.0, 0.0, 0.0]
+    assert found[1, 0] == 1.0
+    assert found[1, 1] == 1.0
+
+
+def test_the_probe_finds_a_wrong_formula(
+    renderer: tl.Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The phase function with a plus where a product belongs, as one public library had it, does not pass."""
+    wrong = tmp_path / "optics.glsl"
+    text = next(p for p in shader_library() if p.stem == "optics").read_text()
+    wrong.write_text(text.replace("4.0 * PI * base", "(4.0 + PI) * base"))
+    from translucent.gpu import shaders
+
+    original = shaders.shader_path
+    monkeypatch.setattr(shaders, "shader_path", lambda name: wrong if name == "lib/optics.glsl" else original(name))
+    with pytest.raises(AssertionError, match="henyey_greenstein"):
+        test_function_equals_its_twin(renderer, "optics", "henyey_greenstein")
