@@ -14,6 +14,9 @@ Array = npt.NDArray[np.float64]
 #: A framed object is smaller than the picture by this factor.
 FRAMING_MARGIN = 1.12
 
+#: Largest coordinate in metres of an eye or target, as for meshes.
+MAX_COORDINATE = 1e18
+
 
 @dataclass(frozen=True, eq=False)
 class Camera:
@@ -80,6 +83,7 @@ class Camera:
         size: tuple[int, int] = (1, 1),
         direction: npt.ArrayLike = (-0.45, -0.35, -1.0),
         fov_y: float = 30.0,
+        up: npt.ArrayLike = (0.0, 1.0, 0.0),
     ) -> Camera:
         """Perspective camera that sees all points, looking along `direction`, with a small margin.
 
@@ -93,12 +97,14 @@ class Camera:
             In which the camera looks.
         fov_y : float
             Full vertical angle of view in degrees.
+        up : array_like (3,)
+            Upwards in the picture.
         """
         seen = np.asarray(points, dtype=np.float64)
         low, high = seen.min(axis=0), seen.max(axis=0)
         reach = float(np.linalg.norm(high - low)) or 1.0
         axis = np.asarray(direction, dtype=np.float64)
-        pose = cls.look_at(low - axis, low, fov_y=fov_y).pose
+        pose = cls(_look_at(-axis, np.zeros(3), up), fov_y=fov_y).pose
         local = (seen - 0.5 * (low + high)) @ pose[:3, :3]  # right, up, backward
         half = np.tan(np.radians(fov_y) / 2) * np.array([size[0] / size[1], 1.0]) / FRAMING_MARGIN
         # Each point asks for |x - cx| <= half (distance - z): the two sides of the picture meet where both are tight.
@@ -109,7 +115,7 @@ class Camera:
         center, distance = (upper - lower) / 2, float(((upper + lower) / (2 * half)).max())
         distance = max(distance, float(local[:, 2].max()) + 1e-3 * reach)
         target = 0.5 * (low + high) + pose[:3, :2] @ center
-        return cls.look_at(target + pose[:3, 2] * distance, target, fov_y=fov_y)
+        return cls.look_at(target + pose[:3, 2] * distance, target, up, fov_y)
 
     @property
     def eye(self) -> Array:
@@ -180,6 +186,8 @@ def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Ar
     e, t, u = (np.asarray(v, dtype=np.float64) for v in (eye, target, up))
     if any(v.shape != (3,) or not np.isfinite(v).all() for v in (e, t, u)):
         raise InputError("camera eye, target or up", "not three finite numbers", "give (x, y, z) for each")
+    if max(np.abs(v).max() for v in (e, t, u)) > MAX_COORDINATE:
+        raise InputError("camera eye, target or up", f"a number beyond {MAX_COORDINATE:g}", "move it closer")
     backward = e - t
     if not (distance := float(np.linalg.norm(backward))) > 0:
         raise InputError("camera", f"eye and target are both at {tuple(e.tolist())}", "move one of them")

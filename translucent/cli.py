@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from translucent.lights import Environment
     from translucent.medium import Medium
     from translucent.mesh import Mesh
+    from translucent.thickness import Method
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -86,6 +87,7 @@ def _unit_option(command: F) -> F:
 @click.option("--fov", default=30.0, show_default=True, metavar="DEG", help="Vertical angle of view.")
 @click.option("--background", default="studio", show_default=True, help="studio, checkerboard, or a color.")
 @click.option("--method", "method_name", metavar="NAME", help="signed-depth, back-face-depth or thin-layer.")
+@click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
 @_common
@@ -103,6 +105,7 @@ def render(
     fov: float,
     background: str,
     method_name: str | None,
+    thickness: str | None,
     samples: int,
     backend: str | None,
     as_json: bool,
@@ -111,12 +114,11 @@ def render(
     from translucent.frame import check_output
     from translucent.gpu.renderer import Renderer
     from translucent.showcase import showcase
-    from translucent.thickness import method_from_name
 
     check_output(output)
     pixels = _size(size)
     medium = _medium(color, distance, preset_name)
-    method = method_from_name(method_name) if method_name else None
+    method = _method(method_name, thickness)
     environment = _environment(background)
     mesh = _mesh(model, unit)
     scene = showcase(mesh, medium, pixels, _camera(mesh, eye, target, up, fov, pixels), environment)
@@ -149,11 +151,10 @@ def explain(
     """Say what is known about MODEL, which passes would render it, and why."""
     from translucent.plan import plan
     from translucent.showcase import showcase
-    from translucent.thickness import method_from_name
 
     medium = _medium(color, distance, preset_name)
     mesh = _mesh(model, unit)
-    chosen = plan(showcase(mesh, medium), method_from_name(method_name) if method_name else None)
+    chosen = plan(showcase(mesh, medium), _method(method_name, None))
     if as_json:
         click.echo(json.dumps({"mesh": mesh.summary(), "plan": chosen.summary()}))
         return
@@ -244,6 +245,18 @@ def _medium(color: str | None, distance: str | None, preset_name: str | None) ->
     return None if color is None or distance is None else Medium.from_color(color, parse_length(distance))
 
 
+def _method(name: str | None, thickness: str | None) -> Method | None:
+    from translucent.thickness import ThinLayer, method_from_name
+    from translucent.units import parse_length
+
+    method = method_from_name(name) if name else None
+    if thickness is None:
+        return method
+    if not isinstance(method, ThinLayer):
+        raise InputError("--thickness", "only --method thin-layer takes it", "add --method thin-layer")
+    return ThinLayer(parse_length(thickness))
+
+
 def _environment(background: str) -> Environment | None:
     from translucent.lights import Environment
 
@@ -264,7 +277,7 @@ def _camera(
             raise InputError("--target", "--eye is missing", "give both, or neither")
         if fov == 30.0 and up == "0,1,0":
             return None
-        return Camera.framing(mesh.vertices[mesh.faces].reshape(-1, 3), size, fov_y=fov)
+        return Camera.framing(mesh.vertices[mesh.faces].reshape(-1, 3), size, fov_y=fov, up=_vector("--up", up))
     return Camera.look_at(
         _vector("--eye", eye),
         mesh.center if target is None else _vector("--target", target),

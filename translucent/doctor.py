@@ -31,7 +31,8 @@ class BackendReport:
 def examine_backends(names: Sequence[str] = get_args(Backend)) -> list[BackendReport]:
     """Try each backend in turn."""
     reports = []
-    for name in names:
+    # The window first: it is whatever context is current, and the others leave theirs behind.
+    for name in sorted(names, key=lambda name: name != "window"):
         try:
             context = open_context(name)
         except NoContextError as error:

@@ -140,7 +140,7 @@ def check_output(path: Path) -> None:
     """Raise before any work is done where a frame could not be written to `path`."""
     if path.suffix.lower() not in _WRITERS:
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):  # False, too, for a name that no folder can have
         raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
     if path.suffix.lower() == ".exr":
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 #: Largest coordinate in metres whose square still fits into float32.
 MAX_COORDINATE = 1e18
+#: Smallest diagonal in metres whose square is not lost in float32.
+MIN_DIAGONAL = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +166,7 @@ class Mesh:
         }
 
     def require_finite(self) -> None:
-        """Raise `InputError` where coordinates are not finite, or too large for float32 arithmetic."""
+        """Raise `InputError` where coordinates are not finite, or the mesh is too large or small for float32."""
         if bad := self.diagnosis.nonfinite_vertices:
             raise InputError(
                 f"mesh {self.name!r}",
@@ -176,6 +179,8 @@ class Mesh:
                 f"a coordinate of {largest:.3g} m, beyond {MAX_COORDINATE:g} m",
                 "give the file's unit (--unit), or scale the mesh",
             )
+        if self.diagonal < MIN_DIAGONAL:
+            raise InputError(f"mesh {self.name!r}", "all its vertices are at one point", "export the mesh again")
 
 
 def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
@@ -211,7 +216,7 @@ def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
     import trimesh
 
     asked = f"mesh {str(path)!r}"
-    if not path.is_file():
+    if not os.path.isfile(path):  # False, too, for a name that no file can have
         raise InputError(asked, "no such file", "check the path")
     if path.suffix[1:].lower() not in trimesh.available_formats():
         raise InputError(

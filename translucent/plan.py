@@ -51,17 +51,20 @@ class RenderPlan:
     spectral : bool
         The passes add up optical depth per channel, since media differ, and not only thickness.
     limits : tuple of str
-        Where the result is not exact, and why; empty for an exact plan.
+        Where thickness and transmittance are not exact, and why; empty for an exact plan.
+    unmodelled : tuple of str
+        What the scene asks for and no pass renders.
     """
 
     method: Method
     passes: tuple[PassSpec, ...]
     spectral: bool = False
     limits: tuple[str, ...] = ()
+    unmodelled: tuple[str, ...] = ()
 
     @property
     def exact(self) -> bool:
-        """Whether the result is exact for the meshes as given, up to float32."""
+        """Whether thickness and transmittance are exact for the meshes as given and straight rays, up to float32."""
         return not self.limits
 
     @property
@@ -79,12 +82,14 @@ class RenderPlan:
                 for step in self.passes
             ],
             "limits": list(self.limits),
+            "unmodelled": list(self.unmodelled),
         }
 
     def __str__(self) -> str:
         lines = [f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
         lines += [f"  limit: {limit}" for limit in self.limits]
+        lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
         return "\n".join(lines)
 
 
@@ -124,14 +129,16 @@ def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
     passes = [
         PassSpec(
             "signed_depth",
-            f"{_count(solids, 'body', 'bodies')} in any order, one draw each: exits minus entries add up to {what}",
+            f"{_count(solids, 'body', 'bodies')} in one unsorted draw each: exits minus entries add up to {what}",
             solids,
             1,
         )
     ]
     limits = []
     if sheets:
-        passes.append(_sheet_pass(sheets, "declared thin: their paths add up"))
+        passes.append(
+            _sheet_pass(sheets, f"{_count(sheets, 'mesh', 'meshes')} declared thin: the paths through all faces add up")
+        )
     if open_bodies:
         names = ", ".join(repr(scene.objects[i].mesh.name) for i in open_bodies)
         passes.append(
@@ -165,14 +172,20 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
 def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
     everything = tuple(range(len(scene.objects)))
     return _finished(
-        scene, method, [_sheet_pass(everything, "every face a sheet: their paths add up")], [], _media_differ(scene)
+        scene,
+        method,
+        [
+            _sheet_pass(
+                everything, f"every face of {_count(everything, 'mesh', 'meshes')} is a sheet: their paths add up"
+            )
+        ],
+        [],
+        _media_differ(scene),
     )
 
 
 def _sheet_pass(objects: tuple[int, ...], reason: str) -> PassSpec:
-    return PassSpec(
-        "thin_layer", f"{_count(objects, 'sheet', 'sheets')} {reason}, t / max(0.001, n.v) each", objects, 1
-    )
+    return PassSpec("thin_layer", f"{reason}, t / max(0.001, n.v) each", objects, 1)
 
 
 def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list[str], spectral: bool) -> RenderPlan:
@@ -183,15 +196,14 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     else:
         reason = "Beer-Lambert: the background through exp(-optical depth)"
     passes.append(PassSpec("transmittance", reason))
-    if any(medium.scatters for medium in media):
-        limits.append("scattering only removes light here: in-scattered light is not modelled")
     if scene.overlap != "add" and any(not body.mesh.diagnosis.convex for body in scene.bodies):
         limits.append(f'overlap="{scene.overlap}": where a mesh overlaps itself, its medium counts twice')
-    if any(
-        medium.ior > 1 and body.sheet_thickness is None for body, medium in zip(scene.bodies, media, strict=True)
-    ) and not isinstance(method, ThinLayer):
-        limits.append("ior above 1: rays go straight, refraction and reflection are not modelled")
-    return RenderPlan(method, tuple(passes), spectral, tuple(limits))
+    unmodelled = []
+    if any(medium.scatters for medium in media):
+        unmodelled.append("in-scattered light: scattering only removes light")
+    if any(medium.ior > 1 for medium in media):
+        unmodelled.append("refraction and reflection: rays go straight, though ior is above 1")
+    return RenderPlan(method, tuple(passes), spectral, tuple(limits), tuple(unmodelled))
 
 
 def _refuse_unsupported(scene: Scene) -> None:

@@ -43,7 +43,7 @@ def _subdivided(name: str, triangles: int) -> Mesh:
 CASES = (
     Case("sphere-100k", "convex, two layers", lambda: Sphere().tessellate(316)),
     Case("torus-100k", "concave, up to four layers", lambda: Torus().tessellate(316)),
-    Case("knot", "concave, up to eight layers", lambda: _subdivided("torus_knot", 80_000)),
+    Case("knot", "concave, up to eight layers", lambda: _subdivided("knot", 80_000)),
 )
 
 METHODS: dict[str, Method] = {

@@ -18,6 +18,7 @@ from translucent.gpu.renderer import Renderer
 from translucent.metrics import compare, interior
 from translucent.scene import Scene
 from translucent.showcase import showcase
+from translucent.solids import Sphere
 from translucent.thickness import Method, SignedDepth
 
 Timings = dict[str, list[float]]
@@ -72,7 +73,33 @@ def measure(
                     }
                 )
         machine = {"platform": platform.platform(), "processors": _processors(), **renderer.provenance}
-    return {"machine": machine, "rows": rows}
+        host = host_overhead(renderer)
+    return {"machine": machine, "host": host, "rows": rows}
+
+
+def host_overhead(renderer: Renderer, frames: int = 200) -> dict[str, float]:
+    """Milliseconds that `Renderer.render` takes at 64 x 64, and what of it is neither GPU work nor read-back.
+
+    The same frame is rendered with `render`, and with only `run` and `read` on a job that is prepared beforehand, in
+    turn; the difference of the medians is the host's part.
+    """
+    scene, size = showcase(Sphere().tessellate(64), size=(64, 64)), (64, 64)
+    with renderer.gpu.current():
+        job = renderer.prepare(scene, size)
+        whole, device = [], []
+        for _ in range(frames):
+            begin = time.perf_counter()
+            renderer.render(scene, size)
+            middle = time.perf_counter()
+            job.place((0.0, 0.0))
+            bound = time.perf_counter()
+            renderer.run(job)
+            renderer.read(job)
+            whole.append(middle - begin)
+            device.append(time.perf_counter() - bound)
+        job.release()
+    render, gpu = float(np.median(whole)) * 1e3, float(np.median(device)) * 1e3
+    return {"render_ms": render, "gpu_and_read_ms": gpu, "host_ms": render - gpu}
 
 
 def _workloads(
@@ -168,4 +195,8 @@ def table(result: dict[str, Any]) -> str:
             line += f"{row['ratio']:>7.2f}{row['frame_ratio']:>7.2f}{row['median']:>10.1e}{row['p999']:>10.1e}"
             line += f"{row['invalid']:>9.2%}"
         lines.append(line)
+    host = result["host"]
+    lines.append(
+        f"render() at 64x64: {host['render_ms']:.2f} ms, of which {host['host_ms']:.2f} ms are neither GPU nor read-back"
+    )
     return "\n".join(lines)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import moderngl
 import numpy as np
 
@@ -37,7 +39,8 @@ class FrameJob:
         self.plan = plan
         self.targets = targets
         self.meshes = meshes
-        self.average = False
+        self.samples = 1
+        self.started = time.perf_counter()
         self._placements = [Placement.of(body, scene.camera) for body in scene.objects]
         self._stride = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
         self._view = gl.buffer(reserve=VIEW.dtype.itemsize)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 import warnings
+from functools import cached_property
 from importlib.metadata import version
 from types import TracebackType
 from weakref import WeakKeyDictionary
@@ -72,7 +73,7 @@ class Renderer:
         """The OpenGL context and where it comes from."""
         return self._gpu
 
-    @property
+    @cached_property
     def provenance(self) -> dict[str, str]:
         """Backend, driver and versions, as every frame records them."""
         return {
@@ -109,7 +110,6 @@ class Renderer:
         RenderError
             If the frame is larger than this OpenGL allows.
         """
-        started = time.perf_counter()
         if samples < 1:
             raise InputError(f"samples {samples}", "below 1", "give for example 16")
         self._require_open()
@@ -119,7 +119,7 @@ class Renderer:
                 self.run(job)
                 if samples > 1:
                     self._average(job, samples)
-                frame = self._read(job, samples, started)
+                frame = self.read(job)
             finally:
                 job.release()
                 self._gpu.drain()
@@ -182,6 +182,31 @@ class Renderer:
             with self._timer.measure(spec.name):
                 step.run(job, spec)
 
+    def read(self, job: FrameJob) -> Frame:
+        """The frame that the passes have left in the job's targets."""
+        result = job.targets.result()
+        if job.samples > 1:
+            averages = job.targets.average()
+            radiance, transmittance = (_read_floats(averages, i, 3) / np.float32(job.samples) for i in range(2))
+        else:
+            radiance, transmittance = (_read_floats(result, i, 3) for i in range(2))
+        flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
+        result.read_into(flags, components=1, attachment=4, alignment=1)
+        optical_depth, thickness = _read_floats(result, 2, 3), _read_floats(result, 3, 1)
+        seconds = self._timer.seconds()
+        seconds["total"] = time.perf_counter() - job.started
+        return Frame(
+            radiance=radiance,
+            transmittance=transmittance,
+            optical_depth=optical_depth,
+            thickness=thickness,
+            coverage=(flags & 1).astype(bool),
+            valid=(flags & 2).astype(bool),
+            plan=job.plan,
+            seconds=seconds,
+            provenance=dict(self.provenance),
+        )
+
     def close(self) -> None:
         """Free all OpenGL objects, and the context if it is ours. Closing twice is fine."""
         if self._closed:
@@ -209,35 +234,11 @@ class Renderer:
     def _average(self, job: FrameJob, samples: int) -> None:
         """Add up `samples` shifted renderings in the target for averages."""
         job.targets.average().clear()
-        job.average = True
+        job.samples = samples
         for right, down in sample_shifts(samples):
             job.place((right, down))
             for spec in job.plan.passes:
                 self._pass(PASSES[spec.name]).run(job, spec)
-
-    def _read(self, job: FrameJob, samples: int, started: float) -> Frame:
-        result = job.targets.result()
-        if samples > 1:
-            averages = job.targets.average()
-            radiance, transmittance = (_read_floats(averages, i, 3) / np.float32(samples) for i in range(2))
-        else:
-            radiance, transmittance = (_read_floats(result, i, 3) for i in range(2))
-        flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
-        result.read_into(flags, components=1, attachment=4, alignment=1)
-        optical_depth, thickness = _read_floats(result, 2, 3), _read_floats(result, 3, 1)
-        seconds = self._timer.seconds()
-        seconds["total"] = time.perf_counter() - started
-        return Frame(
-            radiance=radiance,
-            transmittance=transmittance,
-            optical_depth=optical_depth,
-            thickness=thickness,
-            coverage=(flags & 1).astype(bool),
-            valid=(flags & 2).astype(bool),
-            plan=job.plan,
-            seconds=seconds,
-            provenance=self.provenance,
-        )
 
     def _warn(self, frame: Frame) -> None:
         if invalid := int(np.count_nonzero(~frame.valid)):

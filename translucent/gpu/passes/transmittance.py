@@ -19,12 +19,12 @@ class TransmittancePass:
         self._variants: dict[tuple[bool, ...], moderngl.VertexArray] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Resolve the frame; while `job.average`, add a sample's radiance and transmittance instead."""
+        """Resolve the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl = job.gl
         fallback = any(step.name == "thin_layer_fallback" for step in job.plan.passes)
         emission = any(body.medium is not None and body.medium.emits for body in job.scene.bodies)
         inputs = [job.accumulator()] + ([job.accumulator("fallback")] if fallback else [])
-        if job.average:
+        if job.samples > 1:
             job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
             gl.blend_equation = moderngl.FUNC_ADD
@@ -35,7 +35,7 @@ class TransmittancePass:
         for first, framebuffer in zip((0, 2), inputs, strict=False):
             for unit, texture in enumerate(framebuffer.color_attachments, first):
                 texture.use(unit)
-        variant = self._variant(job.plan.spectral, fallback, job.average, emission)
+        variant = self._variant(job.plan.spectral, fallback, job.samples > 1, emission)
         variant.render(moderngl.TRIANGLES, vertices=3)
 
     def _variant(self, spectral: bool, fallback: bool, average: bool, emission: bool) -> moderngl.VertexArray:
