@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.mesh import Mesh
-from translucent.solids import Sphere, SphericalShell, revolve
+from translucent.solid_geometry import revolve
+from translucent.solids import Sphere, SphericalShell
 
 ROOT = Path(__file__).resolve().parents[1]
 CENTIMETRE = 0.01
@@ -39,8 +40,8 @@ class Shape:
     @property
     def size(self) -> Array:
         """(3,): extent along x, y and z in centimetres."""
-        extent: Array = self.mesh.bounds[1] - self.mesh.bounds[0]
-        return extent
+        low, high = self.mesh.bounds
+        return np.asarray(high - low)
 
 
 # Implicit shapes: fields (..., 3) -> (...), negative inside, about the distance to the surface.
@@ -52,7 +53,8 @@ def ellipsoid(center: Point, radii: Point) -> Field:
     def field(p: Array) -> Array:
         q = (p - np.array(center)) / np.array(radii)
         distance = np.linalg.norm(q, axis=-1)
-        return distance * (distance - 1.0) / np.maximum(np.linalg.norm(q / np.array(radii), axis=-1), 1e-9)
+        slope = np.linalg.norm(q / np.array(radii), axis=-1)
+        return np.asarray(distance * (distance - 1.0) / np.maximum(slope, 1e-9))
 
     return field
 
@@ -120,15 +122,15 @@ def project(field: Field, p: Array, cell: float) -> Array:
 
 def gummy_bear() -> Mesh:
     parts: list[tuple[Field, float]] = [
-        (ellipsoid((0, 0.66, 0.16), (0.42, 0.42, 0.36)), 0.14),
-        (ellipsoid((0, 1.46, 0.06), (0.46, 0.40, 0.40)), 0.16),
-        (ellipsoid((0, 1.345, 0.37), (0.235, 0.165, 0.20)), 0.10),
-        (ellipsoid((0, 1.425, 0.555), (0.095, 0.065, 0.06)), 0.06),
+        (ellipsoid((0, 0.65, 0.17), (0.41, 0.44, 0.37)), 0.14),
+        (ellipsoid((0, 1.46, 0.06), (0.46, 0.40, 0.40)), 0.18),
+        (ellipsoid((0, 1.35, 0.38), (0.24, 0.17, 0.22)), 0.10),
+        (ellipsoid((0, 1.43, 0.58), (0.085, 0.06, 0.055)), 0.06),
         (both_sides(ellipsoid((0.345, 1.80, 0.03), (0.19, 0.19, 0.12))), 0.09),
-        (both_sides(capsule((0.45, 1.02, 0.10), (0.25, 0.89, 0.50), 0.19, 0.16)), 0.11),
+        (both_sides(capsule((0.46, 0.98, 0.06), (0.43, 0.90, 0.44), 0.17, 0.15)), 0.14),
         (both_sides(capsule((0.31, 0.29, 0.08), (0.37, 0.25, 0.52), 0.24, 0.21)), 0.12),
         (both_sides(ellipsoid((0.385, 0.29, 0.62), (0.205, 0.235, 0.13))), 0.08),
-        (both_sides(ellipsoid((0.18, 1.56, 0.40), (0.075, 0.085, 0.075))), 0.07),
+        (both_sides(ellipsoid((0.17, 1.57, 0.405), (0.06, 0.07, 0.055))), 0.05),
     ]
     inner_ear = both_sides(ellipsoid((0.355, 1.81, 0.19), (0.11, 0.11, 0.10)))
 
@@ -157,8 +159,8 @@ def soap_bar() -> Mesh:
         depth = half[1] - np.abs(p[..., 1])
         oval = 2.2 * (np.hypot(p[..., 0] / 3.3, p[..., 2] / 1.95) - 1.0)
         dent = smooth_max(oval, depth - 0.30, 0.45)
-        raised = smooth_max(pointed_oval(p[..., 0], p[..., 2], 1.9, 0.8), 0.10 - depth, 0.20)
-        return smooth_max(body, -smooth_max(dent, -raised, 0.20), 0.25)
+        raised = smooth_max(0.6 * pointed_oval(p[..., 0], p[..., 2], 2.2, 0.95), 0.11 - depth, 0.24)
+        return smooth_max(body, -smooth_max(dent, -raised, 0.24), 0.25)
 
     return standing(implicit_surface(field, (-4.8, -1.8, -3.3), (4.8, 1.8, 3.3), 0.148))
 
@@ -233,12 +235,13 @@ def bangle() -> Mesh:
 
 #: Radius and height in centimetres of the bowl's inner wall, from its lowest point to the rim.
 BOWL = np.array([
-    (0, 9.3), (1.1, 9.5), (2.3, 10.25), (3.35, 11.55), (3.93, 13.2), (3.98, 14.8), (3.72, 16.8), (3.35, 18.7), (3.1, 19.92),
+    (0, 9.3), (1.1, 9.5), (2.3, 10.25), (3.35, 11.55), (3.93, 13.2), (3.98, 14.8), (3.72, 16.8), (3.35, 18.7),
+    (3.1, 19.92),
 ])  # fmt: skip
 WALL = 0.15
 #: Points along the inner wall, and the one up to which the wine stands.
 WALL_POINTS, FILL_POINT = 44, 25
-TURNS = 128
+TURNS = 120
 
 
 def bowl_wall() -> tuple[Array, Array]:
@@ -282,7 +285,9 @@ def wine() -> Mesh:
     """The lower part of the bowl: below, the goblet's own inner wall point for point; above, a level surface."""
     wall = bowl_wall()[0][: FILL_POINT + 1]
     level = np.stack([wall[-1, 0] * np.linspace(1.0, 0.0, 7)[1:], np.full(6, wall[-1, 1])], axis=1)
-    return turned(np.concatenate([wall, level]), TURNS)
+    # Downwards like the goblet's wall, so that both cut each quad along the same diagonal; then turned outwards.
+    inwards = turned(np.concatenate([wall, level])[::-1], TURNS)
+    return Mesh(inwards.vertices, inwards.faces[:, ::-1])
 
 
 def sheet(rows: int, columns: int) -> Faces:
@@ -315,7 +320,7 @@ def shapes() -> dict[str, Shape]:
         "sphere.ply": Shape("Ball", "sphere in rings", standing(Sphere(radius=2.0).tessellate(128))),
         "shell.ply": Shape(
             "Hollow ball, 4 mm wall", "two nested spheres, the inner one wound inwards",
-            standing(SphericalShell(2.5, 2.1).tessellate(72)),
+            standing(SphericalShell(2.5, 2.1).tessellate(88)),
         ),
         "knot.ply": Shape("Knot of a 1.6 cm tube", "tube along a (2, 3) torus knot", torus_knot()),
         "bear.ply": Shape("Gummy bear", "smooth union of ellipsoids and capsules, marching cubes", gummy_bear()),

@@ -54,7 +54,9 @@ class DirectionalLight:
         direction = _vector("light direction", self.direction)
         if not (length := float(np.linalg.norm(direction))) > 0:
             raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
-        object.__setattr__(self, "direction", direction / length)
+        direction = direction / length
+        direction.setflags(write=False)
+        object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "irradiance", _positive("light irradiance", self.irradiance))
 
 
@@ -139,7 +141,11 @@ def _vector(what: str, value: npt.ArrayLike) -> Array:
 
 
 def _positive(what: str, value: npt.ArrayLike) -> Array:
-    triple = _vector(what, np.broadcast_to(np.asarray(value, dtype=np.float64), (3,)))
+    try:
+        triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,))
+    except (TypeError, ValueError):
+        raise InputError(f"{what} {value!r}", "not one or three numbers", "give (r, g, b)") from None
+    triple = _vector(what, triple)
     if (triple < 0).any():
         raise InputError(f"{what} {tuple(triple.tolist())}", "negative", "give values of 0 and above")
     return triple

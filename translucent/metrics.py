@@ -50,8 +50,8 @@ class Errors:
 
     def __str__(self) -> str:
         return (
-            f"{self.quantity}: median {self.median:.2g}, p99 {self.p99:.2g}, p99.9 {self.p999:.2g}, max {self.max:.2g}, "
-            f"rms {self.rms:.2g}, bias {self.bias:+.2g}; invalid {self.invalid:.4%}; "
+            f"{self.quantity}: median {self.median:.2g}, p99 {self.p99:.2g}, p99.9 {self.p999:.2g}, "
+            f"max {self.max:.2g}, rms {self.rms:.2g}, bias {self.bias:+.2g}; invalid {self.invalid:.4%}; "
             f"coverage differs on {self.coverage_mismatch:.4%} ({self.pixels} pixels: {self.mask})"
         )
 

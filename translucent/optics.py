@@ -107,7 +107,7 @@ def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array
     contrast = (n - 1.0) * (n + 1.0)
     k = contrast + c * c
     root = np.sqrt(np.maximum(k, 0.0))
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         parallel = contrast * (c * c * (n * n + 1.0) - 1.0) / (n * n * c + root) ** 2
         normal = contrast / (c + root) ** 2
         reflectance = 0.5 * (parallel * parallel + normal * normal)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.mesh import Mesh
+from translucent.solid_geometry import between, dot, nearest_to_zero, quadric, revolve
 
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -63,7 +64,7 @@ class Solid(ABC):
         """
         origin, direction = np.asarray(origins, dtype=np.float64), np.asarray(directions, dtype=np.float64)
         with np.errstate(over="ignore", under="ignore"):
-            if not (np.abs(_dot(direction, direction) - 1.0) < 1e-6).all():
+            if not (np.abs(dot(direction, direction) - 1.0) < 1e-6).all():
                 raise InputError("chord along rays", "directions that are not of unit length", "normalize them")
             origin, direction = np.broadcast_arrays(origin, direction)
             length = self._length(origin.reshape(-1, 3), direction.reshape(-1, 3))
@@ -78,7 +79,7 @@ class _Intervals(Solid):
     """A solid that knows the pieces of a line inside it."""
 
     def _length(self, origins: Array, directions: Array) -> Array:
-        nearest, shift = _nearest_to_zero(origins - self._middle(), directions)
+        nearest, shift = nearest_to_zero(origins - self._middle(), directions)
         ends = np.maximum(self._inside(nearest, directions), -shift[:, None, None])
         return np.asarray(np.maximum(ends[..., 1] - ends[..., 0], 0.0).sum(axis=-1))
 
@@ -120,7 +121,7 @@ class _Round(_Intervals):
         unit = _unit_sphere(segments)
         a, b, c = unit.vertices[unit.faces].transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
-        depth = 1.0 - float((_dot(normals, a) / np.linalg.norm(normals, axis=1)).min())
+        depth = 1.0 - float((dot(normals, a) / np.linalg.norm(normals, axis=1)).min())
         return max(self._shape()[1]) * depth
 
     def _middle(self) -> Array:
@@ -129,7 +130,7 @@ class _Round(_Intervals):
     def _inside(self, point: Array, direction: Array) -> Array:
         radii = np.array(self._shape()[1])
         scaled = direction / radii
-        nearest, shift = _nearest_to_zero(point / radii, scaled)
+        nearest, shift = nearest_to_zero(point / radii, scaled)
         distance, speed = np.linalg.norm(nearest, axis=-1), np.linalg.norm(scaled, axis=-1)
         half = np.sqrt(np.maximum((1.0 - distance) * (1.0 + distance), 0.0)) / speed
         return np.stack([shift - half, shift + half], axis=-1)[..., None, :]
@@ -199,7 +200,7 @@ class Box(_Intervals):
 
     def _inside(self, point: Array, direction: Array) -> Array:
         half = 0.5 * (np.array(self.high) - np.array(self.low))
-        start, end = _between(point, direction, half)
+        start, end = between(point, direction, half)
         return np.stack([start.max(axis=-1), end.min(axis=-1)], axis=-1)[..., None, :]
 
 
@@ -240,9 +241,9 @@ class Torus(_Intervals):
         coefficients. A double root that rounding hides costs less than sqrt(epsilon): a tangent has no more digits.
         """
         # t^4 + c2 t^2 + c1 t + c0, without a cubic term because `point` is the nearest to the center.
-        across = _dot(direction[:, :2], direction[:, :2])
-        c2 = 2.0 * (_dot(point, point) + self.major**2 - self.minor**2) - 4.0 * self.major**2 * across
-        c1 = -8.0 * self.major**2 * _dot(point[:, :2], direction[:, :2])
+        across = dot(direction[:, :2], direction[:, :2])
+        c2 = 2.0 * (dot(point, point) + self.major**2 - self.minor**2) - 4.0 * self.major**2 * across
+        c1 = -8.0 * self.major**2 * dot(point[:, :2], direction[:, :2])
         companion = np.zeros((len(point), 3, 3))
         companion[:, 1, 0] = companion[:, 2, 1] = 1.0
         companion[:, 0, 2], companion[:, 1, 2] = -c1 / 4.0, -c2 / 2.0
@@ -326,9 +327,9 @@ class Frustum(_Intervals):
         growth = taper * direction[..., 2]
         flat, across = point[..., :2], direction[..., :2]
         distance = np.linalg.norm(flat, axis=-1)
-        a = _dot(across, across) - growth**2
-        first, second = _quadric(a, _dot(flat, across) - growth * radius, (distance - radius) * (distance + radius))
-        bottom, top = _between(point[..., 2], direction[..., 2], np.array(self.height / 2))
+        a = dot(across, across) - growth**2
+        first, second = quadric(a, dot(flat, across) - growth * radius, (distance - radius) * (distance + radius))
+        bottom, top = between(point[..., 2], direction[..., 2], np.array(self.height / 2))
         # Between the roots for a >= 0, before and behind them for a steep line.
         steep = a < 0
         start, end = np.where(steep, bottom, np.maximum(bottom, first)), np.minimum(top, np.where(steep, first, second))
@@ -393,40 +394,6 @@ class TwoSpheres(_Spheres):
         return (self.first, 1), (self.second, 1)
 
 
-def revolve(profile: npt.ArrayLike, segments: int, closed: bool = False) -> tuple[Array, npt.NDArray[np.int32]]:
-    """Surface that a profile sweeps around z; outwards where the solid is on the left of the profile's course.
-
-    Parameters
-    ----------
-    profile : array_like (k, 2)
-        Radius and z in metres; points on the axis have radius 0 exactly and become one vertex.
-    segments : int
-        Copies of the profile around the axis, at least 3.
-    closed : bool
-        Whether the last point is joined to the first.
-
-    Returns
-    -------
-    vertices : (n, 3) float64
-    faces : (m, 3) int32
-    """
-    radius, z = np.asarray(profile, dtype=np.float64).T
-    if segments < 3 or len(radius) < 2 + closed:
-        raise InputError("a surface of revolution", f"{len(radius)} points, {segments} segments", "give 3 or more")
-    angle = 2.0 * pi * np.arange(segments) / segments
-    x, y = np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))
-    grid = np.stack([x, y, np.broadcast_to(z[:, None], x.shape)], axis=-1)
-    index = np.arange(grid[..., 0].size).reshape(grid.shape[:2])
-    index[radius == 0] = index[radius == 0][:, :1]
-    rows = np.concatenate([index, index[:1]]) if closed else index
-    ahead = np.roll(rows, -1, axis=1)
-    a, b, c, d = (corner.ravel() for corner in (rows[:-1], ahead[:-1], ahead[1:], rows[1:]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    used, faces = np.unique(faces, return_inverse=True)
-    return grid.reshape(-1, 3)[used], faces.reshape(-1, 3).astype(np.int32)
-
-
 def _unit_sphere(segments: int) -> Mesh:
     rings = max(segments // 2, 2)
     angle = pi * np.arange(rings + 1) / rings
@@ -438,46 +405,3 @@ def _unit_sphere(segments: int) -> Mesh:
 def _require(solid: Solid, holds: bool, *numbers: float) -> None:
     if not (holds and all(isfinite(number) for number in numbers)):
         raise InputError(str(solid), "its measures do not make a solid", "give finite, positive, ordered measures")
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("...i,...i->...", a, b))
-
-
-def _nearest_to_zero(point: Array, direction: Array) -> tuple[Array, Array]:
-    """The point of each line nearest to 0, and how far along the line it is.
-
-    From there a quadric's terms have the size of the solid, however far away the ray began. The second round removes
-    what the first, with its large numbers, has left along the line.
-    """
-    square = _dot(direction, direction)
-    shift = np.zeros_like(square)
-    for _ in range(2):
-        step = -_dot(point, direction) / square
-        point, shift = point + step[..., None] * direction, shift + step
-    return point, shift
-
-
-def _between(position: Array, velocity: Array, half: Array) -> tuple[Array, Array]:
-    """When `position + t velocity` is within [-half, half]: elementwise first and last t; start > end says never."""
-    moving = velocity != 0
-    safe = np.where(moving, velocity, 1.0)
-    always = np.where(np.abs(position) <= half, np.inf, -np.inf)
-    one, other = (-half - position) / safe, (half - position) / safe
-    return np.where(moving, np.minimum(one, other), -always), np.where(moving, np.maximum(one, other), always)
-
-
-def _quadric(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
-    """Roots of a t^2 + 2 b t + c in ascending order, without cancellation; +-inf where there are fewer.
-
-    The polynomial is negative between them for a >= 0, else outside of them. No solution: (inf, -inf) for a >= 0.
-    """
-    discriminant = b**2 - a * c
-    q = -(b + np.copysign(np.sqrt(np.maximum(discriminant, 0.0)), b))
-    one = np.divide(q, a, out=np.copysign(np.inf, q), where=a != 0)
-    other = np.divide(c, q, out=np.zeros_like(q), where=q != 0)
-    first, second = np.minimum(one, other), np.maximum(one, other)
-    constant = (a == 0) & (b == 0)
-    nowhere = np.where(constant, c > 0, (a >= 0) & (discriminant < 0))
-    first, second = np.where(constant, -np.inf, first), np.where(constant, np.inf, second)
-    return np.where(nowhere, np.inf, first), np.where(nowhere, -np.inf, second)

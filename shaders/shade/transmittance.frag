@@ -66,10 +66,10 @@ void main() {
 #else
     Path path = read_path(accumulated, texel, advance);
 #endif
-    bool covered = path.thickness != 0.0 || path.count != 0.0;
     bool balanced = path.count >= expected_count.x && path.count <= expected_count.y;
     // NaN fails every comparison, so this refuses it, too.
     bool valid = balanced && path.thickness >= -negative_tolerance && path.thickness < NOTHING;
+    bool covered = path.thickness > 0.0 || !valid;
     if (!valid) {
 #if FALLBACK
 #if SPECTRAL

@@ -95,6 +95,18 @@ def test_two_renderers_do_not_disturb_each_other() -> None:
     np.testing.assert_array_equal(first.thickness, again.thickness)
 
 
+def test_contexts_nest() -> None:
+    scene = _scene(Sphere().tessellate(24))
+    with tl.Renderer() as one, tl.Renderer() as other:
+        alone = one.render(scene, (40, 30))
+        with one.gpu.current() as gl:
+            np.testing.assert_array_equal(other.render(scene, (40, 30)).thickness, alone.thickness)
+            np.testing.assert_array_equal(one.render(scene, (40, 30)).thickness, alone.thickness)
+            # Only with its own context current does this read what was written.
+            buffer = gl.buffer(b"still here")
+            assert buffer.read() == b"still here"
+
+
 def test_an_adopted_context_stays_alive_and_is_used() -> None:
     with tl.Renderer() as owner:
         scene = _scene(Box().tessellate())

@@ -167,6 +167,22 @@ def test_an_inverted_mesh_is_as_thick_as_its_right_way_copy(renderer: tl.Rendere
     assert difference.max() <= SNAP
 
 
+def test_an_inverted_part_is_marked_invalid(renderer: tl.Renderer) -> None:
+    """Two spheres, one inside out: its pixels balance, yet their thickness is negative."""
+    good, bad = Sphere((-1.0, 0.0, 0.0), 0.6).tessellate(32), Sphere((1.0, 0.0, 0.0), 0.4).tessellate(32)
+    mesh = tl.Mesh(
+        np.concatenate([good.vertices, bad.vertices]),
+        np.concatenate([good.faces, bad.faces[:, ::-1] + len(good.vertices)]),
+    )
+    assert mesh.diagnosis.solid
+    scene = tl.Scene([tl.Object(mesh, medium=tl.Medium(absorption=1.0))], tl.Camera.look_at((0, 0.4, 4), (0, 0, 0)))
+    with pytest.warns(tl.TranslucentWarning, match="not valid"):
+        frame = renderer.render(scene, SIZE)
+    inverted = Sphere((1.0, 0.0, 0.0), 0.4).chord(*scene.camera.rays(SIZE)) > 0.2
+    assert not frame.valid[inverted].any()
+    assert frame.valid[:, : SIZE[0] // 2].all()
+
+
 def test_doubled_faces_are_marked_and_cancelled_walls_are_empty(renderer: tl.Renderer) -> None:
     mesh = BOX.tessellate()
     doubled = tl.Mesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:2]]))

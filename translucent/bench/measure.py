@@ -197,6 +197,6 @@ def table(result: dict[str, Any]) -> str:
         lines.append(line)
     host = result["host"]
     lines.append(
-        f"render() at 64x64: {host['render_ms']:.2f} ms, of which {host['host_ms']:.2f} ms are neither GPU nor read-back"
+        f"render() at 64x64: {host['render_ms']:.2f} ms, {host['host_ms']:.2f} ms of it neither GPU nor read-back"
     )
     return "\n".join(lines)

@@ -25,6 +25,10 @@ Backend = Literal["egl", "window", "osmesa"]
 REQUIRED = 330
 
 
+#: Contexts that `GpuContext.current` has made current, the innermost last.
+_entered: list[GpuContext] = []
+
+
 @dataclass(frozen=True)
 class Attempt:
     """One backend that was tried, and why it failed; None if it did not."""
@@ -88,12 +92,23 @@ class GpuContext:
 
     @contextmanager
     def current(self) -> Iterator[moderngl.Context]:
-        """Make the context current; an adopted one is current already, by contract."""
-        if not self.owned:
+        """Make the context current, and afterwards what was current before; may be nested.
+
+        An adopted context is current already, by contract.
+        """
+        if not self.owned or _entered[-1:] == [self]:
             yield self.gl
             return
-        with self.gl:
+        # glcontext remembers one predecessor per context, which nesting would overwrite, so we keep the stack.
+        _entered.append(self)
+        self.gl.__enter__()
+        try:
             yield self.gl
+        finally:
+            _entered.pop()
+            self.gl.__exit__(None, None, None)
+            if _entered:
+                _entered[-1].gl.__enter__()
 
     def drain(self) -> None:
         """Free what has been dropped since the last call; at a safe moment, with the context current."""

@@ -19,8 +19,8 @@ from translucent.thickness import SignedDepth, ThinLayer
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
 
-#: Share of the diagonal that a path may be below 0 by rounding.
-_NEGATIVE_TOLERANCE = 1e-4
+#: Share of the diagonal that a path may be below 0; it then counts as 0.
+_NEGATIVE_TOLERANCE = 1e-2
 
 
 class FrameJob:
@@ -111,7 +111,8 @@ class FrameJob:
         """How far below 0 a thickness may be, in metres, before it betrays faces that look the wrong way.
 
         A rasteriser decides coverage on a grid of 1/256 pixel, so at a silhouette a pixel center may lie that far off
-        both faces, which are extended to it. One pixel's size covers slopes up to 256.
+        both of its faces. Extended to it, they cross: by a pixel's size where they are steeper than 256, and by up to
+        a face's length where one is seen edge-on.
         """
         camera, size = self.scene.camera, self.targets.size
         distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements) + self.scene.diagonal

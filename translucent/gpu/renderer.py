@@ -187,7 +187,8 @@ class Renderer:
         result = job.targets.result()
         if job.samples > 1:
             averages = job.targets.average()
-            radiance, transmittance = (_read_floats(averages, i, 3) / np.float32(job.samples) for i in range(2))
+            with np.errstate(under="ignore"):
+                radiance, transmittance = (_read_floats(averages, i, 3) / np.float32(job.samples) for i in range(2))
         else:
             radiance, transmittance = (_read_floats(result, i, 3) for i in range(2))
         flags = np.empty(job.targets.size[::-1], dtype=np.uint8)

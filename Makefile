@@ -1,0 +1,53 @@
+# Everything happens in .venv of this checkout. Needs make and a Python 3.11 to 3.13 with venv, nothing else.
+# Another Python: make PYTHON=/path/to/python3.12 test     Arguments for pytest: make test PYTEST_ARGS="-k optics"
+
+# The first that runs (a pyenv shim may exist and fail), has the right version and can make environments.
+PYTHON ?= $(shell for python in python3.13 python3.12 python3.11 python3; do \
+    if $$python -c 'import ensurepip, sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' >/dev/null 2>&1; \
+    then echo $$python; exit; fi; done; echo python3)
+PYTEST_ARGS ?=
+
+BOOTSTRAP = @$(PYTHON) tools/bootstrap.py
+BIN = .venv/bin
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help venv demo test lint bench meshes wheel clean
+
+help: ## list these commands
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+venv: ## make .venv for development, and find an OpenGL
+	$(BOOTSTRAP) --group dev
+
+demo: ## render a few pictures into out/
+	$(BOOTSTRAP)
+	@$(BIN)/python tools/demo.py
+
+test: ## run the tests
+	$(BOOTSTRAP) --group test
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: ## check style, types and the layers of the imports
+	$(BOOTSTRAP) --group dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: ## measure speed and error of every method into out/bench.json
+	$(BOOTSTRAP)
+	@mkdir -p out
+	$(BIN)/python -m translucent.bench --json out/bench.json
+
+meshes: ## regenerate the files in meshes/
+	$(BOOTSTRAP) --group meshes
+	$(BIN)/python tools/make_meshes.py
+
+wheel: ## build the wheel into dist/ and check it in an environment of its own
+	$(BOOTSTRAP) --group dev
+	$(BIN)/python tools/check_wheel.py
+
+clean: ## remove all that these commands made: .venv, out/, dist/, caches
+	rm -rf .venv out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find translucent tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,47 @@
+"""What the README says works."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from translucent.cli import cli, main
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_python_snippets_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+    monkeypatch.chdir(tmp_path)
+    snippets = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert snippets
+    for snippet in snippets:
+        exec(compile(snippet, "README.md", "exec"), {})
+    assert (tmp_path / "knot.png").stat().st_size > 1000
+
+
+COMMANDS = [line.removeprefix("$ translucent ") for line in README.splitlines() if line.startswith("$ translucent ")]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+    import trimesh
+
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.icosphere(subdivisions=2).export("model.glb")
+    assert main(shlex.split(command)) == 0
+
+
+def test_all_verbs_are_shown() -> None:
+    assert {command.split()[0] for command in COMMANDS} == set(cli.commands)
+
+
+def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+    monkeypatch.chdir(tmp_path)
+    for command in cli.commands.values():
+        assert command.epilog is not None
+        example = command.epilog.removeprefix("Example: translucent ")
+        assert main(shlex.split(example)) == 0, example

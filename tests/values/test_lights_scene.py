@@ -1,0 +1,217 @@
+"""Lights, environments, objects and scenes: values by hand, and refusals."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+import translucent as tl
+from translucent.lights import checkerboard_share, gradient_share
+
+EPS = float(np.finfo(np.float64).eps)
+NAN = math.nan
+
+_BOX = trimesh.creation.box((2, 4, 6))
+BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")
+INVERTED = tl.Mesh(_BOX.vertices, _BOX.faces[:, ::-1], name="inverted")
+CAMERA = tl.Camera.look_at((0, 0, 20), (0, 0, 0))
+GLASS = tl.Medium(absorption=1.0)
+
+
+def turned(degrees: float, axis: tuple[float, float, float]) -> np.ndarray[Any, Any]:
+    return trimesh.transformations.rotation_matrix(math.radians(degrees), axis)
+
+
+# Environments
+
+
+def test_a_constant_environment_is_the_same_everywhere() -> None:
+    environment = tl.Environment.constant((0.1, 0.2, 0.3))
+    radiance = environment.radiance(np.eye(3)[None], np.zeros((1, 3, 2)))
+    assert radiance.shape == (1, 3, 3)
+    assert (radiance == (0.1, 0.2, 0.3)).all()
+
+
+@pytest.mark.parametrize(
+    ("direction", "share"), [((0, 1, 0), 1.0), ((0, -1, 0), 0.0), ((1, 0, 0), 0.5), ((0.6, 0.8, 0), 0.9)]
+)
+def test_a_gradient_goes_with_the_sine_of_the_elevation(direction: tuple[float, ...], share: float) -> None:
+    assert gradient_share(direction) == pytest.approx(share, abs=EPS)
+    environment = tl.Environment.gradient((0.0, 0.0, 1.0), (1.0, 0.0, 3.0))
+    assert environment.radiance(direction, (0, 0)) == pytest.approx([share, 0, 1 + 2 * share], abs=4 * EPS)
+
+
+def test_a_checkerboard_alternates_from_the_top_left() -> None:
+    rows = ["010101", "101010", "010101"]  # three squares in the height of a picture twice as wide
+    right, down = np.meshgrid((np.arange(6) + 0.5) / 3, (np.arange(3) + 0.5) / 3)
+    share = checkerboard_share(np.stack([right, down], axis=-1), 3)
+    assert ["".join(f"{v:.0f}" for v in row) for row in share] == rows
+
+
+def test_a_checkerboard_has_its_first_color_at_the_top_left() -> None:
+    environment = tl.Environment.checkerboard((1, 0, 0), (0, 0, 1), tiles=2)
+    backdrop = [(0.1, 0.1), (0.6, 0.1), (0.1, 0.6), (0.6, 0.6)]
+    expected = [(1, 0, 0), (0, 0, 1), (0, 0, 1), (1, 0, 0)]
+    assert environment.radiance(np.zeros((4, 3)), backdrop).tolist() == [list(map(float, e)) for e in expected]
+
+
+def test_an_environment_takes_text_as_srgb_and_numbers_as_linear_radiance() -> None:
+    assert tl.Environment.constant("#808080").first == pytest.approx([0.2158605] * 3, abs=1e-7)
+    assert tl.Environment.constant(2.5).first.tolist() == [2.5] * 3
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: tl.Environment.constant((-1, 0, 0)), "environment radiance (-1.0, 0.0, 0.0); negative"),
+        (lambda: tl.Environment.constant((NAN, 0, 0)), "environment radiance"),
+        (lambda: tl.Environment.constant("reddish"), "color 'reddish'; neither"),
+        (lambda: tl.Environment.gradient((0, 0, 0), (0, 0)), "environment radiance (0, 0); not one or three numbers"),
+        (lambda: tl.Environment.checkerboard(0, 1, tiles=0), "checkerboard of 0 tiles; not above 0"),
+        (lambda: tl.Environment.checkerboard(0, 1, tiles=NAN), "checkerboard of nan tiles; not above 0"),
+        (lambda: tl.PointLight((0, 0), 1), "light position (0, 0); not three finite numbers"),
+        (lambda: tl.PointLight((0, 0, NAN), 1), "not three finite numbers"),
+        (lambda: tl.PointLight((0, 0, 0), -1), "light intensity (-1.0, -1.0, -1.0); negative"),
+        (lambda: tl.PointLight((0, 0, 0), (1, 2)), "light intensity (1, 2); not one or three numbers"),
+        (lambda: tl.PointLight((0, 0, 0), "bright"), "light intensity 'bright'; not one or three numbers"),
+        (lambda: tl.PointLight("here", 1), "light position 'here'; not three finite numbers"),
+        (lambda: tl.DirectionalLight((0, 0, 0), 1), "light direction; its length is 0"),
+        (lambda: tl.DirectionalLight((0, 0, math.inf), 1), "light direction (0, 0, inf); not three finite"),
+        (lambda: tl.DirectionalLight((0, 0, 1), (1, -1, 0)), "light irradiance (1.0, -1.0, 0.0); negative"),
+    ],
+)
+def test_there_is_no_such_light(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        make()
+
+
+def test_lights_hold_read_only_arrays_and_one_number_stands_for_all_channels() -> None:
+    point, sun = tl.PointLight((1, 2, 3), 5), tl.DirectionalLight((0, 0, -4), (1, 2, 3))
+    assert np.asarray(point.intensity).tolist() == [5, 5, 5]
+    assert np.asarray(sun.direction).tolist() == [0, 0, -1]
+    for array in (point.position, point.intensity, sun.irradiance, sun.direction):
+        assert not np.asarray(array).flags.writeable
+
+
+# Objects
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"transform": np.diag([1, 0, 1, 1])}, "transform of 'box'; it flattens the mesh (a scale of 0)"),
+        ({"transform": np.eye(3)}, "transform of 'box'; not a finite 4x4 matrix"),
+        ({"transform": np.eye(4) * NAN}, "transform of 'box'; not a finite 4x4 matrix"),
+        ({"transform": np.eye(4)[:, ::-1]}, "transform of 'box'; last row (1.0, 0.0, 0.0, 0.0)"),
+        ({"transform": np.eye(4) * 2}, "transform of 'box'; last row (0.0, 0.0, 0.0, 2.0)"),
+        ({"sheet_thickness": 0}, "sheet_thickness 0 of 'box'; not above 0"),
+        ({"sheet_thickness": -1e-3}, "sheet_thickness -0.001 of 'box'; not above 0"),
+        ({"sheet_thickness": NAN}, "sheet_thickness nan of 'box'; not above 0"),
+    ],
+)
+def test_there_is_no_such_object(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        tl.Object(BOX, GLASS, **options)
+
+
+def test_an_object_needs_finite_coordinates() -> None:
+    broken = tl.Mesh(np.where(_BOX.vertices > 2, np.nan, _BOX.vertices), _BOX.faces, name="broken")
+    with pytest.raises(tl.InputError, match="mesh 'broken'; 4 vertices are not finite"):
+        tl.Object(broken, GLASS)
+
+
+def test_a_strong_but_regular_scale_does_not_flatten() -> None:
+    matrix = np.diag([1e-6, 1.0, 1e6, 1.0])
+    assert tl.Object(BOX, GLASS, matrix).bounds.tolist() == [[-1e-6, -2, -3e6], [1e-6, 2, 3e6]]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "scale", "mirrored", "inwards"),
+    [
+        (BOX, (1, 1, 1), False, False),
+        (BOX, (-1, 1, 1), True, True),
+        (BOX, (-1, -2, 1), False, False),
+        (BOX, (-1, -2, -3), True, True),
+        (INVERTED, (1, 1, 1), False, True),
+        (INVERTED, (1, 1, -1), True, False),
+    ],
+)
+def test_a_mirror_and_an_inverted_mesh_cancel(
+    mesh: tl.Mesh, scale: tuple[float, ...], mirrored: bool, inwards: bool
+) -> None:
+    body = tl.Object(mesh, GLASS, np.diag([*scale, 1]))
+    assert (body.mirrored, body.faces_inwards) == (mirrored, inwards)
+
+
+def test_bounds_follow_a_rotation_and_a_translation() -> None:
+    matrix = turned(90, (0, 0, 1))
+    matrix[:3, 3] = (10, 20, 30)
+    assert tl.Object(BOX, GLASS, matrix).bounds == pytest.approx(np.array([[8, 19, 27], [12, 21, 33]]), abs=64 * EPS)
+
+
+@given(st.floats(-180, 180), st.tuples(*[st.floats(0.1, 1)] * 3))
+def test_bounds_hold_every_vertex_however_the_body_is_turned(degrees: float, axis: tuple[float, float, float]) -> None:
+    matrix = turned(degrees, axis)
+    low, high = tl.Object(BOX, GLASS, matrix).bounds
+    world = BOX.vertices @ matrix[:3, :3].T
+    assert low == pytest.approx(world.min(axis=0), abs=16 * EPS)
+    assert high == pytest.approx(world.max(axis=0), abs=16 * EPS)
+
+
+@pytest.mark.parametrize("mesh", [BOX, INVERTED], ids=["box", "inverted"])
+@pytest.mark.parametrize(
+    "matrix",
+    [np.eye(4), np.diag([-1, 1, 1, 1]), np.diag([2, -3, 0.5, 1]), turned(30, (1, 2, 3)) @ np.diag([-1, 2, 3, 1])],
+    ids=["plain", "mirrored", "mirrored and stretched", "turned"],
+)
+def test_a_body_contains_what_is_inside_it_whatever_its_winding(mesh: tl.Mesh, matrix: np.ndarray[Any, Any]) -> None:
+    matrix = trimesh.transformations.translation_matrix((5, 6, 7)) @ matrix
+    body = tl.Object(mesh, GLASS, matrix)
+    for local, number in (((0.5, 1.9, -2.9), 1), ((0, 0, 0), 1), ((1.1, 0, 0), 0), ((0, 0, 3.1), 0), ((9, 9, 9), 0)):
+        world = matrix[:3, :3] @ local + matrix[:3, 3]
+        assert body.winding_number(world) == pytest.approx(number, abs=1e-13)
+
+
+def test_on_its_surface_a_body_contains_a_fraction() -> None:
+    body = tl.Object(BOX, GLASS)
+    assert body.winding_number((1, 0.3, 0.4)) == pytest.approx(1 / 2, abs=1e-13)
+    assert body.winding_number((1, 2, 0.4)) == pytest.approx(1 / 4, abs=1e-13)
+    assert body.winding_number((1, 2, 3)) == pytest.approx(1 / 8, abs=1e-13)
+
+
+# Scenes
+
+
+def test_a_scene_needs_an_object_and_a_known_overlap() -> None:
+    with pytest.raises(tl.InputError, match="scene; it has no objects"):
+        tl.Scene([], CAMERA)
+    with pytest.raises(tl.InputError, match=r"overlap 'xor'; not a known policy; use one of add, union, priority"):
+        tl.Scene([tl.Object(BOX, GLASS)], CAMERA, overlap="xor")  # type: ignore[arg-type]
+
+
+def test_a_scene_knows_its_bodies_and_bounds() -> None:
+    glass, rock = tl.Object(BOX, GLASS), tl.Object(BOX, None, trimesh.transformations.translation_matrix((10, 0, 0)))
+    scene = tl.Scene([glass, rock], CAMERA)
+    assert scene.bodies == (glass,)
+    assert scene.bounds.tolist() == [[-1, -2, -3], [11, 2, 3]]
+    assert scene.diagonal == pytest.approx(math.sqrt(144 + 16 + 36), rel=2 * EPS)
+    assert scene.environment.first.tolist() == [1, 1, 1]
+
+
+def test_the_showcase_frames_the_mesh_in_a_medium_of_its_size() -> None:
+    for scale in (1e-3, 1.0, 1e3):
+        mesh = tl.Mesh(BOX.vertices * scale, BOX.faces)
+        scene = tl.showcase(mesh)
+        medium = scene.objects[0].medium
+        assert medium is not None
+        assert medium.transmittance(0.15 * mesh.diagonal) == pytest.approx((0.18, 0.62, 0.35), rel=1e-14)
+        assert scene.camera.forward == pytest.approx(tl.showcase(BOX).camera.forward, abs=1e-12)
+    assert tl.showcase(BOX, GLASS).objects[0].medium is GLASS

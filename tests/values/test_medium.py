@@ -1,0 +1,235 @@
+"""Media: their numbers, their refusals, and the presets against the published tables."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import translucent as tl
+from translucent.color import parse_color
+from translucent.medium import Medium
+
+NAN, INF = math.nan, math.inf
+JADE = (0.18, 0.62, 0.35)
+
+
+def test_a_medium_has_its_color_at_its_distance() -> None:
+    jade = Medium.from_color(JADE, distance=0.02)
+    # log, division, product and exp: 4 roundings, times the optical depth, 1.8 at most.
+    assert jade.transmittance(0.02) == pytest.approx(JADE, rel=2e-15)
+    assert jade.transmittance(0.04) == pytest.approx(np.square(JADE), rel=4e-15)
+    assert jade.extinction == pytest.approx(-np.log(JADE) / 0.02, rel=1e-15)
+
+
+@given(st.tuples(*[st.floats(1e-30, 1)] * 3), st.floats(1e-6, 1e6), st.floats(0, 10))
+def test_color_distance_and_extinction_agree(color: tuple[float, ...], distance: float, factor: float) -> None:
+    medium = Medium.from_color(color, distance)
+    with np.errstate(under="ignore"):
+        depth = -np.log(color) * factor
+        expected = np.exp(-depth)
+    assert medium.transmittance(factor * distance) == pytest.approx(expected, rel=1e-14 * max(1.0, depth.max()), abs=0)
+
+
+@pytest.mark.parametrize("shape", [(), (4,), (2, 3), (0,)])
+def test_transmittance_adds_a_channel_axis(shape: tuple[int, ...]) -> None:
+    assert Medium(absorption=(1, 2, 3)).transmittance(np.ones(shape)).shape == (*shape, 3)
+
+
+def test_no_distance_no_loss_and_a_huge_one_all() -> None:
+    medium = Medium(absorption=(1.0, 1e-3, 5.0))
+    assert medium.transmittance([0.0, 1e9]).tolist() == [[1, 1, 1], [0, 0, 0]]
+
+
+def test_extinction_is_absorption_plus_scattering() -> None:
+    medium = Medium(absorption=(1, 2, 3), scattering=(0.5, 0, 4))
+    assert medium.extinction.tolist() == [1.5, 2.0, 7.0]
+    assert medium.extinction.dtype == np.float64
+
+
+def test_hex_is_srgb_and_a_bare_triple_is_linear() -> None:
+    assert Medium.from_color("#7b1e3a", 0.01) == Medium.from_color(parse_color("#7b1e3a"), 0.01)
+    assert Medium.from_color("#808080", 1.0) != Medium.from_color((128 / 255,) * 3, 1.0)
+
+
+def test_a_single_number_stands_for_all_channels() -> None:
+    assert Medium(absorption=2.0) == Medium(absorption=(2.0, 2.0, 2.0))
+
+
+def test_white_absorbs_exactly_nothing() -> None:
+    medium = Medium.from_color((1, 1, 1), 0.02)
+    assert medium.extinction.tolist() == [0, 0, 0]
+    assert not np.signbit(medium.extinction).any()
+    assert medium == Medium()
+
+
+@pytest.mark.parametrize("distance", [INF, 1e308])
+def test_a_color_infinitely_far_away_leaves_light_as_it_is(distance: float) -> None:
+    medium = Medium.from_color((0.18, 0.999999, 1.0), distance)
+    assert medium.transmittance(1e3).tolist() == [1.0, 1.0, 1.0]
+    if distance == INF:
+        assert medium.extinction.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_tiny_and_huge_distances_are_fine_while_the_extinction_is_finite() -> None:
+    for distance in (1e-30, 1e30):
+        assert Medium.from_color((0.5,) * 3, distance).transmittance(distance) == pytest.approx((0.5,) * 3, rel=4e-16)
+
+
+@pytest.mark.parametrize(
+    ("color", "distance", "message"),
+    [
+        ((0.0, 0.5, 0.5), 1, "color (0.0, 0.5, 0.5); red = 0 is not in 0 < t <= 1; no finite extinction gives 0"),
+        ((0.5, -0.0, 0.5), 1, "green = -0 is not in 0 < t <= 1"),
+        ((0.5, 0.5, -0.1), 1, "blue = -0.1 is not in 0 < t <= 1; no finite extinction gives 0 or above 1"),
+        ((0.5, 1.5, 0.5), 1, "green = 1.5 is not in 0 < t <= 1; a medium cannot add light"),
+        ((0.5, 0.5, NAN), 1, "a channel is not finite"),
+        ((0.5, 0.5, INF), 1, "a channel is not finite"),
+        ("#ff0000", 1, "color '#ff0000'; green = 0 is not in 0 < t <= 1"),
+        ("nonsense", 1, "color 'nonsense'; neither a hex color"),
+        ((0.5, 0.5), 1, "not (3,)"),
+        (JADE, 0, "distance 0; not above 0; give the distance in metres"),
+        (JADE, -0.02, "distance -0.02; not above 0"),
+        (JADE, -INF, "distance -inf; not above 0"),
+        (JADE, NAN, "distance nan; not above 0"),
+        (JADE, "2cm", "distance '2cm'; not above 0; give the distance in metres"),
+        (JADE, None, "distance None; not above 0"),
+        (JADE, 1e-309, "distance 1e-309 m; so short that the extinction overflows"),
+        ((1e-300,) * 3, 1e-306, "so short that the extinction overflows"),
+    ],
+    ids=str,
+)
+def test_no_medium_has_such_a_color(color: Any, distance: Any, message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        Medium.from_color(color, distance)
+
+
+@pytest.mark.parametrize(
+    ("given_", "message"),
+    [
+        ({"absorption": (1, -1, 0)}, "medium absorption (1.0, -1.0, 0.0); negative or not finite"),
+        ({"absorption": (1, NAN, 0)}, "medium absorption (1.0, nan, 0.0); negative or not finite"),
+        ({"absorption": INF}, "medium absorption (inf, inf, inf); negative or not finite"),
+        ({"scattering": (0, 0, -1e-9)}, "medium scattering"),
+        ({"emission": (-1, 0, 0)}, "medium emission"),
+        ({"absorption": (1, 2)}, "medium absorption (1, 2); not one or three numbers"),
+        ({"absorption": "red"}, "medium absorption 'red'; not one or three numbers"),
+        ({"anisotropy": 1.0}, "medium anisotropy 1.0; not between -1 and 1"),
+        ({"anisotropy": -1.0}, "medium anisotropy -1.0"),
+        ({"anisotropy": NAN}, "medium anisotropy nan"),
+        ({"ior": 0.9}, "medium ior 0.9; below 1 or not finite"),
+        ({"ior": INF}, "medium ior inf"),
+        ({"ior": NAN}, "medium ior nan"),
+    ],
+    ids=str,
+)
+def test_no_medium_has_such_coefficients(given_: dict[str, Any], message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        Medium(**given_)
+
+
+def test_equal_media_are_equal_and_hash_alike() -> None:
+    one, same = Medium(absorption=(1, 0, 3), ior=1.5), Medium(absorption=[1.0, -0.0, 3.0], ior=1.5)
+    assert one == same
+    assert hash(one) == hash(same)
+    assert len({one, same}) == 1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"absorption": (1, 2, 4)}, {"scattering": 1.0}, {"emission": 1.0}, {"anisotropy": 0.5}, {"ior": 1.4}],
+    ids=str,
+)
+def test_media_that_differ_anywhere_are_not_equal(change: dict[str, Any]) -> None:
+    one = Medium(absorption=(1, 2, 3), ior=1.5)
+    assert dataclasses.replace(one, **change) != one
+    assert one != "jade"
+
+
+def test_a_medium_cannot_be_changed() -> None:
+    source = np.array([1.0, 2.0, 3.0])
+    medium = Medium(absorption=source)
+    source[0] = 9.0
+    assert medium.absorption[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        medium.absorption[0] = 9.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        medium.ior = 2.0  # type: ignore[misc]
+
+
+def test_emits_and_scatters_look_at_every_channel() -> None:
+    assert (Medium().emits, Medium().scatters) == (False, False)
+    assert Medium(emission=(0, 0, 1e-9)).emits
+    assert Medium(scattering=(0, 0, 1e-9)).scatters
+
+
+# Presets
+
+#: Rows of the published table that presets take their numbers from.
+ROWS = {
+    "marble": "Marble",
+    "skim_milk": "Skimmilk",
+    "skin1": "Skin1",
+    "ketchup": "Ketchup",
+    "merlot": "Merlot",
+    "chardonnay": "Chardonnay",
+    "beer": "Budweiser Beer",
+    "apple_juice": "Apple Juice",
+    "shampoo": "Shampoo",
+}
+
+
+@pytest.mark.parametrize("name", sorted(tl.presets()))
+def test_a_preset_loads_with_its_source(name: str) -> None:
+    found = tl.preset(name)
+    assert found.name == name
+    assert found.kind in {"measured", "estimated"}
+    assert found.source
+    assert (found.medium.extinction > 0).all()
+    assert 1 < found.medium.ior < 2.5
+
+
+def test_every_measured_preset_is_held_against_the_table() -> None:
+    assert {name for name, found in tl.presets().items() if found.kind == "measured"} == set(ROWS)
+
+
+@pytest.mark.parametrize(("name", "row"), ROWS.items())
+def test_a_measured_preset_has_the_published_numbers(assets: Path, name: str, row: str) -> None:
+    with (assets / "measured_media.csv").open(encoding="utf-8") as stream:
+        table = {line["name"]: line for line in csv.DictReader(stream)}
+    medium, line = tl.preset(name).medium, table[row]
+    assert line["units"] == "mm^-1"
+    for found, column in ((medium.absorption, "sigma_a"), (medium.scattering, "sigma_s_prime")):
+        per_metre = [1e3 * float(line[f"{column}_{channel}"]) for channel in "rgb"]
+        assert np.asarray(found) == pytest.approx(per_metre, rel=1e-14, abs=0)
+    assert medium.ior == float(line["eta"])
+    # Reduced scattering coefficients go with an isotropic phase function.
+    assert medium.anisotropy == 0.0
+
+
+def test_a_millimetre_of_ketchup() -> None:
+    # Absorption 1.45 and scattering 0.03 per mm in blue.
+    assert tl.preset("ketchup").medium.transmittance(1e-3)[2] == pytest.approx(math.exp(-1.48), rel=1e-14)
+
+
+def test_an_estimated_preset_has_its_color_at_its_distance() -> None:
+    assert tl.preset("jade").medium.transmittance(0.02) == pytest.approx(JADE, rel=2e-15)
+
+
+@pytest.mark.parametrize("name", ["Skim Milk", "skim-milk", "SKIM_MILK"])
+def test_the_name_of_a_preset_can_be_written_so(name: str) -> None:
+    assert tl.preset(name) is tl.preset("skim_milk")
+
+
+@pytest.mark.parametrize("name", ["unobtainium", ""])
+def test_an_unknown_preset_names_the_known_ones(name: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(f"preset {name!r}; not a known preset; use one of marble, skim")):
+        tl.preset(name)
