@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +45,15 @@ def revolve(profile: npt.ArrayLike, segments: int, closed: bool = False) -> tupl
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     used, faces = np.unique(faces, return_inverse=True)
     return grid.reshape(-1, 3)[used], faces.reshape(-1, 3).astype(np.int32)
+
+
+def unit_sphere(segments: int) -> Mesh:
+    """Sphere of radius 1 around the origin, of `segments` meridians and half as many rings."""
+    rings = max(segments // 2, 2)
+    angle = pi * np.arange(rings + 1) / rings
+    profile = np.stack([np.sin(angle), -np.cos(angle)], axis=1)
+    profile[-1, 0] = 0.0
+    return Mesh(*revolve(profile, segments))
 
 
 def dot(a: Array, b: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.mesh import Mesh
-from translucent.solid_geometry import between, dot, nearest_to_zero, quadric, revolve
+from translucent.solid_geometry import between, dot, nearest_to_zero, quadric, revolve, unit_sphere
 
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -110,7 +110,7 @@ class _Round(_Intervals):
     def tessellate(self, segments: int = 64) -> Mesh:
         """Closed mesh of `segments` meridians and half as many rings."""
         center, radii = self._shape()
-        unit = _unit_sphere(segments)
+        unit = unit_sphere(segments)
         return Mesh(unit.vertices * radii + center, unit.faces, name=type(self).__name__.lower())
 
     def sagitta(self, segments: int = 64) -> float:
@@ -118,7 +118,7 @@ class _Round(_Intervals):
 
         The depth of the lowest face plane in the unit sphere; no axis stretches it by more than the largest radius.
         """
-        unit = _unit_sphere(segments)
+        unit = unit_sphere(segments)
         a, b, c = unit.vertices[unit.faces].transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         depth = 1.0 - float((dot(normals, a) / np.linalg.norm(normals, axis=1)).min())
@@ -392,14 +392,6 @@ class TwoSpheres(_Spheres):
 
     def _parts(self) -> tuple[tuple[Sphere, int], ...]:
         return (self.first, 1), (self.second, 1)
-
-
-def _unit_sphere(segments: int) -> Mesh:
-    rings = max(segments // 2, 2)
-    angle = pi * np.arange(rings + 1) / rings
-    profile = np.stack([np.sin(angle), -np.cos(angle)], axis=1)
-    profile[-1, 0] = 0.0
-    return Mesh(*revolve(profile, segments))
 
 
 def _require(solid: Solid, holds: bool, *numbers: float) -> None:

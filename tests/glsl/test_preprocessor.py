@@ -105,6 +105,7 @@ def test_block_layout_is_what_the_driver_uses(renderer: tl.Renderer, block: Unif
         program[block.name].binding = block.binding
         uniforms, output = gl.buffer(block.pack(**values)), gl.buffer(reserve=4)
         uniforms.bind_to_uniform_block(block.binding)
+        gl.framebuffer([gl.texture((1, 1), 1)]).use()
         gl.vertex_array(program, []).transform(output, vertices=1)
         total = np.frombuffer(output.read(), np.float32)[0]
     assert total == pytest.approx(expected, rel=1e-5)

@@ -163,8 +163,8 @@ def test_function_equals_its_twin(renderer: tl.Renderer, library: str, name: str
     worst = np.unravel_index(excess.argmax(), excess.shape)
     row = worst[0]
     assert (excess <= 1).all(), (
-        f"{name}{tuple(np.asarray(a)[row].tolist() for a in arguments)} = {found[worst]:.9g}, exact {exact[worst]:.9g}, "
-        f"{excess[worst]:.1f} times the allowed error"
+        f"{name}{tuple(np.asarray(a)[row].tolist() for a in arguments)} = {found[worst]:.9g}, "
+        f"exact {exact[worst]:.9g}, {excess[worst]:.1f} times the allowed error"
     )
 
 

@@ -214,6 +214,15 @@ def test_only_a_single_solid_without_dents_is_convex(mesh: Mesh, convex: bool) -
     assert mesh.diagnosis.convex is convex
 
 
+@pytest.mark.parametrize(("depth", "convex"), [(0.0, True), (1e-12, True), (1e-7, False), (-1e-7, True), (-0.5, True)])
+def test_a_dent_is_not_convex_unless_it_is_rounding(depth: float, convex: bool) -> None:
+    # The wall x = 0 as four triangles around a ninth vertex in its middle, pushed in by `depth`.
+    fan = [(a, b, 8) for a, b in itertools.pairwise((*QUADS[0], QUADS[0][0]))]
+    mesh = Mesh(np.vstack([CORNERS, [[depth, 0.5, 0.5]]]), np.vstack([CUBE[2:], fan]))
+    assert mesh.diagnosis.solid
+    assert mesh.diagnosis.convex is convex
+
+
 def test_a_torus_is_not_convex() -> None:
     torus = trimesh.creation.torus(1.0, 0.25, major_sections=24, minor_sections=12)
     mesh = Mesh(torus.vertices, torus.faces)

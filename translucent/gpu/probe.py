@@ -66,8 +66,12 @@ def run_function(
         for buffer, (kind, name) in zip(buffers, signature.parameters, strict=True)
     ]
     vertex_array = gl.vertex_array(program, content)
+    # Nothing is drawn, yet OpenGL asks for a complete framebuffer, which a context without a window lacks.
+    texture = gl.texture((1, 1), 1)
+    framebuffer = gl.framebuffer([texture])
+    framebuffer.use()
     vertex_array.transform(output, moderngl.POINTS, count)
     values = np.frombuffer(output.read(), dtype=np.float32).copy()
-    for resource in (vertex_array, program, output, *buffers):
+    for resource in (vertex_array, program, output, framebuffer, texture, *buffers):
         resource.release()
     return values if width == 1 else values.reshape(count, width)

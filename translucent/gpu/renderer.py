@@ -53,7 +53,8 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
         self._gpu: GpuContext = open_context(backend) if context is None else adopt_context(context)
         self._meshes = MeshCache(self._gpu.gl)
-        self._timer = PassTimer(self._gpu.gl)
+        with self._gpu.current():
+            self._timer = PassTimer(self._gpu.gl)
         self._targets: Targets | None = None
         self._passes: dict[type[Pass], Pass] = {}
         self._present: PresentPass | None = None
