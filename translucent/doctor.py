@@ -14,7 +14,7 @@ from translucent.gpu.context import Backend, NoContextError, open_context
 #: Packages beside the core, and what each is for.
 OPTIONAL = {
     "OpenEXR": "writing .exr files (pip install 'translucent-shading[exr]')",
-    "lavavu-osmesa": "a software OpenGL where the system has none (pip install 'translucent-shading[osmesa]')",
+    "lavavu-osmesa": "a software OpenGL where the system has none (pip install --no-deps lavavu-osmesa)",
 }
 CORE = ("numpy", "scipy", "trimesh", "moderngl", "glcontext", "pillow", "click", "pyrender", "embreex")
 
@@ -74,7 +74,7 @@ def report(facts: dict[str, Any]) -> str:
     if facts["backend"] is None:
         lines.append(
             "No OpenGL 3.3 without a window: apt-get install libegl1 libgl1 libgl1-mesa-dri, "
-            "or pip install 'translucent-shading[osmesa]' (Linux x86-64)."
+            "or pip install --no-deps lavavu-osmesa (Linux x86-64)."
         )
     else:
         lines.append(f"Rendering uses {facts['backend']}.")

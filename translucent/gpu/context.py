@@ -45,7 +45,7 @@ class NoContextError(RenderError):
         super().__init__(
             "OpenGL 3.3 context",
             f"none; tried {tried}",
-            "apt-get install libegl1 libgl1 libgl1-mesa-dri, or pip install 'translucent-shading[osmesa]'; "
+            "apt-get install libegl1 libgl1 libgl1-mesa-dri, or pip install --no-deps lavavu-osmesa (Linux x86-64); "
             "`translucent doctor` explains this machine",
         )
         self.attempts = attempts

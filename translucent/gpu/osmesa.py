@@ -8,7 +8,6 @@ from __future__ import annotations
 import ctypes
 from importlib import metadata
 from pathlib import Path
-from types import TracebackType
 
 WHEEL = "lavavu-osmesa"
 
@@ -44,9 +43,7 @@ class OSMesaContext:
             raise OSError("OSMesaMakeCurrent failed")
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:  # moderngl calls it without arguments
         """Leave the context current: there is no other to go back to."""
 
     def release(self) -> None:
