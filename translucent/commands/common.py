@@ -1,0 +1,139 @@
+"""What the verbs share: options, and reading what they were given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from translucent.errors import InputError
+
+if TYPE_CHECKING:
+    from translucent.camera import Camera
+    from translucent.lights import Environment
+    from translucent.medium import Medium
+    from translucent.mesh import Mesh
+    from translucent.thickness import Method
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def common_options(command: F) -> F:
+    """Options of every verb."""
+    command = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")(command)
+    return click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")(command)
+
+
+def medium_options(command: F) -> F:
+    """Options that choose a medium."""
+    command = click.option("--preset", "preset_name", metavar="NAME", help="A named medium, such as merlot.")(command)
+    command = click.option("--distance", metavar="D", help="Distance at which light has the color: 2cm, 0.8in.")(
+        command
+    )
+    return click.option("--color", metavar="C", help="Transmitted color: '#7b1e3a', teal, 'linear(.18,.62,.35)'.")(
+        command
+    )
+
+
+def unit_option(command: F) -> F:
+    """Option for the unit of a file."""
+    return click.option("--unit", default="m", show_default=True, help="Unit of the file's coordinates.")(command)
+
+
+def read_mesh(model: str, unit: str) -> Mesh:
+    """The mesh of a file, or of the toolkit's own by name."""
+    from translucent.assets import mesh_names, mesh_path
+    from translucent.mesh import load_mesh
+
+    if model in mesh_names() and not Path(model).exists():
+        return load_mesh(mesh_path(model))
+    return load_mesh(model, unit=unit)
+
+
+def read_medium(color: str | None, distance: str | None, preset_name: str | None) -> Medium | None:
+    """The medium that the options choose, if they do."""
+    from translucent.medium import Medium
+    from translucent.presets import preset
+    from translucent.units import parse_length
+
+    if preset_name is not None:
+        if color is not None or distance is not None:
+            raise InputError(f"--preset {preset_name}", "--color or --distance is given, too", "give one or the other")
+        return preset(preset_name).medium
+    if (color is None) != (distance is None):
+        given, missing = ("--color", "--distance") if distance is None else ("--distance", "--color")
+        raise InputError(given, f"{missing} is missing", "give both: a color has a meaning only at a distance")
+    return None if color is None or distance is None else Medium.from_color(color, parse_length(distance))
+
+
+def read_method(name: str | None, thickness: str | None) -> Method | None:
+    """The thickness method of this name, if there is one."""
+    from translucent.thickness import ThinLayer, method_from_name
+    from translucent.units import parse_length
+
+    method = method_from_name(name) if name else None
+    if thickness is None:
+        return method
+    if not isinstance(method, ThinLayer):
+        raise InputError("--thickness", "only --method thin-layer takes it", "add --method thin-layer")
+    return ThinLayer(parse_length(thickness))
+
+
+def read_environment(background: str) -> Environment | None:
+    """The background of this name or color; None is the showcase's own."""
+    from translucent.lights import Environment
+
+    if background == "studio":
+        return None
+    if background == "checkerboard":
+        return Environment.checkerboard((0.9, 0.9, 0.9), (0.6, 0.6, 0.6), tiles=12)
+    return Environment.constant(background)
+
+
+def read_camera(
+    mesh: Mesh, eye: str | None, target: str | None, up: str, fov: float, size: tuple[int, int]
+) -> Camera | None:
+    """The camera that the options choose; None leaves it to the showcase."""
+    from translucent.camera import Camera
+
+    if eye is None:
+        if target is not None:
+            raise InputError("--target", "--eye is missing", "give both, or neither")
+        if fov == 30.0 and up == "0,1,0":
+            return None
+        return Camera.framing(mesh.vertices[mesh.faces].reshape(-1, 3), size, fov_y=fov, up=read_vector("--up", up))
+    return Camera.look_at(
+        read_vector("--eye", eye),
+        mesh.center if target is None else read_vector("--target", target),
+        read_vector("--up", up),
+        fov_y=fov,
+    )
+
+
+def read_vector(option: str, text: str) -> list[float]:
+    """Three numbers of an option."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3:
+        raise InputError(f"{option} {text!r}", "not three numbers", f"write for example {option} 0,1.5,4")
+    return values
+
+
+def read_size(text: str) -> tuple[int, int]:
+    """Width and height of an option."""
+    from translucent.camera import check_size
+
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise InputError(f"--size {text!r}", "not WxH", "write for example --size 1280x720") from None
+    return check_size((width, height))
+
+
+def triple_text(values: Any) -> str:
+    """Three numbers, aligned."""
+    return " ".join(f"{value:10.5g}" for value in values)
