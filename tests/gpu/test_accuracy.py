@@ -166,6 +166,16 @@ def test_units_and_distance_from_the_origin_do_not_matter(
     assert errors.invalid == 0
 
 
+def test_vertices_far_from_the_origin_keep_their_detail(renderer: tl.Renderer, assets: Path) -> None:
+    """The offset of Embree's watertightness test: float32 resolves 1.6 cm there, the mesh is 1 m."""
+    mesh = tl.load_mesh(assets / "meshes_clean" / "rocker-arm.obj")
+    moved = tl.Mesh(mesh.vertices + (148376.0, 1234.0, -223423.0), mesh.faces)
+    errors = _errors(renderer, _scene(moved, tl.Camera.framing(moved.vertices, SIZE)))
+    assert errors.median <= 1e-7 * mesh.diagonal
+    assert errors.p999 <= 1e-5 * mesh.diagonal
+    assert errors.invalid == 0
+
+
 def _volume(renderer: tl.Renderer, mesh: tl.Mesh, size: int = 1024) -> tuple[float, float]:
     """Sum of thickness x pixel area in an orthographic view, and the area of a pixel's row times the depth."""
     radius = 0.51 * mesh.diagonal

@@ -77,7 +77,7 @@ def test_opaque_density_is_black_and_never_nan(renderer: tl.Renderer) -> None:
         tl.Object(BOX.tessellate(), medium=tl.Medium(absorption=(1e38, 0.0, 1.0))),
         tl.Object(Sphere(radius=0.6).tessellate(), medium=tl.Medium(absorption=(1e300, 1.0, 0.0))),
     ]
-    for scene in (tl.Scene(bodies, CAMERA), tl.Scene(bodies[:1], CAMERA)):
+    for scene in (tl.Scene(bodies, CAMERA), tl.Scene(bodies[:1], CAMERA), tl.Scene(bodies[1:], CAMERA)):
         frame = renderer.render(scene, SIZE)
         for name in ("radiance", "transmittance", "optical_depth", "thickness"):
             assert np.isfinite(getattr(frame, name)).all(), name
@@ -97,6 +97,23 @@ def test_sheets_equal_the_reference(renderer: tl.Renderer, ior: float, declared:
     facing = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)) & (truth.thickness < 0.05)
     np.testing.assert_allclose(frame.thickness[facing], truth.thickness[facing], rtol=1e-4)
     np.testing.assert_allclose(frame.transmittance[facing], truth.transmittance[facing], atol=1e-4)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, 0.5, 1.3), (-1.0, 1.5, 0.7)])
+def test_sheets_follow_rotated_nonuniform_and_mirrored_transforms(
+    renderer: tl.Renderer, scale: tuple[float, float, float]
+) -> None:
+    """A normal turns with the inverse transpose, not with the matrix: the sheet's own thickness stays as declared."""
+    angle = 0.6
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn @ np.diag(scale) @ turn
+    body = tl.Object(Sphere().tessellate(64), medium=tl.Medium(absorption=10.0), transform=matrix, sheet_thickness=2e-3)
+    scene = tl.Scene([body], tl.Camera.look_at((1.5, 2.0, 7.0), (0.0, 0.0, 0.0), fov_y=50))
+    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
+    facing = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)) & truth.coverage & (truth.thickness < 0.02)
+    assert facing.sum() > 100
+    np.testing.assert_allclose(frame.thickness[facing], truth.thickness[facing], rtol=1e-3)
 
 
 def test_a_tilted_sheet_is_its_thickness_over_the_cosine(renderer: tl.Renderer) -> None:
