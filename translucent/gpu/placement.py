@@ -104,7 +104,7 @@ class Placement:
         medium = self.body.medium
         extinction = np.zeros(3) if medium is None else np.minimum(medium.extinction, max_extinction)
         from_normal = np.eye(4)
-        # The inverse transpose keeps outwards outwards under a mirror, too; only an inverted mesh has its normals inside.
+        # The inverse transpose keeps outwards outwards under a mirror; only an inverted mesh has its normals inside.
         from_normal[:3, :3] = np.linalg.inv(linear).T * (-1.0 if self.body.mesh.diagnosis.inverted else 1.0)
         # The scale of a normal is lost when it is normalised; unit scale keeps it within float32.
         from_normal[:3, :3] /= np.abs(from_normal[:3, :3]).max()
