@@ -17,7 +17,7 @@ from translucent.frame import Frame
 from translucent.lights import DirectionalLight, Environment, PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
-from translucent.metrics import Errors, compare
+from translucent.metrics import Errors, compare, interior
 from translucent.plan import RenderPlan, plan
 from translucent.presets import Preset, preset, presets
 from translucent.scene import Object, Scene
@@ -49,6 +49,7 @@ __all__ = [
     "TranslucentError",
     "TranslucentWarning",
     "compare",
+    "interior",
     "load_mesh",
     "plan",
     "preset",
@@ -59,6 +60,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("translucent-shading")
     # The values need no OpenGL, so importing them does not load it.
     if name == "Renderer":
         from translucent.gpu.renderer import Renderer

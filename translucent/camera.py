@@ -143,14 +143,14 @@ class Camera:
         return float(half_height * size[0] / size[1]), float(half_height)
 
     def rays(self, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> tuple[Array, Array]:
-        """Rays through the pixel centres.
+        """Rays through the pixel centers.
 
         Parameters
         ----------
         size : (width, height)
             In pixels.
         offset : (right, down)
-            Shift from the pixel centres, in pixels.
+            Shift from the pixel centers, in pixels.
 
         Returns
         -------

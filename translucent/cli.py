@@ -32,6 +32,10 @@ def main(arguments: list[str] | None = None) -> int:
         return _failed(str(error), 2 if isinstance(error, InputError) else 1)
     except KeyboardInterrupt:
         return _failed("interrupted", 130)
+    except Exception as error:  # a defect of ours, or a full memory: still one line
+        if "--debug" in given:
+            raise
+        return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows where", 1)
     return 0
 
 

@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 _FUNCTION = re.compile(r"\s*(srgb|linear)\s*\(([^()]*)\)\s*", re.IGNORECASE)
+_PIXEL = re.compile(r"(.+)@\s*(\d+)\s*,\s*(\d+)\s*")
 
 
 def srgb_to_linear(encoded: npt.ArrayLike) -> Array:
@@ -51,7 +52,8 @@ def parse_color(color: str | npt.ArrayLike) -> Array:
     ----------
     color : str or array_like (3,)
         ``"#7b1e3a"`` and CSS names are sRGB-encoded; ``"srgb(r, g, b)"`` and ``"linear(r, g, b)"`` take numbers
-        0..1; a bare triple is linear. Nothing is guessed.
+        0..1; ``"photo.png@120,45"`` is a pixel of an image (column, row, from the top left; sRGB-encoded); a bare
+        triple is linear. Nothing is guessed.
 
     Returns
     -------
@@ -60,7 +62,7 @@ def parse_color(color: str | npt.ArrayLike) -> Array:
     Raises
     ------
     InputError
-        If the text is no colour, or a channel is not finite.
+        If the text is no colour, a channel is not finite, or there is no such image or pixel.
     """
     if isinstance(color, str):
         return _parse_text(color)
@@ -87,13 +89,17 @@ def _parse_text(text: str) -> Array:
             raise InputError(f"color {text!r}", "not three numbers", "write for example linear(0.18, 0.62, 0.35)")
         triple = _finite(triple, text)
         return srgb_to_linear(triple) if match[1].lower() == "srgb" else triple
+    if match := _PIXEL.fullmatch(text):
+        from translucent.pixel import pixel_color
+
+        return pixel_color(match[1], int(match[2]), int(match[3]))
     try:
         rgb = ImageColor.getrgb(text.strip())
     except ValueError:
         raise InputError(
             f"color {text!r}",
             "neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)",
-            "write for example '#7b1e3a', 'teal' or 'linear(0.18,0.62,0.35)'",
+            "write for example '#7b1e3a', 'salmon' or 'linear(0.18,0.62,0.35)'",
         ) from None
     return srgb_to_linear(np.array(rgb[:3]) / 255.0)
 

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+#: A dent not deeper than this share of the size leaves a body convex.
+CONVEX_TOLERANCE = 1e-6
+
 #: How many offenders a finding names.
 FIRST = 3
 
@@ -197,8 +200,8 @@ class _Edges:
         opposite = vertices[self.faces[other // 3, (other + 2) % 3]]
         height = np.einsum("ij,ij->i", normals[one // 3], opposite - corners[one // 3, 0])
         size = np.ptp(vertices[np.unique(self.faces)], axis=0).max()
-        # Flat patches of a scanned or boolean-made body scatter by rounding: allow 1e-9 of the size.
-        return bool((height <= 1e-9 * size * np.linalg.norm(normals[one // 3], axis=1)).all())
+        # Files keep float32, so flat patches and fine tessellations scatter by some 1e-7 of the size.
+        return bool((height <= CONVEX_TOLERANCE * size * np.linalg.norm(normals[one // 3], axis=1)).all())
 
 
 def _collapsed(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

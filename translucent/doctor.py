@@ -13,7 +13,7 @@ from translucent.gpu.context import Backend, NoContextError, open_context
 
 #: Packages beside the core, and what each is for.
 OPTIONAL = {
-    "OpenEXR": "writing .exr files (pip install 'translucent-shading[exr]')",
+    "OpenEXR": "writing .exr files (pip install openexr)",
     "lavavu-osmesa": "a software OpenGL where the system has none (pip install --no-deps lavavu-osmesa)",
 }
 CORE = ("numpy", "scipy", "trimesh", "moderngl", "glcontext", "pillow", "click", "pyrender", "embreex")
@@ -38,7 +38,7 @@ def examine_backends(names: Sequence[str] = get_args(Backend)) -> list[BackendRe
         except NoContextError as error:
             reports.append(BackendReport(name, False, error.attempts[-1].error or ""))
             continue
-        info = context.gl.info
+        info = context.info
         detail = f"{context.renderer}; {info['GL_VERSION']}; textures up to {info['GL_MAX_TEXTURE_SIZE']}"
         reports.append(BackendReport(name, True, detail))
         if name != "window":

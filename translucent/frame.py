@@ -52,6 +52,10 @@ class Frame:
     seconds: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())
+        return f"Frame({self.size[0]}x{self.size[1]}, {covered} pixels covered, {invalid} invalid)"
+
     @property
     def size(self) -> tuple[int, int]:
         """(width, height) in pixels."""
@@ -149,7 +153,7 @@ def check_output(path: Path) -> None:
             raise RenderError(
                 f"output {str(path)!r}",
                 "the OpenEXR package is not installed",
-                "pip install 'translucent-shading[exr]'",
+                "pip install openexr",
             ) from None
 
 

@@ -93,6 +93,9 @@ class Mesh:
         array.setflags(write=False)
         object.__setattr__(self, field, array)
 
+    def __repr__(self) -> str:
+        return f"Mesh({self.name!r}, {len(self.vertices)} vertices, {len(self.faces)} faces)"
+
     @cached_property
     def diagnosis(self) -> Diagnosis:
         """What is wrong with the mesh, and whether it bounds a solid."""
@@ -106,7 +109,7 @@ class Mesh:
 
     @property
     def center(self) -> Array:
-        """(3,): centre of the bounding box."""
+        """(3,): center of the bounding box."""
         return np.asarray(0.5 * self.bounds[0] + 0.5 * self.bounds[1])
 
     @property
@@ -191,7 +194,7 @@ def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
     path : path
         What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
     unit : str
-        Unit of the file's coordinates; glTF is in metres by definition.
+        Unit of the file's coordinates. glTF is in metres by definition; another unit rescales it.
 
     Returns
     -------

@@ -83,7 +83,12 @@ def compare(
         used &= mask
         words += ", within the given mask"
     if not used.any():
-        raise InputError("compare", f"no pixel is {words}", "check that both frames show the body")
+        raise InputError(
+            "compare",
+            f"no pixel is {words}: the frame covers {int(frame.coverage.sum())}, {int((~frame.valid).sum())} invalid, "
+            f"the truth {int(truth.coverage.sum())}, {int((~truth.valid).sum())} invalid",
+            "check that both show the body, and that its mesh is closed",
+        )
     error = (
         np.asarray(getattr(frame, quantity), np.float64)[used] - np.asarray(getattr(truth, quantity), np.float64)[used]
     )
@@ -108,7 +113,7 @@ def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """(h, w) bool: pixels whose 3 x 3 neighbourhood has equal hit counts, away from every silhouette.
 
     At a silhouette a rasteriser decides coverage on a grid of sub-pixels, so it and a ray tracer may disagree there
-    about which surfaces a pixel centre sees: a matter of coverage, not of thickness.
+    about which surfaces a pixel center sees: a matter of coverage, not of thickness.
     """
     padded = np.pad(hit_counts, 1, mode="edge")
     height, width = hit_counts.shape

@@ -57,7 +57,7 @@ def extinction_from_color(color: npt.ArrayLike, distance: npt.ArrayLike) -> Arra
     return -np.log(np.asarray(color, dtype=np.float64)) / np.asarray(distance, dtype=np.float64) + 0.0
 
 
-def mean_opacity_slope(optical_depth: npt.ArrayLike) -> Array:
+def mean_transmittance(optical_depth: npt.ArrayLike) -> Array:
     """(1 - exp(-x)) / x, the mean transmittance over a path of optical depth x; 1 at x = 0."""
     x = np.asarray(optical_depth, dtype=np.float64)
     safe = np.where(x == 0, 1.0, x)
@@ -71,7 +71,7 @@ def emitted_radiance(emission: npt.ArrayLike, extinction: npt.ArrayLike, distanc
     Max 1995, eq. 11 with a constant source term.
     """
     d = np.asarray(distance, dtype=np.float64)
-    return np.asarray(emission, dtype=np.float64) * d * mean_opacity_slope(np.asarray(extinction, dtype=np.float64) * d)
+    return np.asarray(emission, dtype=np.float64) * d * mean_transmittance(np.asarray(extinction, dtype=np.float64) * d)
 
 
 def opacity_for_step(opacity_at_reference: npt.ArrayLike, step_ratio: npt.ArrayLike) -> Array:
@@ -104,15 +104,15 @@ def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array
     c = np.asarray(cos_incident, dtype=np.float64)
     n = np.asarray(ior, dtype=np.float64)
     # Each amplitude is a difference of nearly equal terms where n is near 1; multiplied out, it holds n^2 - 1.
-    contrast = (n - 1.0) * (n + 1.0)
-    k = contrast + c * c
+    ior_squared_minus_1 = (n - 1.0) * (n + 1.0)
+    k = ior_squared_minus_1 + c * c
     root = np.sqrt(np.maximum(k, 0.0))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        parallel = contrast * (c * c * (n * n + 1.0) - 1.0) / (n * n * c + root) ** 2
-        normal = contrast / (c + root) ** 2
+        parallel = ior_squared_minus_1 * (c * c * (n * n + 1.0) - 1.0) / (n * n * c + root) ** 2
+        normal = ior_squared_minus_1 / (c + root) ** 2
         reflectance = 0.5 * (parallel * parallel + normal * normal)
     # A boundary between equal media does not exist, also not edge-on, where the formula is 0/0.
-    return np.where(contrast == 0.0, 0.0, np.where(k <= 0.0, 1.0, reflectance))
+    return np.where(ior_squared_minus_1 == 0.0, 0.0, np.where(k <= 0.0, 1.0, reflectance))
 
 
 def refracted_cosine(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:

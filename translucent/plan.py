@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -30,12 +31,15 @@ class PassSpec:
         Indices into `Scene.objects` of what it draws; empty for a pass over pixels.
     geometry_passes : int
         How often it draws them.
+    target : {"accumulated", "fallback"}
+        Where its paths add up: the fallback is read where the other does not balance.
     """
 
     name: str
     reason: str
     objects: tuple[int, ...] = ()
     geometry_passes: int = 0
+    target: Literal["accumulated", "fallback"] = "accumulated"
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,8 @@ def plan(scene: Scene, method: Method | None = None) -> RenderPlan:
     InputError
         If no available method can render the scene.
     """
+    if method is not None and not isinstance(method, Method):
+        raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     _refuse_unsupported(scene)
     if isinstance(method, BackFaceDepth):
         return _plan_back_face_depth(scene, method)
@@ -126,39 +132,52 @@ def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
     what = (
         "optical depth per channel, since media differ" if spectral else "thickness, since all bodies share one medium"
     )
-    passes = [
-        PassSpec(
-            "signed_depth",
-            f"{_count(solids, 'body', 'bodies')} in one unsorted draw each: exits minus entries add up to {what}",
-            solids,
-            1,
-        )
-    ]
+    passes = []
     limits = []
+    if solids:
+        reason = f"{_count(solids, 'body', 'bodies')} in one unsorted draw each: exits minus entries add up to {what}"
+        passes.append(PassSpec("signed_depth", reason, solids, 1))
     if sheets:
         passes.append(
-            _sheet_pass(sheets, f"{_count(sheets, 'mesh', 'meshes')} declared thin: the paths through all faces add up")
+            _sheet_pass(sheets, f"{_count(sheets, 'mesh', 'meshes')} declared thin: paths through faces add up")
         )
     if open_bodies:
-        names = ", ".join(repr(scene.objects[i].mesh.name) for i in open_bodies)
-        passes.append(
-            PassSpec(
-                "thin_layer_fallback",
-                f"{names} not closed: pixels that enter and leave unequally often get sheets of "
-                f"{FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid",
-                open_bodies,
-                1,
-            )
-        )
-        limits.append(f"{names}: {'; '.join(p for i in open_bodies for p in scene.objects[i].mesh.diagnosis.problems)}")
+        passes += _fallback_passes(scene, solids, sheets, open_bodies)
+        limits += [_open_limit(scene.objects[i]) for i in open_bodies]
     if not method.anchored:
         limits.append("distances count from the camera: float32 loses digits with distance")
     return _finished(scene, method, passes, limits, spectral)
 
 
+def _fallback_passes(
+    scene: Scene, solids: tuple[int, ...], sheets: tuple[int, ...], open_bodies: tuple[int, ...]
+) -> list[PassSpec]:
+    """What a pixel shows that enters and leaves unequally often: open bodies as sheets, all others as ever."""
+    names = ", ".join(repr(scene.objects[i].mesh.name) for i in open_bodies)
+    reason = (
+        f"{names} not closed: pixels that enter and leave unequally often get sheets of {FALLBACK_SHEET:.0%} of the "
+        "diagonal, and are marked invalid"
+    )
+    passes = [PassSpec("thin_layer_fallback", reason, open_bodies + sheets, 1, "fallback")]
+    if closed := tuple(i for i in solids if i not in open_bodies):
+        passes.append(PassSpec("signed_depth_fallback", "closed bodies, in those pixels, too", closed, 1, "fallback"))
+    return passes
+
+
+def _open_limit(body: Object) -> str:
+    return (
+        f"{body.mesh.name!r}: {'; '.join(body.mesh.diagnosis.problems)}: close it, or declare it a sheet "
+        "(sheet_thickness=..., --method thin-layer)"
+    )
+
+
 def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
     if _media_differ(scene):
         raise InputError("BackFaceDepth", "bodies with different media", "use SignedDepth, which tells them apart")
+    if sheets := [body.mesh.name for body in scene.objects if body.sheet_thickness is not None]:
+        raise InputError(
+            "BackFaceDepth", f"{', '.join(map(repr, sheets))} declared a sheet", "use SignedDepth or ThinLayer"
+        )
     everything = tuple(range(len(scene.objects)))
     passes = [PassSpec("back_face_depth", "asked for: nearest front face, then farthest back face", everything, 2)]
     limits = []
@@ -171,17 +190,10 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
 
 def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
     everything = tuple(range(len(scene.objects)))
-    return _finished(
-        scene,
-        method,
-        [
-            _sheet_pass(
-                everything, f"every face of {_count(everything, 'mesh', 'meshes')} is a sheet: their paths add up"
-            )
-        ],
-        [],
-        _media_differ(scene),
-    )
+    solid = [body.mesh.name for body in scene.objects if body.sheet_thickness is None and body.mesh.diagnosis.solid]
+    limits = [f"{', '.join(map(repr, solid))} closed, but drawn as sheets: what is inside is left out"] if solid else []
+    reason = f"every face of {_count(everything, 'mesh', 'meshes')} is a sheet: their paths add up"
+    return _finished(scene, method, [_sheet_pass(everything, reason)], limits, _media_differ(scene))
 
 
 def _sheet_pass(objects: tuple[int, ...], reason: str) -> PassSpec:
@@ -196,6 +208,9 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     else:
         reason = "Beer-Lambert: the background through exp(-optical depth)"
     passes.append(PassSpec("transmittance", reason))
+    for body in scene.bodies:
+        if found := body.mesh.diagnosis.duplicate_faces:
+            limits.append(f"{body.mesh.name!r}: {found.count} duplicated faces, which count twice or cancel")
     if scene.overlap != "add" and any(not body.mesh.diagnosis.convex for body in scene.bodies):
         limits.append(f'overlap="{scene.overlap}": where a mesh overlaps itself, its medium counts twice')
     unmodelled = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, get_args
@@ -46,6 +46,9 @@ class Object:
     sheet_thickness: float | None = None
 
     def __post_init__(self) -> None:
+        _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
+        if self.medium is not None:
+            _require_type("medium of an object", self.medium, Medium, "use tl.Medium")
         self.mesh.require_finite()
         matrix = np.eye(4) if self.transform is None else np.array(self.transform, dtype=np.float64)
         where = f"transform of {self.mesh.name!r}"
@@ -65,6 +68,9 @@ class Object:
                 "not above 0",
                 "give metres, for example 1e-3",
             )
+
+    def __repr__(self) -> str:
+        return f"Object({self.mesh!r}, {self.medium!r})"
 
     @property
     def matrix(self) -> Array:
@@ -121,14 +127,23 @@ class Scene:
     overlap: Overlap = "add"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "objects", tuple(self.objects))
-        object.__setattr__(self, "lights", tuple(self.lights))
+        for field_name, kinds in (("objects", Object), ("lights", (PointLight, DirectionalLight))):
+            given = getattr(self, field_name)
+            items = tuple(given) if isinstance(given, Iterable) else (given,)
+            for item in items:
+                _require_type(f"{field_name} of a scene", item, kinds, "give a list of them")
+            object.__setattr__(self, field_name, items)
+        _require_type("camera of a scene", self.camera, Camera, "use tl.Camera.look_at")
+        _require_type("environment of a scene", self.environment, Environment, "use tl.Environment.constant")
         if not self.objects:
             raise InputError("scene", "it has no objects", "add a tl.Object")
         if self.overlap not in get_args(Overlap):
             raise InputError(
                 f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
             )
+
+    def __repr__(self) -> str:
+        return f"Scene of {len(self.objects)} objects, {len(self.lights)} lights, {self.environment.kind} environment"
 
     @property
     def bodies(self) -> tuple[Object, ...]:
@@ -145,3 +160,8 @@ class Scene:
     def diagonal(self) -> float:
         """Length of the diagonal of the bounds in metres."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def _require_type(what: str, value: object, kinds: type | tuple[type, ...], do: str) -> None:
+    if not isinstance(value, kinds):
+        raise InputError(f"{what} {value!r}", f"of type {type(value).__name__}", do)

@@ -84,7 +84,7 @@ class _Intervals(Solid):
         return np.asarray(np.maximum(ends[..., 1] - ends[..., 0], 0.0).sum(axis=-1))
 
     def _middle(self) -> Array:
-        """(3,): centre of the solid."""
+        """(3,): center of the solid."""
         return np.zeros(3)
 
     @abstractmethod

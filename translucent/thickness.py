@@ -13,7 +13,7 @@ from translucent.errors import InputError
 class SignedDepth:
     """One unsorted pass: the sum of exit distances minus the sum of entry distances. Exact for closed meshes.
 
-    Baker & Boyd 2001 without a sort, in float32 and anchored: distances count from the body's own centre, so that
+    Baker & Boyd 2001 without a sort, in float32 and anchored: distances count from the body's own center, so that
     precision does not depend on how far away the body is.
 
     Parameters

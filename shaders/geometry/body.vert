@@ -8,7 +8,7 @@ in vec3 normal;
 out vec3 world_normal;
 #endif
 
-// Meters along the camera's forward axis, from the body's anchor. All points of one pixel lie on one ray, so the ray's
+// Metres along the camera's forward axis, from the body's anchor. All points of one pixel lie on one ray, so the ray's
 // length is this, times a factor of the pixel: one interpolated number carries the whole distance.
 out float axial;
 

@@ -6,7 +6,7 @@
 
 // (1 - exp(-x)) / x. Near 0 the difference cancels, so a Taylor series takes over: its first omitted term,
 // x^9 / 10!, is below float32 rounding up to the switch at 0.5.
-vec3 mean_opacity_slope(vec3 optical_depth) {
+vec3 mean_transmittance(vec3 optical_depth) {
     vec3 x = min(optical_depth, vec3(MAX_OPTICAL_DEPTH));
     vec3 series = vec3(1.0) - x / 9.0;
     for (int k = 8; k >= 2; --k) {
@@ -21,13 +21,13 @@ vec3 mean_opacity_slope(vec3 optical_depth) {
 // alpha = 1 - exp(-tau), without cancellation at small tau.
 vec3 opacity(vec3 optical_depth) {
     vec3 x = min(optical_depth, vec3(MAX_OPTICAL_DEPTH));
-    return mix(vec3(1.0) - exp(-x), x * mean_opacity_slope(x), lessThan(x, vec3(SERIES_LIMIT)));
+    return mix(vec3(1.0) - exp(-x), x * mean_transmittance(x), lessThan(x, vec3(SERIES_LIMIT)));
 }
 
 // T = exp(-tau); 0 from tau = 104 on in float32. Near 1 drivers' exp is off by a rounding, 1 - opacity is not.
 vec3 transmittance(vec3 optical_depth) {
     vec3 x = min(optical_depth, vec3(MAX_OPTICAL_DEPTH));
-    return mix(exp(-x), vec3(1.0) - x * mean_opacity_slope(x), lessThan(x, vec3(SERIES_LIMIT)));
+    return mix(exp(-x), vec3(1.0) - x * mean_transmittance(x), lessThan(x, vec3(SERIES_LIMIT)));
 }
 
 // log(1 - x). Drivers' log has an absolute error, useless near 1; there it is 2 artanh(-x / (2 - x)) as a series whose
@@ -51,7 +51,7 @@ vec3 extinction_from_color(vec3 color, float distance_m) {
 
 // q / sigma_t (1 - exp(-sigma_t d)), and q d where sigma_t = 0.
 vec3 emitted_radiance(vec3 emission, vec3 extinction, float distance_m) {
-    return emission * distance_m * mean_opacity_slope(extinction * distance_m);
+    return emission * distance_m * mean_transmittance(extinction * distance_m);
 }
 
 // Opacity of a step that is step_ratio times as long: 1 - (1 - alpha)^ratio.
@@ -69,15 +69,15 @@ vec3 composite_over(vec3 front, float front_opacity, vec3 behind) {
 // Unpolarised reflectance of a smooth dielectric; ior is relative to the side that the ray comes from.
 // Multiplied out, each amplitude holds n^2 - 1 as a factor, so that nothing cancels where ior is near 1.
 float fresnel_dielectric(float cos_incident, float ior) {
-    float contrast = (ior - 1.0) * (ior + 1.0);
-    float k = contrast + cos_incident * cos_incident;
-    if (contrast == 0.0) { return 0.0; }
+    float ior_squared_minus_1 = (ior - 1.0) * (ior + 1.0);
+    float k = ior_squared_minus_1 + cos_incident * cos_incident;
+    if (ior_squared_minus_1 == 0.0) { return 0.0; }
     if (k <= 0.0) { return 1.0; }  // total internal reflection
     float root = sqrt(k);
     float parallel_sum = ior * ior * cos_incident + root;
     float normal_sum = cos_incident + root;
-    float parallel = contrast * (cos_incident * cos_incident * (ior * ior + 1.0) - 1.0) / (parallel_sum * parallel_sum);
-    float normal = contrast / (normal_sum * normal_sum);
+    float parallel = ior_squared_minus_1 * (cos_incident * cos_incident * (ior * ior + 1.0) - 1.0) / (parallel_sum * parallel_sum);
+    float normal = ior_squared_minus_1 / (normal_sum * normal_sum);
     return 0.5 * (parallel * parallel + normal * normal);
 }
 

@@ -32,7 +32,7 @@ struct Path {
     float count;
 };
 
-// advance: meters along the ray per meter along the camera's forward axis.
+// advance: metres along the ray per metre along the camera's forward axis.
 #if SPECTRAL
 Path read_path(sampler2D depths, sampler2D lengths, ivec2 texel, float advance) {
     vec4 sum = texelFetch(depths, texel, 0);
@@ -69,7 +69,7 @@ void main() {
     bool balanced = path.count >= expected_count.x && path.count <= expected_count.y;
     // NaN fails every comparison, so this refuses it, too.
     bool valid = balanced && path.thickness >= -negative_tolerance && path.thickness < NOTHING;
-    bool covered = path.thickness > 0.0 || !valid;
+    bool covered = path.thickness > coverage_floor || !valid;
     if (!valid) {
 #if FALLBACK
 #if SPECTRAL

@@ -6,7 +6,7 @@
 in float axial;
 
 #if SPECTRAL
-layout(location = 0) out vec4 optical_depth_and_count;  // per meter of ray advance
+layout(location = 0) out vec4 optical_depth_and_count;  // per metre of ray advance
 layout(location = 1) out float path;
 #else
 layout(location = 0) out vec2 path_and_count;
@@ -14,10 +14,11 @@ layout(location = 0) out vec2 path_and_count;
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
+    float signed_path = side * max(axial, axial_start);
 #if SPECTRAL
-    optical_depth_and_count = vec4(side * axial * extinction.rgb, side);
-    path = side * axial;
+    optical_depth_and_count = vec4(signed_path * extinction.rgb, side * count_weight);
+    path = signed_path;
 #else
-    path_and_count = vec2(side * axial, side);
+    path_and_count = vec2(signed_path, side * count_weight);
 #endif
 }

@@ -32,6 +32,7 @@ def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     monkeypatch.chdir(tmp_path)
     trimesh.creation.icosphere(subdivisions=2).export("model.glb")
+    trimesh.creation.icosphere(subdivisions=2).export("model.stl")
     assert main(shlex.split(command)) == 0
 
 

@@ -67,7 +67,7 @@ def _backdrop_arguments() -> list[np.ndarray]:
 ARGUMENTS = {
     "transmittance": [_triples(DEPTHS)],
     "opacity": [_triples(DEPTHS)],
-    "mean_opacity_slope": [_triples(DEPTHS)],
+    "mean_transmittance": [_triples(DEPTHS)],
     "extinction_from_color": _color_arguments(),
     "log_one_minus": [UNIT[UNIT < 0.999].astype(np.float32)],
     "emitted_radiance": _emission_arguments(),

@@ -8,10 +8,12 @@ import resource
 import sys
 from collections.abc import Callable
 
+import moderngl
 import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.gpu.targets import Targets
 from translucent.solids import Box, Sphere
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Program", "Query")
@@ -95,6 +97,12 @@ def test_two_renderers_do_not_disturb_each_other() -> None:
     np.testing.assert_array_equal(first.thickness, again.thickness)
 
 
+def test_provenance_before_the_first_frame_spoils_nothing() -> None:
+    with tl.Renderer() as renderer:
+        assert renderer.provenance["renderer"]
+        renderer.render(_scene(Box().tessellate()), (8, 8))
+
+
 def test_contexts_nest() -> None:
     scene = _scene(Sphere().tessellate(24))
     with tl.Renderer() as one, tl.Renderer() as other:
@@ -124,7 +132,19 @@ def test_unknown_backend_and_size_are_refused(renderer: tl.Renderer) -> None:
     for size in ((0, 10), (10, -1), (10.5, 10), "ab", (10,)):
         with pytest.raises(tl.InputError, match="frame size"):
             renderer.render(scene, size)  # type: ignore[arg-type]
-    with pytest.raises(tl.InputError, match="samples 0"):
+    with pytest.raises(tl.InputError, match="samples 0; not a whole number"):
         renderer.render(scene, (8, 8), samples=0)
     with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL ends at \d+"):
         renderer.render(scene, (1_000_000, 2))
+
+
+def test_a_frame_that_opengl_has_no_room_for_is_one_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise moderngl.Error("the framebuffer is not complete")
+
+    monkeypatch.setattr(Targets, "_make", full)
+    with tl.Renderer() as renderer:
+        with pytest.raises(tl.RenderError, match=r"frame size 4000x4000; OpenGL has no room for 128 MB of it"):
+            renderer.render(_scene(Box().tessellate()), (4000, 4000))
+        monkeypatch.undo()
+        assert renderer.render(_scene(Box().tessellate()), (8, 8)).valid.all()

@@ -171,6 +171,51 @@ def test_a_hole_marks_its_pixels_and_only_those(renderer: tl.Renderer, defect: d
     assert (frame.thickness[~frame.valid & frame.coverage] > 0).any()
 
 
+def _open_box(missing: slice, shift: float) -> tl.Object:
+    mesh = Box(low=(-0.5, -0.5, -0.5 + shift), high=(0.5, 0.5, 0.5 + shift)).tessellate()
+    normals = np.cross(*(mesh.vertices[mesh.faces[:, k]] - mesh.vertices[mesh.faces[:, 0]] for k in (1, 2)))
+    side = 1.0 if missing.start is None else -1.0
+    faces = mesh.faces[normals[:, 2] * side <= 0]
+    return tl.Object(tl.Mesh(mesh.vertices, faces, name="open box"), medium=tl.Medium(absorption=1.0))
+
+
+FRONT_MISSING, BACK_MISSING = slice(None), slice(1)
+
+
+def test_holes_of_two_bodies_do_not_cancel(renderer: tl.Renderer) -> None:
+    """One box without its front, one without its back: together the ray enters as often as it leaves."""
+    scene = tl.Scene(
+        [_open_box(FRONT_MISSING, 0.0), _open_box(BACK_MISSING, -2.0)],
+        tl.Camera.look_at((0, 0, 4), (0, 0, 0), fov_y=10),
+    )
+    with pytest.warns(tl.TranslucentWarning, match="not valid"):
+        frame = renderer.render(scene, (16, 16))
+    assert not frame.valid[8, 8]
+    assert not tl.reference.render(scene, (16, 16)).valid[8, 8]
+
+
+@pytest.mark.parametrize("missing", [FRONT_MISSING, BACK_MISSING])
+@pytest.mark.parametrize("plane", [3.0, 0.2])
+def test_orthographic_holes_are_found_wherever_the_plane_is(
+    renderer: tl.Renderer, missing: slice, plane: float
+) -> None:
+    camera = tl.Camera.orthographic((0.01, 0.02, plane), (0.01, 0.02, -9.0), height=0.5)
+    with pytest.warns(tl.TranslucentWarning, match="not valid"):
+        frame = renderer.render(tl.Scene([_open_box(missing, 0.0)], camera), (16, 16))
+    assert not frame.valid.any()
+
+
+def test_an_open_body_does_not_erase_a_closed_one(renderer: tl.Renderer) -> None:
+    closed = tl.Object(
+        Box(low=(-0.5, -0.5, -3.5), high=(0.5, 0.5, -2.5)).tessellate(), medium=tl.Medium(absorption=1.0)
+    )
+    scene = tl.Scene([_open_box(FRONT_MISSING, 0.0), closed], tl.Camera.look_at((0, 0, 4), (0, 0, 0), fov_y=5))
+    with pytest.warns(tl.TranslucentWarning, match="not valid"):
+        frame = renderer.render(scene, (8, 8))
+    assert not frame.valid[4, 4]
+    assert 1.0 < frame.thickness[4, 4] < 1.1
+
+
 def test_an_inverted_mesh_is_as_thick_as_its_right_way_copy(renderer: tl.Renderer) -> None:
     mesh = Sphere().tessellate(32)
     inverted = tl.Mesh(mesh.vertices, mesh.faces[:, ::-1])

@@ -148,8 +148,8 @@ def test_two_emitting_intervals_are_one(sigma: float, a: float, b: float) -> Non
 
 
 @pytest.mark.parametrize("tau", [0.0, 5e-324, 1e-310, 1e-16])
-def test_mean_opacity_slope_tends_to_one(tau: float) -> None:
-    assert optics.mean_opacity_slope(tau) == 1.0
+def test_mean_transmittance_tends_to_one(tau: float) -> None:
+    assert optics.mean_transmittance(tau) == 1.0
 
 
 # Compositing

@@ -52,7 +52,7 @@ def names(found: RenderPlan) -> list[str]:
         ([body(sheet_thickness=1e-3)], None, ["thin_layer"], False, 1),
         ([body(sheet_thickness=1e-3), body(WINE, sheet_thickness=1e-3)], None, ["thin_layer"], True, 1),
         ([body(), body(sheet_thickness=1e-3)], None, ["signed_depth", "thin_layer"], False, 2),
-        ([body()], tl.ThinLayer(0.01), ["thin_layer"], False, 1),
+        ([body(mesh=OPEN)], tl.ThinLayer(0.01), ["thin_layer"], False, 1),
         ([body()], tl.BackFaceDepth(), ["back_face_depth"], False, 2),
     ],
 )
@@ -108,9 +108,10 @@ def test_thin_sheets_are_exact_by_definition_of_the_model() -> None:
 
 def test_an_open_solid_gets_a_marked_fallback() -> None:
     found = plan(scene(body(), body(mesh=OPEN, x=3)))
-    assert names(found) == ["signed_depth", "thin_layer_fallback", "transmittance"]
-    assert found.passes[0].objects == (0, 1)
-    assert found.passes[1].objects == (1,)
+    assert names(found) == ["signed_depth", "thin_layer_fallback", "signed_depth_fallback", "transmittance"]
+    assert [step.objects for step in found.passes] == [(0, 1), (1,), (0,), ()]
+    assert [step.target for step in found.passes] == ["accumulated", "fallback", "fallback", "accumulated"]
+    assert "close it, or declare it a sheet" in found.limits[0]
     assert "'open box' not closed" in found.passes[1].reason
     assert "marked invalid" in found.passes[1].reason
 
@@ -226,3 +227,28 @@ assert not found, found
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_closed_body_drawn_as_sheets_is_a_limit() -> None:
+    found = plan(scene(body()), tl.ThinLayer())
+    assert not found.exact
+    assert "closed, but drawn as sheets" in found.limits[0]
+
+
+def test_back_face_depth_refuses_sheets() -> None:
+    with pytest.raises(tl.InputError, match="declared a sheet; use SignedDepth or ThinLayer"):
+        plan(scene(body(sheet_thickness=1e-3)), tl.BackFaceDepth())
+
+
+@pytest.mark.parametrize("method", ["signed-depth", tl.ThinLayer, 3])
+def test_what_is_no_method_is_refused(method: object) -> None:
+    with pytest.raises(tl.InputError, match="not a thickness method; give for example"):
+        plan(scene(body()), method)  # type: ignore[arg-type]
+
+
+def test_duplicated_faces_are_a_limit() -> None:
+    cube = body().mesh
+    doubled = tl.Mesh(cube.vertices, [*cube.faces.tolist(), *cube.faces[:, ::-1].tolist()], name="walls")
+    found = plan(scene(body(mesh=doubled)))
+    assert not found.exact
+    assert "'walls': 12 duplicated faces" in found.limits[0]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from translucent.lights import Environment
     from translucent.medium import Medium
     from translucent.mesh import Mesh
+    from translucent.scene import Scene
     from translucent.thickness import Method
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -32,14 +33,16 @@ def medium_options(command: F) -> F:
     command = click.option("--distance", metavar="D", help="Distance at which light has the color: 2cm, 0.8in.")(
         command
     )
-    return click.option("--color", metavar="C", help="Transmitted color: '#7b1e3a', teal, 'linear(.18,.62,.35)'.")(
+    return click.option("--color", metavar="C", help="Transmitted color: '#7b1e3a', salmon, 'linear(.18,.62,.35)'.")(
         command
     )
 
 
 def unit_option(command: F) -> F:
     """Option for the unit of a file."""
-    return click.option("--unit", default="m", show_default=True, help="Unit of the file's coordinates.")(command)
+    return click.option(
+        "--unit", default="m", show_default=True, metavar="U", help="Unit of the file's coordinates: mm, cm, in, ..."
+    )(command)
 
 
 def read_mesh(model: str, unit: str) -> Mesh:
@@ -48,6 +51,8 @@ def read_mesh(model: str, unit: str) -> Mesh:
     from translucent.mesh import load_mesh
 
     if model in mesh_names() and not Path(model).exists():
+        if unit != "m":
+            raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
         return load_mesh(mesh_path(model))
     return load_mesh(model, unit=unit)
 
@@ -137,3 +142,14 @@ def read_size(text: str) -> tuple[int, int]:
 def triple_text(values: Any) -> str:
     """Three numbers, aligned."""
     return " ".join(f"{value:10.5g}" for value in values)
+
+
+def medium_text(scene: Scene) -> str:
+    """What the only body of a scene is filled with, and how light fares in it."""
+    from translucent.color import to_hex
+
+    body = scene.bodies[0]
+    reach = 0.1 * body.mesh.diagonal
+    seen = to_hex(body.medium.transmittance(reach)) if body.medium is not None else ""
+    sigma = body.medium.extinction if body.medium is not None else ()
+    return f"extinction {', '.join(f'{value:.4g}' for value in sigma)} 1/m: white light is {seen} after {reach:.3g} m"

@@ -10,6 +10,7 @@ import click
 from translucent.commands.common import (
     common_options,
     medium_options,
+    medium_text,
     read_camera,
     read_environment,
     read_medium,
@@ -71,8 +72,9 @@ def render(
         frame = renderer.render(scene, pixels, method, samples)
     frame.save(output)
     if as_json:
-        click.echo(json.dumps({"output": str(output), **frame.summary()}))
+        click.echo(json.dumps({"output": str(output), "medium": medium_text(scene), **frame.summary()}))
         return
     click.echo(f"{output}: {pixels[0]}x{pixels[1]}, {frame.provenance['backend']}, {frame.provenance['renderer']}")
+    click.echo(f"medium: {medium_text(scene)}")
     click.echo(str(frame.plan))
     click.echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in frame.seconds.items()))

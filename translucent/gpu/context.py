@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -60,12 +60,15 @@ class GpuContext:
     gl : moderngl.Context
     backend : str
         ``egl``, ``window``, ``osmesa`` or ``adopted``.
+    info : dict
+        What the driver says of itself; moderngl reads it once and for all, so it is read while the context is current.
     attempts : tuple of Attempt
         What was tried before, ending with this one.
     """
 
     gl: moderngl.Context
     backend: str
+    info: Mapping[str, Any]
     attempts: tuple[Attempt, ...] = ()
 
     @property
@@ -76,7 +79,7 @@ class GpuContext:
     @property
     def renderer(self) -> str:
         """Name of the driver's device; a software rasteriser is named as such."""
-        name = str(self.gl.info["GL_RENDERER"])
+        name = str(self.info["GL_RENDERER"])
         software = any(word in name.lower() for word in ("llvmpipe", "softpipe", "swrast"))
         return f"{name} (software rasteriser)" if software else name
 
@@ -86,7 +89,7 @@ class GpuContext:
         return {
             "backend": self.backend,
             "renderer": self.renderer,
-            "driver": str(self.gl.info["GL_VERSION"]),
+            "driver": str(self.info["GL_VERSION"]),
             "moderngl": version("moderngl"),
         }
 
@@ -145,7 +148,7 @@ def open_context(backend: str | None = None) -> GpuContext:
             continue
         attempts.append(Attempt(name, None))
         gl.gc_mode = "context_gc"
-        return GpuContext(gl, name, tuple(attempts))
+        return GpuContext(gl, name, gl.info, tuple(attempts))
     raise NoContextError(tuple(attempts))
 
 
@@ -156,7 +159,7 @@ def adopt_context(gl: moderngl.Context) -> GpuContext:
     """
     if gl.gc_mode is None:
         gl.gc_mode = "context_gc"
-    return GpuContext(gl, "adopted")
+    return GpuContext(gl, "adopted", gl.info)
 
 
 def _open_egl() -> moderngl.Context:

@@ -19,6 +19,13 @@ from translucent.thickness import SignedDepth, ThinLayer
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
 
+#: A path of less than this share of the diagonal is the rounding of a sum that should be 0.
+_COVERAGE_FLOOR = 2e-7
+
+#: Counts of open bodies must not cancel: the first gets 16 times the weight of closed ones, the next 16 times that, and
+#: so on, as far as float32 counts exactly. Beyond, they share the last weight.
+_OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
+
 #: Share of the diagonal that a path may be below 0; it then counts as 0.
 _NEGATIVE_TOLERANCE = 1e-2
 
@@ -42,6 +49,7 @@ class FrameJob:
         self.samples = 1
         self.started = time.perf_counter()
         self._placements = [Placement.of(body, scene.camera) for body in scene.objects]
+        self._count_weights = _count_weights(scene)
         self._stride = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
         self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
         self._bodies = gl.buffer(reserve=self._stride * len(scene.objects))
@@ -62,6 +70,7 @@ class FrameJob:
                 shift,
                 anchored=anchored,
                 sheet_thickness=self._sheet_thickness(placement.body),
+                count_weight=self._count_weights[i],
                 max_extinction=limit,
                 depth_range=depths,
             )
@@ -104,7 +113,11 @@ class FrameJob:
         """Least and greatest sum of signed counts of a pixel that can be trusted."""
         if isinstance(self.plan.method, ThinLayer):
             return 0.0, 0.0
-        low, high = zip(*(placement.expected_count for placement in self._placements), strict=True)
+        pairs = [
+            (weight * placement.expected_count[0], weight * placement.expected_count[1])
+            for weight, placement in zip(self._count_weights, self._placements, strict=True)
+        ]
+        low, high = zip(*pairs, strict=True)
         return sum(low), sum(high)
 
     def _negative_tolerance(self) -> float:
@@ -132,6 +145,18 @@ class FrameJob:
             environment_second=[*environment.second, 0.0],
             expected_count=self._expected_counts(),
             negative_tolerance=self._negative_tolerance(),
+            coverage_floor=_COVERAGE_FLOOR * self.scene.diagonal,
             environment_tiles=environment.tiles,
             environment_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
         )
+
+
+def _count_weights(scene: Scene) -> list[float]:
+    """What a face of each object adds to a pixel's count."""
+    weights = []
+    used = 0
+    for body in scene.objects:
+        is_open = not body.mesh.diagnosis.solid
+        weights.append(_OPEN_WEIGHTS[min(used, len(_OPEN_WEIGHTS) - 1)] if is_open else 1.0)
+        used += is_open
+    return weights

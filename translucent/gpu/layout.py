@@ -96,6 +96,8 @@ BODY = UniformBlock(
         ("extinction", "f4", (4,)),
         ("sheet_thickness", "f4", ()),
         ("sheet_ior", "f4", ()),
+        ("axial_start", "f4", ()),  # rays start here: what is behind counts as if it were at the start
+        ("count_weight", "f4", ()),  # what one face adds to the count
     ),
 )
 
@@ -110,6 +112,7 @@ SHADE = UniformBlock(
         ("environment_second", "f4", (4,)),
         ("expected_count", "f4", (2,)),  # least and greatest signed count of a trustworthy pixel
         ("negative_tolerance", "f4", ()),
+        ("coverage_floor", "f4", ()),  # a path not longer than this is rounding
         ("environment_tiles", "f4", ()),
         ("environment_kind", "i4", ()),
     ),

@@ -9,16 +9,13 @@ import numpy.typing as npt
 
 from translucent.camera import Camera
 from translucent.gpu.layout import BODY, VIEW
+from translucent.gpu.shaders import CONSTANTS
 from translucent.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 
 #: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
 MAX_SCENE_OPTICAL_DEPTH = 1e30
-
-#: Least and greatest signed count where a body is cut by the image plane of an orthographic camera: each pixel starts
-#: its own ray there, inside or outside, so any count that is not negative may be right.
-_CUT_COUNT = (0.0, 1e3)
 
 #: With the eye on a surface, what is nearer than this share of the diagonal is clipped.
 _NEAR_ON_SURFACE = 1e-6
@@ -69,6 +66,7 @@ class Placement:
         *,
         anchored: bool,
         sheet_thickness: float,
+        count_weight: float,
         max_extinction: float,
         depth_range: tuple[float, float] | None = None,
     ) -> bytes:
@@ -83,6 +81,8 @@ class Placement:
             Count distances from the body's center, not from the camera.
         sheet_thickness : float
             In metres, for passes that draw the body as a sheet.
+        count_weight : float
+            What one face adds to the count.
         max_extinction : float
             In 1/m.
         depth_range : (near, far), optional
@@ -118,6 +118,8 @@ class Placement:
             extinction=[*extinction, 0.0],
             sheet_thickness=sheet_thickness,
             sheet_ior=1.0 if medium is None else medium.ior,
+            axial_start=0.0 if camera.fov_y is None and self.cut else -float(CONSTANTS["NOTHING"]),
+            count_weight=count_weight,
         )
 
     def _depth_row(
@@ -128,10 +130,6 @@ class Placement:
             if camera.fov_y is None:
                 return np.asarray((2.0 * axial_row - (near + far) * w_row) / (far - near))
             return np.asarray(w_row * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near))
-        if camera.fov_y is None and self.cut:
-            # -1 on the image plane, growing ahead of it and never reaching 1: clips what is behind.
-            reach = float(np.abs(axial_row[3]) + np.linalg.norm(axial_row[:3]) * self.body.mesh.diagonal)
-            return np.asarray(axial_row / reach - w_row)
         if self.on_surface:
             # Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
             return np.array([0.0, 0.0, 0.0, -_NEAR_ON_SURFACE * self.body.mesh.diagonal])
@@ -140,10 +138,9 @@ class Placement:
 
 def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:
     """Signed counts that are right for a body whose bounds the eye, or the image plane, is in."""
-    if body.sheet_thickness is not None:
+    if body.sheet_thickness is not None or camera.fov_y is None:
+        # An orthographic ray is a whole line: it leaves a body as often as it enters, some of it behind the picture.
         return 0.0, 0.0
-    if camera.fov_y is None:
-        return _CUT_COUNT
     number = body.winding_number(camera.eye)
     if body.mesh.diagnosis.solid and abs(number - round(number)) > 1e-6:
         # Only on its surface does the winding number of a solid have a fraction.

@@ -111,8 +111,8 @@ class Renderer:
         RenderError
             If the frame is larger than this OpenGL allows.
         """
-        if samples < 1:
-            raise InputError(f"samples {samples}", "below 1", "give for example 16")
+        if not isinstance(samples, int) or samples < 1:
+            raise InputError(f"samples {samples!r}", "not a whole number above 0", "give for example 16")
         self._require_open()
         with self._gpu.current():
             job = self.prepare(scene, size, method)

@@ -183,3 +183,13 @@ def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
     except KeyError:
         known = ", ".join(sorted(program))
         raise RenderError(f"uniform {name!r}", f"the program has only {known}", "check the spelling") from None
+
+
+if __name__ == "__main__":
+    # A shader file as one text, constants and includes written out: for use in another engine.
+    import sys
+
+    if len(sys.argv) < 2:
+        sys.exit("usage: python -m translucent.gpu.shaders lib/optics.glsl [SWITCH=0 ...]")
+    switches = dict(argument.split("=") for argument in sys.argv[2:])
+    print(preprocess(sys.argv[1], {name: int(value) for name, value in switches.items()}).text)

@@ -51,13 +51,24 @@ class Targets:
 
     def _get(self, name: str, components: tuple[int, ...]) -> moderngl.Framebuffer:
         if name not in self._framebuffers:
-            attachments = [
-                self._gl.texture(self.size, abs(count), dtype="f4" if count > 0 else "f1") for count in components
-            ]
-            for texture in attachments:
-                texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self._framebuffers[name] = self._gl.framebuffer(attachments)
+            try:
+                self._framebuffers[name] = self._make(components)
+            except moderngl.Error as error:
+                megabytes = sum(4 * abs(count) for count in components) * self.size[0] * self.size[1] / 1e6
+                raise RenderError(
+                    f"frame size {self.size[0]}x{self.size[1]}",
+                    f"OpenGL has no room for {megabytes:.0f} MB of it ({error})",
+                    "render in parts, or smaller",
+                ) from error
         return self._framebuffers[name]
+
+    def _make(self, components: tuple[int, ...]) -> moderngl.Framebuffer:
+        attachments = [
+            self._gl.texture(self.size, abs(count), dtype="f4" if count > 0 else "f1") for count in components
+        ]
+        for texture in attachments:
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return self._gl.framebuffer(attachments)
 
     def release(self) -> None:
         """Free all textures and framebuffers."""

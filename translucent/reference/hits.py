@@ -91,7 +91,7 @@ def line_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[int
 
 @dataclass(frozen=True)
 class _Grid:
-    """Pixel centres in the picture's plane: at distance 1 for a perspective camera, in metres for the other."""
+    """Pixel centers in the picture's plane: at distance 1 for a perspective camera, in metres for the other."""
 
     center: Array
     scale: Array

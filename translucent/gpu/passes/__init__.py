@@ -25,6 +25,7 @@ class Pass(Protocol):
 
 PASSES: dict[str, type[Pass]] = {
     "signed_depth": SignedDepthPass,
+    "signed_depth_fallback": SignedDepthPass,
     "thin_layer": ThinLayerPass,
     "thin_layer_fallback": ThinLayerPass,
     "back_face_depth": BackFaceDepthPass,

@@ -23,7 +23,7 @@ class SignedDepthPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies."""
         gl = job.gl
-        job.accumulator().use()
+        job.accumulator(spec.target).use()
         # No depth test and no culling: every face counts. Order cannot matter to a sum.
         gl.enable_only(moderngl.BLEND)
         gl.blend_equation = moderngl.FUNC_ADD

@@ -26,7 +26,7 @@ class ThinLayerPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the sheets."""
         gl = job.gl
-        job.accumulator("fallback" if spec.name == "thin_layer_fallback" else "accumulated").use()
+        job.accumulator(spec.target).use()
         gl.enable_only(moderngl.BLEND)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE

@@ -21,7 +21,7 @@ class TransmittancePass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Resolve the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl = job.gl
-        fallback = any(step.name == "thin_layer_fallback" for step in job.plan.passes)
+        fallback = any(step.target == "fallback" for step in job.plan.passes)
         emission = any(body.medium is not None and body.medium.emits for body in job.scene.bodies)
         inputs = [job.accumulator()] + ([job.accumulator("fallback")] if fallback else [])
         if job.samples > 1:
