@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 import warnings
 
 import click
@@ -10,6 +12,7 @@ import click
 from translucent.commands.doctor import doctor
 from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
+from translucent.commands.presets import presets
 from translucent.commands.render import render
 from translucent.errors import InputError, TranslucentError
 
@@ -17,6 +20,9 @@ from translucent.errors import InputError, TranslucentError
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed at run time, 2 bad usage or input."""
     given = sys.argv[1:] if arguments is None else arguments
+    if threading.current_thread() is threading.main_thread():
+        # Asked to end, unwind as for Ctrl-C, so that no half-written file stays behind.
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     warnings.showwarning = lambda message, *_, **__: click.echo(f"warning: {message}", err=True)
     try:
         cli.main(args=given, prog_name="translucent", standalone_mode=False)
@@ -50,7 +56,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, explain, extinction, doctor):
+for command in (render, explain, extinction, presets, doctor):
     cli.add_command(command)
 
 

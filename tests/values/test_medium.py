@@ -1,12 +1,10 @@
-"""Media: their numbers, their refusals, and the presets against the published tables."""
+"""Media: their numbers and their refusals."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import math
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -169,67 +167,3 @@ def test_emits_and_scatters_look_at_every_channel() -> None:
     assert (Medium().emits, Medium().scatters) == (False, False)
     assert Medium(emission=(0, 0, 1e-9)).emits
     assert Medium(scattering=(0, 0, 1e-9)).scatters
-
-
-# Presets
-
-#: Rows of the published table that presets take their numbers from.
-ROWS = {
-    "marble": "Marble",
-    "skim_milk": "Skimmilk",
-    "skin1": "Skin1",
-    "ketchup": "Ketchup",
-    "merlot": "Merlot",
-    "chardonnay": "Chardonnay",
-    "beer": "Budweiser Beer",
-    "apple_juice": "Apple Juice",
-    "shampoo": "Shampoo",
-}
-
-
-@pytest.mark.parametrize("name", sorted(tl.presets()))
-def test_a_preset_loads_with_its_source(name: str) -> None:
-    found = tl.preset(name)
-    assert found.name == name
-    assert found.kind in {"measured", "estimated"}
-    assert found.source
-    assert (found.medium.extinction > 0).all()
-    assert 1 < found.medium.ior < 2.5
-
-
-def test_every_measured_preset_is_held_against_the_table() -> None:
-    assert {name for name, found in tl.presets().items() if found.kind == "measured"} == set(ROWS)
-
-
-@pytest.mark.parametrize(("name", "row"), ROWS.items())
-def test_a_measured_preset_has_the_published_numbers(assets: Path, name: str, row: str) -> None:
-    with (assets / "measured_media.csv").open(encoding="utf-8") as stream:
-        table = {line["name"]: line for line in csv.DictReader(stream)}
-    medium, line = tl.preset(name).medium, table[row]
-    assert line["units"] == "mm^-1"
-    for found, column in ((medium.absorption, "sigma_a"), (medium.scattering, "sigma_s_prime")):
-        per_metre = [1e3 * float(line[f"{column}_{channel}"]) for channel in "rgb"]
-        assert np.asarray(found) == pytest.approx(per_metre, rel=1e-14, abs=0)
-    assert medium.ior == float(line["eta"])
-    # Reduced scattering coefficients go with an isotropic phase function.
-    assert medium.anisotropy == 0.0
-
-
-def test_a_millimetre_of_ketchup() -> None:
-    # Absorption 1.45 and scattering 0.03 per mm in blue.
-    assert tl.preset("ketchup").medium.transmittance(1e-3)[2] == pytest.approx(math.exp(-1.48), rel=1e-14)
-
-
-def test_an_estimated_preset_has_its_color_at_its_distance() -> None:
-    assert tl.preset("jade").medium.transmittance(0.02) == pytest.approx(JADE, rel=2e-15)
-
-
-@pytest.mark.parametrize("name", ["Skim Milk", "skim-milk", "SKIM_MILK"])
-def test_the_name_of_a_preset_can_be_written_so(name: str) -> None:
-    assert tl.preset(name) is tl.preset("skim_milk")
-
-
-@pytest.mark.parametrize("name", ["unobtainium", ""])
-def test_an_unknown_preset_names_the_known_ones(name: str) -> None:
-    with pytest.raises(tl.InputError, match=re.escape(f"preset {name!r}; not a known preset; use one of marble, skim")):
-        tl.preset(name)

@@ -66,7 +66,10 @@ def read_medium(color: str | None, distance: str | None, preset_name: str | None
     if preset_name is not None:
         if color is not None or distance is not None:
             raise InputError(f"--preset {preset_name}", "--color or --distance is given, too", "give one or the other")
-        return preset(preset_name).medium
+        chosen = preset(preset_name)
+        if chosen.warning:
+            click.echo(f"warning: {chosen.warning}", err=True)
+        return chosen.medium
     if (color is None) != (distance is None):
         given, missing = ("--color", "--distance") if distance is None else ("--distance", "--color")
         raise InputError(given, f"{missing} is missing", "give both: a color has a meaning only at a distance")

@@ -1,0 +1,218 @@
+"""``translucent presets``: the table, one medium in full, JSON, swatches on terminals only, unknown names."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.cli import cli, main
+from translucent.commands.presets import presets as command
+
+ESCAPE = "\x1b["
+
+
+@dataclass(frozen=True)
+class Result:
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Result]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
+    monkeypatch.setitem(cli.commands, "presets", command)
+
+    def _run(*arguments: str) -> Result:
+        code = main(["presets", *arguments])
+        captured = capsys.readouterr()
+        return Result(code, captured.out, captured.err)
+
+    return _run
+
+
+def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To be called by the test itself: the captured output of a fixture's time is another one."""
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+
+
+def strict_json(text: str) -> Any:
+    """One JSON object; NaN and infinities, which JSON does not have, fail."""
+
+    def refuse(word: str) -> None:
+        pytest.fail(f"{word} is no JSON")
+
+    value = json.loads(text, parse_constant=refuse)
+    assert isinstance(value, dict)
+    return value
+
+
+def rows(text: str) -> dict[str, str]:
+    """What ``show`` prints, by label."""
+    return dict(re.split(r" +", line, maxsplit=1) for line in text.splitlines())
+
+
+# The table
+
+
+def test_the_table_has_every_medium(run: Run) -> None:
+    result = run()
+    head, *lines = result.out.splitlines()
+    assert (result.code, result.err) == (0, "")
+    assert head.split() == ["name", "kind", "regime", *["1", "mm", "1", "cm", "10", "cm"], "source"]
+    assert [line.split()[0] for line in lines] == list(tl.presets())
+    for line, one in zip(lines, tl.presets().values(), strict=True):
+        cells = re.split(r" {2,}", line)
+        assert cells == [one.name, one.kind, one.regime, *one.colors().values(), one.source]
+    assert ESCAPE not in result.out
+
+
+def test_the_columns_line_up(run: Run) -> None:
+    head, *lines = run().out.splitlines()
+    for column, pattern in (("kind", "measured|estimated"), ("1 mm", "#"), ("source", "Jensen|Narasimhan|by eye")):
+        at = head.index(column)
+        assert all(re.match(pattern, line[at:]) for line in lines), column
+
+
+def test_the_table_as_json(run: Run) -> None:
+    result = run("--json")
+    listed = strict_json(result.out)["presets"]
+    assert [entry["name"] for entry in listed] == list(tl.presets())
+    assert {tuple(entry) for entry in listed} == {("name", "kind", "regime", "colors", "source")}
+    merlot = next(entry for entry in listed if entry["name"] == "merlot")
+    assert merlot["regime"] == "absorbing"
+    assert merlot["colors"] == tl.preset("merlot").colors()
+
+
+# One medium
+
+
+def test_a_measured_medium_in_full(run: Run) -> None:
+    result = run("show", "coke")
+    found = rows(result.out)
+    assert (result.code, result.err) == (0, "")
+    assert (found["name"], found["kind"], found["regime"]) == ("coke", "measured", "absorbing")
+    assert found["source"].endswith("Acquiring Scattering Properties of Participating Media by Dilution, SIGGRAPH 2006")
+    assert " ".join(found["absorption"].split()) == "0.10014 0.16503 0.2468 1/mm 100.14 165.03 246.8 1/m"
+    assert " ".join(found["scattering"].split()) == "0.00254 0.00299 0 1/mm 2.54 2.99 0 1/m"
+    assert found["anisotropy"].split()[:3] == ["0.965", "0.972", "0"]
+    assert found["ior"].strip() == "1.33"
+    assert "warning" not in found
+    assert re.search(r"mean free path +9\.739 +5\.9517 +4\.0519 mm", result.out)
+    assert re.search(r"after 1 cm +#a17852 +\(absorption alone #a37952\)", result.out)
+    assert ESCAPE not in result.out
+
+
+def test_a_medium_that_scatters_warns(run: Run) -> None:
+    out = run("show", "marble").out
+    assert re.search(r"^warning +scattering dominates.* 8\.51 mm, 5\.57 mm, 3\.95 mm \(red, green, blue\)$", out, re.M)
+    assert re.search(r"^scattering\* +2\.19 +2\.62 +3 1/mm", out, re.M)
+    assert "* reduced, sigma_s (1 - g)" in out
+
+
+def test_an_estimated_medium_shows_what_there_is(run: Run) -> None:
+    out = run("show", "jade").out
+    assert re.search(r"^source +by eye$", out, re.M)
+    assert re.search(r"^note +absorption only", out, re.M)
+    assert "scattering " not in out
+    assert "absorption alone" not in out
+
+
+def test_aliases_are_shown(run: Run) -> None:
+    assert rows(run("show", "Budweiser").out)["name"] == "beer, budweiser, budweiser_beer"
+
+
+@pytest.mark.parametrize("name", list(tl.presets()))
+def test_every_medium_can_be_shown(run: Run, name: str) -> None:
+    result = run("show", name)
+    assert (result.code, result.err) == (0, "")
+    assert "nan" not in result.out
+    found = strict_json(run("show", name, "--json").out)
+    one = tl.preset(name)
+    assert (found["name"], found["regime"], found["warning"]) == (name, one.regime, one.warning)
+    assert found["extinction"] == one.medium.extinction.tolist()
+    assert np.add(found["absorption"], found["scattering"]).tolist() == found["extinction"]
+    assert found["colors"] == one.colors()
+
+
+def test_json_has_no_infinities(run: Run) -> None:
+    assert strict_json(run("show", "spectralon", "--json").out)["diffusion_length"] == [None] * 3
+
+
+def test_json_may_be_asked_for_before_the_verb(run: Run) -> None:
+    assert run("--json", "show", "merlot").out == run("show", "merlot", "--json").out
+
+
+# Swatches
+
+
+def test_a_terminal_shows_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend_a_terminal(monkeypatch)
+    assert re.search(r"after 1 cm +\x1b\[48;2;161;120;82m  \x1b\[0m #a17852", run("show", "coke").out)
+    head, *lines = run().out.splitlines()
+    assert all(line.count(f"{ESCAPE}48;2;") == line.count("#") == 3 for line in lines)
+    plain = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in lines]
+    assert all(re.match("Jensen|Narasimhan|by eye", line[head.index("source") :]) for line in plain)
+
+
+@pytest.mark.parametrize(("variable", "value"), [("NO_COLOR", "1"), ("TERM", "dumb")])
+def test_a_terminal_without_colors_shows_none(
+    run: Run, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
+) -> None:
+    pretend_a_terminal(monkeypatch)
+    assert ESCAPE in run("show", "coke").out
+    monkeypatch.setenv(variable, value)
+    assert ESCAPE not in run("show", "coke").out + run().out
+
+
+def test_an_empty_no_color_asks_for_nothing(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend_a_terminal(monkeypatch)
+    monkeypatch.setenv("NO_COLOR", "")
+    assert ESCAPE in run("show", "coke").out
+
+
+def test_json_has_no_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend_a_terminal(monkeypatch)
+    assert ESCAPE not in run("--json").out + run("show", "coke", "--json").out
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["show", "honney"], "error: preset 'honney'; not a known preset; did you mean honey? 'translucent presets' "),
+        (["show", "unobtainium"], "error: preset 'unobtainium'; not a known preset; use one of marble"),
+        (["show"], "error: Missing argument 'NAME'"),
+        (["shw", "merlot"], "error: No such command 'shw'"),
+        (["--jsn"], "error: No such option"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_line(run: Run, arguments: list[str], message: str) -> None:
+    result = run(*arguments)
+    assert (result.code, result.out) == (2, "")
+    assert len(result.err.splitlines()) == 1
+    assert result.err.startswith(message)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["show", "--help"]])
+def test_help_has_an_example(run: Run, arguments: list[str]) -> None:
+    result = run(*arguments)
+    assert result.code == 0
+    assert "Example: translucent presets" in result.out
+    assert "--json" in result.out

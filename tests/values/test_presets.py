@@ -1,0 +1,397 @@
+"""Named media: against the published table, complete, refused where wrong, and honest about scattering."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.color import to_hex
+from translucent.presets import PAPERS, Preset, read_presets
+
+NAMES = sorted(tl.presets())
+MEASURED = [name for name in NAMES if tl.preset(name).kind == "measured"]
+ESTIMATED = [name for name in NAMES if tl.preset(name).kind == "estimated"]
+
+#: Names that were there from the start: other people's files use them.
+FIRST = [
+    *("marble", "skim_milk", "skin1", "ketchup", "merlot", "chardonnay", "beer", "apple_juice", "shampoo"),
+    *("jade", "amber", "honey", "gummy", "bottle_glass", "soap", "crystal"),
+]
+
+#: Linear colors and distances in m of estimated media, which are not to change.
+COLORS = {
+    "jade": ((0.18, 0.62, 0.35), 0.02),
+    "amber": ((0.90, 0.42, 0.05), 0.02),
+    "honey": ((0.80, 0.40, 0.04), 0.02),
+    "gummy": ((0.75, 0.05, 0.04), 0.01),
+    "bottle_glass": ((0.25, 0.55, 0.22), 0.01),
+    "soap": ((0.85, 0.55, 0.30), 0.02),
+    "crystal": ((0.93, 0.96, 0.95), 0.01),
+    "wax": ((0.86, 0.68, 0.42), 0.01),
+    "sea_water": ((0.22, 0.74, 0.89), 5.0),
+    "whisky": ((0.80, 0.45, 0.12), 0.03),
+}
+
+
+@pytest.fixture(scope="module")
+def table(assets: Path) -> list[dict[str, str]]:
+    with (assets / "measured_media.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def triple(row: dict[str, str], column: str) -> list[float]:
+    return [float(row[f"{column}_{channel}"]) for channel in "rgb"]
+
+
+# Against the published table
+
+
+def test_the_table_and_the_measured_presets_are_the_same_media(table: list[dict[str, str]]) -> None:
+    assert len(table) == 47
+    assert sorted(tl.preset(row["name"]).name for row in table) == MEASURED
+
+
+def test_every_row_of_the_table_is_what_the_preset_says(table: list[dict[str, str]]) -> None:
+    for row in table:
+        found, unreduced = tl.preset(row["name"]), bool(row["sigma_s_r"])
+        assert row["units"] == "mm^-1"
+        assert found.absorption == pytest.approx(1e3 * np.array(triple(row, "sigma_a")), rel=1e-14, abs=0), row["name"]
+        scattering = triple(row, "sigma_s" if unreduced else "sigma_s_prime")
+        assert found.scattering == pytest.approx(1e3 * np.array(scattering), rel=1e-14, abs=0), row["name"]
+        assert found.channel_anisotropy == (tuple(triple(row, "g")) if unreduced else (0, 0, 0)), row["name"]
+        assert found.medium.ior == float(row["eta"])
+        assert found.reduced == (not unreduced)
+        assert PAPERS[found.source] == row["primary_paper"]
+
+
+def test_reduced_scattering_agrees_with_the_table_within_its_printed_digits(table: list[dict[str, str]]) -> None:
+    for row in table:
+        found = tl.preset(row["name"])
+        published = 1e3 * np.array(triple(row, "sigma_s_prime"))
+        if found.reduced:
+            assert found.reduced_scattering == pytest.approx(published, rel=1e-14, abs=0)
+            continue
+        # sigma_s has five decimals per mm, g three.
+        rounding = 5e-3 * (1 - np.array(found.channel_anisotropy)) + 5e-4 * found.scattering
+        assert (np.abs(found.reduced_scattering - published) <= 1.001 * rounding + 1e-4 * published).all(), row["name"]
+
+
+def test_rows_on_which_the_sources_disagree_are_marked(table: list[dict[str, str]]) -> None:
+    doubtful = {tl.preset(row["name"]).name for row in table if " vs " in row["crosscheck"]}
+    assert doubtful == {"chicken1", "chicken2"}
+    for name in MEASURED:
+        assert ("unconfirmed" in tl.preset(name).note) == (name in doubtful)
+
+
+@pytest.mark.parametrize("name", [name for name in MEASURED if "powder" in name or "coffee" in name] + ["espresso"])
+def test_powders_and_coffee_say_that_their_concentration_is_not_that_of_the_drink(name: str) -> None:
+    assert "concentrat" in tl.preset(name).note
+
+
+# Units
+
+
+def test_a_millimetre_of_ketchup() -> None:
+    ketchup = tl.preset("ketchup")
+    absorbing = tl.Medium(absorption=ketchup.absorption)
+    assert absorbing.transmittance(1e-3)[2] == pytest.approx(0.2346, abs=5e-5)
+    # Absorption 1.45 and scattering 0.03 per mm in blue: both are lost to a ray.
+    assert ketchup.medium.transmittance(1e-3)[2] == pytest.approx(math.exp(-1.48), rel=1e-14)
+
+
+def test_a_centimetre_of_merlot() -> None:
+    assert tl.preset("merlot").medium.transmittance(1e-2) == pytest.approx((0.31, 0.08, 0.05), abs=5e-3)
+
+
+def test_a_centimetre_of_chardonnay() -> None:
+    # 2 % of the events in blue scatter: 0.79 is left by absorption alone.
+    absorbing = tl.Medium(absorption=tl.preset("chardonnay").absorption)
+    assert absorbing.transmittance(1e-2) == pytest.approx((0.90, 0.89, 0.79), abs=5e-3)
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)])
+def test_coefficients_are_per_unit(unit: str, metres: float) -> None:
+    ink = read_presets(ENTRY.replace('unit = "mm"', f'unit = "{unit}"'))["ink"]
+    assert ink.absorption == pytest.approx(np.array([1, 2, 3]) / metres, rel=1e-15)
+
+
+def test_estimated_presets_have_their_colors_at_their_distances() -> None:
+    assert sorted(COLORS) == ESTIMATED
+    for name, (color, distance) in COLORS.items():
+        assert tl.preset(name).medium.transmittance(distance) == pytest.approx(color, rel=4e-15), name
+        assert not tl.preset(name).medium.scatters
+
+
+def test_what_scatters_in_reality_and_not_here_says_so() -> None:
+    assert all(tl.preset(name).note.startswith("absorption only") for name in ("jade", "wax", "soap"))
+
+
+# Complete
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_preset_is_complete(name: str) -> None:
+    found = tl.preset(name)
+    assert found.name == name
+    assert re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name)
+    assert found.source in PAPERS if found.kind == "measured" else found.source.startswith("by eye")
+    assert (found.medium.extinction > 0).all()
+    assert found.medium.extinction.shape == found.reduced_scattering.shape == (3,)
+    assert 1 < found.medium.ior < 2
+    assert 0 <= found.medium.anisotropy < 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_anisotropy_keeps_the_sum_of_reduced_scattering(name: str) -> None:
+    found = tl.preset(name)
+    kept = (found.scattering * (1 - found.medium.anisotropy)).sum()
+    assert kept == pytest.approx(found.reduced_scattering.sum(), rel=1e-12, abs=1e-12)
+
+
+def test_an_anisotropy_of_channels_that_do_not_scatter_does_not_count() -> None:
+    # Red alone scatters in the published table; green and blue have g = 0 for want of a measurement.
+    assert tl.preset("merlot").medium.anisotropy == pytest.approx(0.974, rel=1e-14)
+
+
+# Names
+
+
+@pytest.mark.parametrize("name", FIRST)
+def test_the_first_names_keep_working(name: str) -> None:
+    assert tl.preset(name).name == name
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("Skim Milk", "skim_milk"),
+        ("skim-milk", "skim_milk"),
+        ("SKIM_MILK", "skim_milk"),
+        ("Skimmilk", "skim_milk"),
+        ("budweiser", "beer"),
+        ("Head & Shoulders Shampoo", "head_shoulders_shampoo"),
+        ("whiskey", "whisky"),
+        (" jade ", "jade"),
+    ],
+)
+def test_a_name_can_be_written_so(written: str, name: str) -> None:
+    assert tl.preset(written) is tl.preset(name)
+
+
+def test_aliases_are_not_listed_as_media_of_their_own() -> None:
+    assert "budweiser" in tl.presets()["beer"].aliases
+    assert "budweiser" not in tl.presets()
+
+
+def test_the_list_is_the_callers_own() -> None:
+    tl.presets().clear()
+    assert len(tl.presets()) == len(NAMES)
+
+
+@pytest.mark.parametrize("name", ["unobtainium", "", "&"])
+def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
+    message = f"preset {name!r}; not a known preset; use one of marble, skim_milk, merlot, honey, jade and 52 more"
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        tl.preset(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "guess"), [("honney", "honey"), ("Merlo", "merlot"), ("budwiser", "budweiser"), ("skin", "skin2 or skin1")]
+)
+def test_an_unknown_name_gives_what_it_may_mean(name: str, guess: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(f"preset {name!r}; not a known preset; did you mean {guess}")):
+        tl.preset(name)
+
+
+# Regimes
+
+
+@pytest.mark.parametrize(
+    ("name", "regime"),
+    [
+        ("marble", "scattering dominated"),
+        ("skim_milk", "scattering dominated"),
+        ("whole_milk", "scattering dominated"),
+        ("regular_milk", "scattering dominated"),
+        ("skin1", "scattering dominated"),
+        ("spectralon", "scattering dominated"),
+        ("ketchup", "scattering dominated"),  # red scatters three times as often as it is absorbed
+        ("espresso", "single scattering"),  # absorbed before it scatters often
+        ("gatorade", "single scattering"),
+        ("clorox", "single scattering"),
+        ("merlot", "absorbing"),
+        ("beer", "absorbing"),
+        ("apple_juice", "absorbing"),  # a sixth of the events scatters, but once in 40 cm
+        ("jade", "absorbing"),
+        ("crystal", "absorbing"),
+    ],
+)
+def test_a_regime(name: str, regime: str) -> None:
+    found = tl.preset(name)
+    assert found.regime == regime
+    assert bool(found.warning) == (regime == "scattering dominated")
+
+
+def medium(absorption: float, scattering: float, g: float = 0.0) -> Preset:
+    """A medium of these coefficients per metre."""
+    return Preset("x", tl.Medium(absorption, scattering, anisotropy=g), "estimated", "", channel_anisotropy=(g, g, g))
+
+
+@pytest.mark.parametrize(
+    ("absorption", "scattering", "g", "regime"),
+    [
+        (100, 100, 0, "scattering dominated"),  # as much scattering as absorption, twice within 1 cm
+        (101, 100, 0, "single scattering"),
+        (50, 50, 0, "scattering dominated"),  # one event in 1 cm
+        (49, 50, 0, "single scattering"),
+        (0, 100, 0, "scattering dominated"),
+        (0, 99, 0, "single scattering"),
+        (100, 1001, 0.9, "scattering dominated"),  # forward scattering counts by its reduced share
+        (100, 999, 0.9, "single scattering"),
+        (90.1, 10, 0, "absorbing"),  # less than a tenth of the events
+        (90, 10, 0, "single scattering"),
+        (0, 4.99, 0, "absorbing"),  # less than a twentieth of the light in 1 cm
+        (0, 5, 0, "single scattering"),
+        (0, 0, 0, "absorbing"),
+    ],
+)
+def test_the_borders_of_the_regimes(absorption: float, scattering: float, g: float, regime: str) -> None:
+    assert medium(absorption, scattering, g).regime == regime
+
+
+@pytest.mark.parametrize(
+    ("scattering", "regime"),
+    [((0, 0, 0), "absorbing"), ((0, 0, 20), "single scattering"), ((200, 0, 0), "scattering dominated")],
+)
+def test_the_channel_that_scatters_most_decides(scattering: tuple[float, float, float], regime: str) -> None:
+    assert Preset("x", tl.Medium(100, scattering), "estimated", "").regime == regime
+
+
+def test_marble_spreads_light_by_millimetres() -> None:
+    marble = tl.preset("marble")
+    assert 1e3 * marble.diffusion_length == pytest.approx((8.5, 5.6, 4.0), abs=0.05)
+    assert marble.diffusion_length[0] == pytest.approx(1e-3 / math.sqrt(3 * 0.0021 * (0.0021 + 2.19)), rel=1e-14)
+    assert "absorption along the view ray alone does not show the look" in marble.warning
+    assert "1/sigma_tr: 8.51 mm, 5.57 mm, 3.95 mm" in marble.warning
+    assert 1e3 * tl.preset("skin1").diffusion_length == pytest.approx((3.7, 1.4, 0.7), abs=0.05)
+
+
+def test_the_diffusion_length_goes_by_reduced_scattering() -> None:
+    # 1000 at g = 0.9 spreads light as 100 does at g = 0.
+    assert medium(1, 1000, 0.9).diffusion_length == pytest.approx(medium(1, 100).diffusion_length, rel=1e-14)
+
+
+def test_without_absorption_light_spreads_without_end() -> None:
+    spectralon = tl.preset("spectralon")
+    assert spectralon.diffusion_length.tolist() == [math.inf] * 3
+    assert spectralon.albedo.tolist() == [1.0] * 3
+    assert "no end" in spectralon.warning
+
+
+def test_a_medium_of_nothing_has_no_events() -> None:
+    nothing = medium(0, 0)
+    assert nothing.albedo.tolist() == nothing.reduced_albedo.tolist() == [0.0] * 3
+    assert nothing.mean_free_path.tolist() == [math.inf] * 3
+    assert nothing.summary()["mean_free_path"] == [None] * 3
+    assert set(nothing.colors().values()) == {"#ffffff"}
+
+
+def test_colors_after_distances() -> None:
+    merlot = tl.preset("merlot")
+    assert merlot.colors()["1 cm"] == to_hex(np.exp([-1.1713, -2.5191, -2.9434]))
+    marble = tl.preset("marble")
+    assert marble.colors()["1 cm"] == "#000000"
+    assert marble.absorption_colors()["1 cm"] == to_hex(np.exp([-0.021, -0.041, -0.071]))
+
+
+# The file
+
+ENTRY = """
+[ink]
+aliases = ["dye"]
+kind = "measured"
+source = "a paper"
+unit = "mm"
+absorption = [1, 2.0, 3.0]
+scattering = [0.5, 0.0, 0.5]
+anisotropy = [0.8, 0.0, 0.4]
+ior = 1.33
+note = "stains"
+"""
+COLOR_ENTRY = '[glass]\nkind = "estimated"\nsource = "by eye"\ncolor = [0.5, 0.6, 0.7]\ndistance = "2cm"\nior = 1.5\n'
+
+
+def test_an_entry_is_read() -> None:
+    ink = read_presets(ENTRY)["ink"]
+    assert ink.absorption == pytest.approx((1e3, 2e3, 3e3), rel=1e-15)
+    assert ink.scattering == pytest.approx((500, 0, 500), rel=1e-15)
+    assert ink.medium.anisotropy == pytest.approx(0.6, rel=1e-15)
+    assert ink.medium.ior == 1.33
+    assert (ink.note, ink.aliases, ink.channel_anisotropy) == ("stains", ("dye",), (0.8, 0.0, 0.4))
+    glass = read_presets(COLOR_ENTRY)["glass"]
+    assert glass.medium == tl.Medium.from_color((0.5, 0.6, 0.7), 0.02, ior=1.5)
+    assert (glass.note, glass.aliases, glass.reduced) == ("", (), False)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("absorption", "absorbtion", "media.toml, [ink]; unknown key 'absorbtion'; did you mean 'absorption'?"),
+        ("note", "zzz", "media.toml, [ink]; unknown key 'zzz'; use some of absorption, aliases, "),
+        ('kind = "measured"\n', "", "media.toml, [ink]; no key 'kind'; add it"),
+        ('unit = "mm"\n', "", "media.toml, [ink]; no key 'unit'; add it"),
+        ("scattering = [0.5, 0.0, 0.5]\n", "", "media.toml, [ink]; no key 'scattering'; add it"),
+        ("scattering =", "reduced_scattering =", "[ink]; both 'anisotropy' and 'reduced_scattering'; give one or the"),
+        ('kind = "measured"', 'kind = "guessed"', '[ink]; kind = \'guessed\'; give "measured" or "estimated"'),
+        ('"a paper"', '""', "media.toml, [ink]; source = ''; give a text"),
+        ('"a paper"', "2001", "media.toml, [ink]; source = 2001; give a text"),
+        ('"stains"', "true", "media.toml, [ink]; note = True; give a text"),
+        ('["dye"]', '"dye"', "media.toml, [ink]; aliases = 'dye'; give a list of names"),
+        ('["dye"]', '["ink"]', "media.toml, [ink]; alias 'ink' is a name already; choose another"),
+        ('["dye"]', '["a", "a"]', "media.toml, [ink]; alias 'a' is a name already"),
+        ("[1, 2.0, 3.0]", "[1, 2.0]", "[ink]; absorption = [1, 2.0]; give three numbers [r, g, b]"),
+        ("[1, 2.0, 3.0]", '[1, 2.0, "3"]', "[ink]; absorption = [1, 2.0, '3']; give a number"),
+        ("[1, 2.0, 3.0]", "[1, 2.0, true]", "[ink]; absorption = [1, 2.0, True]; give a number"),
+        ("[1, 2.0, 3.0]", "1.0", "[ink]; absorption = 1.0; give three numbers"),
+        ("[1, 2.0, 3.0]", "[1, -2, 3]", "media.toml, [ink]; medium absorption (1000.0, -2000.0, 3000.0); negative"),
+        ("[1, 2.0, 3.0]", "[1, nan, 3]", "media.toml, [ink]; medium absorption (1000.0, nan, 3000.0); negative or not"),
+        ("0.8, 0.0", "1.0, 0.0", "[ink]; anisotropy = [1.0, 0.0, 0.4]; give between -1 and 1"),
+        ('"mm"', '"furlong"', "media.toml, [ink]; unit 'furlong'; not a known unit"),
+        ("1.33", "0.9", "media.toml, [ink]; medium ior 0.9; below 1"),
+        ("1.33", '"1.33"', "media.toml, [ink]; ior = '1.33'; give a number"),
+        ("[ink]", "[Ink]", "media.toml, [Ink]; not a name in lower_snake_case"),
+        ("[ink]", "ink = 3\n[other]", "media.toml, [ink]; not a table"),
+        ("[ink]", "[ink", "media.toml; no TOML: "),
+    ],
+)
+def test_an_entry_that_is_wrong_is_named(old: str, new: str, message: str) -> None:
+    assert old in ENTRY
+    with pytest.raises(tl.InputError, match=re.escape(message)) as caught:
+        read_presets(ENTRY.replace(old, new, 1), "media.toml")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('distance = "2cm"\n', "", "presets.toml, [glass]; no key 'distance'; add it"),
+        ("color = [0.5, 0.6, 0.7]\n", "", "presets.toml, [glass]; no key 'color'; add it"),
+        (
+            '"2cm"',
+            '"2cm"\nabsorption = [1.0, 1.0, 1.0]',
+            "[glass]; both 'absorption' and 'color'; give one or the other",
+        ),
+        ("0.5, 0.6", "0.0, 0.6", "presets.toml, [glass]; color (0.0, 0.6, 0.7); red = 0 is not in 0 < t <= 1"),
+        ('"2cm"', '"2 parsec"', "presets.toml, [glass]; unit 'parsec'; not a known unit"),
+    ],
+)
+def test_an_entry_with_a_color_that_is_wrong_is_named(old: str, new: str, message: str) -> None:
+    assert old in COLOR_ENTRY
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        read_presets(COLOR_ENTRY.replace(old, new, 1))

@@ -1,0 +1,113 @@
+"""``translucent presets``: the named media, in a table or one in full."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import click
+
+from translucent.commands.common import common_options, triple_text
+
+if TYPE_CHECKING:
+    from translucent.presets import Preset
+
+_LISTED = ("name", "kind", "regime", "colors", "source")
+
+
+@click.group(invoke_without_command=True, epilog="Example: translucent presets show merlot")
+@common_options
+@click.pass_context
+def presets(context: click.Context, as_json: bool) -> None:
+    """List the named media: what they do to light, and their colors after 1 mm, 1 cm and 10 cm."""
+    from translucent.presets import presets as all_presets
+
+    if context.invoked_subcommand is not None:
+        return
+    found = list(all_presets().values())
+    if as_json:
+        rows = [{key: one.summary()[key] for key in _LISTED} for one in found]
+        click.echo(json.dumps({"presets": rows}))
+        return
+    click.echo(_table(found), color=_colorful())
+
+
+@presets.command(epilog="Example: translucent presets show merlot")
+@click.argument("name")
+@common_options
+@click.pass_context
+def show(context: click.Context, name: str, as_json: bool) -> None:
+    """Print everything about the medium NAME: coefficients, colors, source, and what absorption alone is worth."""
+    from translucent.presets import preset
+
+    one = preset(name)
+    above = context.parent.params if context.parent else {}
+    if as_json or above.get("as_json"):
+        click.echo(json.dumps(one.summary()))
+        return
+    click.echo(_details(one), color=_colorful())
+
+
+def _table(found: list[Preset]) -> str:
+    wide = max(len(one.name) for one in found)
+    # A swatch and a space go before each hex color.
+    pad = 3 if _colorful() else 0
+    head = "  ".join(f"{text:<{7 + pad}}" for text in found[0].colors())
+    lines = [f"{'name':<{wide}}  {'kind':<9}  {'regime':<20}  {head}  source"]
+    lines += [
+        f"{one.name:<{wide}}  {one.kind:<9}  {one.regime:<20}  "
+        f"{'  '.join(_swatch(color) + color for color in one.colors().values())}  {one.source}"
+        for one in found
+    ]
+    return "\n".join(lines)
+
+
+def _details(one: Preset) -> str:
+    from translucent.presets import PAPERS
+
+    rows = [
+        ("name", ", ".join((one.name, *one.aliases))),
+        ("kind", one.kind),
+        ("source", PAPERS.get(one.source, one.source)),
+        ("note", one.note),
+        ("regime", one.regime),
+        ("warning", one.warning),
+        ("absorption", _coefficients(one.absorption)),
+    ]
+    if one.medium.scatters:
+        rows += [
+            ("scattering*" if one.reduced else "scattering", _coefficients(one.scattering)),
+            ("extinction", _coefficients(one.medium.extinction)),
+            ("anisotropy", f"{triple_text(one.channel_anisotropy)}       rendered with {one.medium.anisotropy:.5g}"),
+            ("albedo", triple_text(one.albedo)),
+        ]
+    rows += [("mean free path", f"{triple_text(1e3 * one.mean_free_path)} mm"), ("ior", f"{one.medium.ior:10g}")]
+    alone = one.absorption_colors()
+    for text, color in one.colors().items():
+        without = f"  (absorption alone {_swatch(alone[text])}{alone[text]})" if one.medium.scatters else ""
+        rows.append((f"after {text}", f"{_swatch(color)}{color}{without}"))
+    lines = [f"{label:<15} {text}" for label, text in rows if text]
+    if one.reduced:
+        lines.append("* reduced, sigma_s (1 - g), all that was measured: scatters isotropically")
+    return "\n".join(lines)
+
+
+def _coefficients(per_metre: Iterable[float]) -> str:
+    values = list(per_metre)
+    return f"{triple_text(1e-3 * v for v in values)} 1/mm  {triple_text(values)} 1/m"
+
+
+def _colorful() -> bool:
+    """Whether colors can be shown: on a terminal, unless it is a dumb one or NO_COLOR asks for none."""
+    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def _swatch(color: str) -> str:
+    """Two columns of a hex color and a space, or nothing where colors cannot be shown."""
+    if not _colorful():
+        return ""
+    red, green, blue = (int(color[i : i + 2], 16) for i in (1, 3, 5))
+    return f"\x1b[48;2;{red};{green};{blue}m  \x1b[0m "
