@@ -173,7 +173,7 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     try:
         width, height = (int(v) for v in size)
         exact = (width, height) == tuple(size)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"frame size {size!r}", "not (width, height)", "give two whole numbers, for example (1280, 720)"
         ) from None

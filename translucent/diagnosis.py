@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.repair import spread_winding
+from translucent.winding import inside_out_parts
+
 #: A dent not deeper than this share of the size leaves a body convex.
 CONVEX_TOLERANCE = 1e-6
 
@@ -63,8 +66,10 @@ class Diagnosis:
         No open edge.
     solid : bool
         Closed and consistently wound: the thickness along every ray is defined.
+    inside_out_parts : int
+        Closed parts that look inwards and are no cavity, beside others that look outwards.
     inverted : bool
-        Solid, with the faces looking inwards (negative volume).
+        Solid, with all faces looking inwards.
     convex : bool
         Solid, one component, and no edge bends inwards.
     """
@@ -80,6 +85,7 @@ class Diagnosis:
     volume: float
     closed: bool
     solid: bool
+    inside_out_parts: int
     inverted: bool
     convex: bool
 
@@ -102,6 +108,8 @@ class Diagnosis:
         ]
         if self.inverted:
             lines.append("inverted: all faces look inwards")
+        if self.inside_out_parts:
+            lines.append(f"{self.inside_out_parts} closed parts inside out")
         return tuple(lines)
 
     def __str__(self) -> str:
@@ -142,6 +150,8 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
     solid = bool(closed and not mixed.any() and finite[used].all() and len(edges.total) > 0)
     volume = _signed_volume(corners)
     components = edges.components()
+    inverted = solid and volume < 0
+    inside_out = _inside_out(vertices, edges.faces) if solid and components > 1 and not inverted else 0
     return Diagnosis(
         nonfinite_vertices=_found(~finite),
         unreferenced_vertices=_found(~used),
@@ -154,7 +164,8 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
         volume=volume,
         closed=closed,
         solid=solid,
-        inverted=solid and volume < 0,
+        inside_out_parts=inside_out,
+        inverted=inverted,
         convex=solid and components == 1 and edges.all_convex(vertices, float(np.sign(volume))),
     )
 
@@ -202,6 +213,12 @@ class _Edges:
         size = np.ptp(vertices[np.unique(self.faces)], axis=0).max()
         # Files keep float32, so flat patches and fine tessellations scatter by some 1e-7 of the size.
         return bool((height <= CONVEX_TOLERANCE * size * np.linalg.norm(normals[one // 3], axis=1)).all())
+
+
+def _inside_out(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int64]) -> int:
+    """Number of closed parts that look inwards and lie inside no other."""
+    part, _ = spread_winding(faces)
+    return len(inside_out_parts(vertices, faces, part))
 
 
 def _collapsed(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

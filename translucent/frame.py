@@ -159,8 +159,9 @@ def check_output(path: Path) -> None:
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was."""
+    path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=".partial-", suffix=path.suffix, dir=path.parent)
     except OSError as error:
         raise RenderError(
             f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,10 @@ from translucent.errors import InputError
 
 Array = npt.NDArray[np.float64]
 ColorLike = str | npt.ArrayLike
+EnvironmentKind = Literal["constant", "gradient", "checkerboard"]
+
+#: Largest radiance, intensity or irradiance: its products with lengths stay within float32.
+MAX_RADIANCE = 1e18
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +77,20 @@ class Environment:
         Squares of a checkerboard along the height of the picture.
     """
 
-    kind: Literal["constant", "gradient", "checkerboard"]
+    kind: EnvironmentKind
     first: Array
     second: Array
     tiles: float = 8.0
 
     def __post_init__(self) -> None:
+        if self.kind not in get_args(EnvironmentKind):
+            raise InputError(
+                f"environment kind {self.kind!r}", "not known", f"use one of {', '.join(get_args(EnvironmentKind))}"
+            )
         object.__setattr__(self, "first", _positive("environment radiance", self.first))
         object.__setattr__(self, "second", _positive("environment radiance", self.second))
-        if not 0 < self.tiles < np.inf:
-            raise InputError(f"checkerboard of {self.tiles} tiles", "not above 0", "give for example 8")
+        if not 0 < self.tiles <= 1e6:
+            raise InputError(f"checkerboard of {self.tiles} tiles", "not in 0 to 1e6", "give for example 8")
 
     @classmethod
     def constant(cls, radiance: ColorLike) -> Environment:
@@ -146,10 +154,12 @@ def _positive(what: str, value: npt.ArrayLike) -> Array:
     except (TypeError, ValueError):
         raise InputError(f"{what} {value!r}", "not one or three numbers", "give (r, g, b)") from None
     triple = _vector(what, triple)
-    if (triple < 0).any():
-        raise InputError(f"{what} {tuple(triple.tolist())}", "negative", "give values of 0 and above")
+    if (triple < 0).any() or (triple > MAX_RADIANCE).any():
+        raise InputError(
+            f"{what} {tuple(triple.tolist())}", f"not in 0 to {MAX_RADIANCE:g}", "give values of 0 and above"
+        )
     return triple
 
 
 def _radiance(color: ColorLike) -> Array:
-    return parse_color(color) if isinstance(color, str) else _positive("environment radiance", color)
+    return _positive("environment radiance", parse_color(color) if isinstance(color, str) else color)

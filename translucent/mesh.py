@@ -14,10 +14,14 @@ import numpy.typing as npt
 
 from translucent.diagnosis import Diagnosis, diagnose
 from translucent.errors import InputError, TranslucentWarning
-from translucent.repair import WELD_TOLERANCE, orient, weld
+from translucent.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
 from translucent.units import metres_per_unit
+from translucent.winding import winding_number
 
 Array = npt.NDArray[np.float64]
+
+#: Largest index of a vertex.
+MAX_INDEX = 2**31 - 1
 
 #: Largest coordinate in metres whose square still fits into float32.
 MAX_COORDINATE = 1e18
@@ -78,7 +82,10 @@ class Mesh:
 
     def _array(self, field: str, value: Any, dtype: Any, columns: int) -> npt.NDArray[Any]:
         try:
-            array = np.array(value, dtype=dtype, order="C")
+            array = np.array(value, order="C")
+            if dtype is np.int32 and array.size and (array.dtype.kind not in "iu" or np.abs(array).max() > MAX_INDEX):
+                raise ValueError
+            array = array.astype(dtype)
         except (TypeError, ValueError, OverflowError):
             raise InputError(
                 f"mesh {self.name!r}", f"{field} are not numbers of {np.dtype(dtype)}", "check the arrays"
@@ -105,7 +112,9 @@ class Mesh:
     def bounds(self) -> Array:
         """(2, 3): smallest and largest coordinates of the vertices that faces use."""
         used = self.vertices[np.unique(self.faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        bounds = np.stack([used.min(axis=0), used.max(axis=0)])
+        bounds.setflags(write=False)
+        return bounds
 
     @property
     def center(self) -> Array:
@@ -123,34 +132,40 @@ class Mesh:
         return self.diagnosis.volume
 
     @cached_property
+    def face_normals(self) -> Array:
+        """(m, 3): unit normals of the faces, towards the side from which they are counter-clockwise; 0 without area."""
+        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        return np.asarray(
+            normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        )
+
+    @cached_property
     def vertex_normals(self) -> Array:
         """(n, 3): unit normals, the mean of the face normals weighted by the angle at the vertex."""
         corners = self.vertices[self.faces]
         normals = np.zeros_like(self.vertices)
-        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        face_normals /= np.maximum(np.linalg.norm(face_normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
         for i in range(3):
             a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
             angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
-            np.add.at(normals, self.faces[:, i], face_normals * angle[:, None])
+            np.add.at(normals, self.faces[:, i], self.face_normals * angle[:, None])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return np.where(length > 0, normals / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0))
 
     def winding_number(self, point: npt.ArrayLike) -> float:
-        """How often the surface winds around `point`: 0 outside, 1 inside, a fraction on it or near a hole.
+        """How often the surface winds around `point`: 0 outside, 1 inside, a fraction on it or near a hole."""
+        return winding_number(self.vertices[self.faces], point)
 
-        The sum of the solid angles of all faces over 4 pi (van Oosterom & Strackee 1983).
-        """
-        a, b, c = (self.vertices[self.faces] - np.asarray(point, dtype=np.float64)).transpose(1, 0, 2)
-        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-        with np.errstate(under="ignore"):
-            triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-            dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
-            lengths = la * lb * lc
-            half_angle = np.arctan2(triple, lengths + dots[0] * lc + dots[1] * la + dots[2] * lb)
-        # Across a face its solid angle jumps from 2 pi to -2 pi: on it, as far as rounding can tell, it is the mean.
-        half_angle[np.abs(triple) <= 16 * np.finfo(np.float64).eps * lengths] = 0.0
-        return float(half_angle.sum() / (2.0 * np.pi))
+    def is_near(self, point: npt.ArrayLike, distance: float) -> bool:
+        """Whether the surface comes within `distance` metres of `point`."""
+        from trimesh.triangles import closest_point
+
+        corners, target = self.vertices[self.faces], np.asarray(point, dtype=np.float64)
+        near = ((corners.min(axis=1) <= target + distance) & (corners.max(axis=1) >= target - distance)).all(axis=1)
+        if not near.any():
+            return False
+        nearest = closest_point(corners[near], np.broadcast_to(target, (int(near.sum()), 3)))
+        return bool((np.linalg.norm(nearest - target, axis=1) <= distance).any())
 
     def summary(self) -> dict[str, object]:
         """What is known about the mesh, in values that JSON can hold; lengths in metres."""
@@ -243,7 +258,10 @@ def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
 
 def _mended(raw: Mesh) -> Mesh:
     """`raw` welded and consistently wound, with its repairs on record."""
-    same = weld(raw.vertices, WELD_TOLERANCE * raw.diagonal)
+    corners = raw.vertices[raw.faces]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    # A stray vertex far away makes the diagonal huge; what is short beside the usual edge is still one point.
+    same = weld(raw.vertices, min(WELD_TOLERANCE * raw.diagonal, WELD_EDGE_SHARE * float(np.median(edges))))
     faces, flipped, turned = orient(raw.vertices, same[raw.faces].astype(np.int32))
     reversed_face = (faces != same[raw.faces]).any(axis=1)
     split_faces = np.where(reversed_face[:, None], raw.faces[:, ::-1], raw.faces)

@@ -211,6 +211,9 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     for body in scene.bodies:
         if found := body.mesh.diagnosis.duplicate_faces:
             limits.append(f"{body.mesh.name!r}: {found.count} duplicated faces, which count twice or cancel")
+    for body in scene.bodies:
+        if parts := body.mesh.diagnosis.inside_out_parts:
+            limits.append(f"{body.mesh.name!r}: {parts} closed parts inside out: their pixels are marked invalid")
     if scene.overlap != "add" and any(not body.mesh.diagnosis.convex for body in scene.bodies):
         limits.append(f'overlap="{scene.overlap}": where a mesh overlaps itself, its medium counts twice')
     unmodelled = []

@@ -8,12 +8,17 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.winding import inside_out_parts
+
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
 
 #: Vertices closer than this share of the bounding-box diagonal are one point. Files store float32 at best, whose last
 #: bit is 6e-8 of the coordinate: CAD exports differ by some of these between neighbouring faces.
 WELD_TOLERANCE = 1e-6
+
+#: Nor are vertices one point that are farther apart than this share of the median edge.
+WELD_EDGE_SHARE = 1e-2
 
 
 def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
@@ -48,8 +53,8 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
 def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
     """Wind the faces of each edge-connected part alike, and turn parts that are inside out.
 
-    A part is turned outwards only if it is closed and lies inside no other part: a shell within another may be meant
-    as a cavity, so it keeps the sense that it has.
+    A part is turned outwards only if it is closed and lies inside no other part: a shell within another is a cavity,
+    and keeps the sense that it has.
 
     Parameters
     ----------
@@ -65,26 +70,15 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
     turned : int
         Closed parts turned outwards as a whole.
     """
-    part, flip = _spread_winding(faces)
+    part, flip = spread_winding(faces)
     oriented = np.where(flip[:, None], faces[:, ::-1], faces)
-    turned = 0
-    bounds = [_bounds(vertices[oriented[part == p]]) for p in range(part.max() + 1)]
-    for p, box in enumerate(bounds):
-        mine = part == p
-        own = oriented[mine]
-        if not _balanced(own):
-            continue
-        corners = vertices[own] - vertices[own[0, 0]]
-        if np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) >= 0:
-            continue
-        if any(_contains(other, box) for q, other in enumerate(bounds) if q != p):
-            continue
-        oriented[mine] = own[:, ::-1]
-        turned += 1
-    return oriented.astype(np.int32), int(flip.sum()), turned
+    turned = inside_out_parts(vertices, oriented, part)
+    mine = np.isin(part, turned)
+    oriented[mine] = oriented[mine][:, ::-1]
+    return oriented.astype(np.int32), int(flip.sum()), len(turned)
 
 
-def _spread_winding(faces: Faces) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
     """Part of each face, and whether it must be turned to agree with the majority of its part.
 
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice
@@ -118,19 +112,3 @@ def _spread_winding(faces: Faces) -> tuple[npt.NDArray[np.int64], npt.NDArray[np
     in_second = orientable & (as_is > turned)
     share = np.bincount(part, weights=in_second) / np.bincount(part)
     return part, orientable & (in_second != (share > 0.5)[part])
-
-
-def _balanced(faces: Faces) -> bool:
-    """Whether every directed edge has its opposite."""
-    start, end = faces[:, [0, 1, 2]].ravel().astype(np.int64), faces[:, [1, 2, 0]].ravel().astype(np.int64)
-    key = start.max() + 1
-    return bool(np.array_equal(np.sort(start * key + end), np.sort(end * key + start)))
-
-
-def _bounds(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    flat = points.reshape(-1, 3)
-    return np.stack([flat.min(axis=0), flat.max(axis=0)])
-
-
-def _contains(outer: npt.NDArray[np.float64], inner: npt.NDArray[np.float64]) -> bool:
-    return bool((outer[0] <= inner[0]).all() and (outer[1] >= inner[1]).all())

@@ -14,7 +14,7 @@ from translucent.camera import Camera
 from translucent.errors import InputError
 from translucent.lights import DirectionalLight, Environment, PointLight
 from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.mesh import MAX_COORDINATE, Mesh
 
 Array = npt.NDArray[np.float64]
 Overlap = Literal["add", "union", "priority"]
@@ -62,7 +62,9 @@ class Object:
             raise InputError(where, "it flattens the mesh (a scale of 0)", "give every axis a scale other than 0")
         matrix.setflags(write=False)
         object.__setattr__(self, "transform", matrix)
-        if self.sheet_thickness is not None and not 0 < self.sheet_thickness < np.inf:
+        if (largest := float(np.abs(self.bounds).max())) > MAX_COORDINATE:
+            raise InputError(where, f"it puts the mesh {largest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
+        if self.sheet_thickness is not None and not 0 < self.sheet_thickness <= MAX_COORDINATE:
             raise InputError(
                 f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}",
                 "not above 0",

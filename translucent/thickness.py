@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from translucent.errors import InputError
+from translucent.mesh import MAX_COORDINATE
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class ThinLayer:
     thickness: float = 1e-3
 
     def __post_init__(self) -> None:
-        if not 0 < self.thickness < np.inf:
+        if not 0 < self.thickness <= MAX_COORDINATE:
             raise InputError(f"ThinLayer thickness {self.thickness}", "not above 0", "give metres, for example 1e-3")
 
 

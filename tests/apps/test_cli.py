@@ -119,7 +119,7 @@ BAD_RENDER_OPTIONS = [
     (["--fov", "180"], "camera fov_y 180.0; not between 0 and 180"),
     (["--fov", "nan"], "camera fov_y nan; not between 0 and 180"),
     (["--fov", "wide"], "Invalid value for '--fov'"),
-    (["--samples", "0"], "samples 0; not a whole number above 0"),
+    (["--samples", "0"], "samples 0; not a whole number in 1 to 4096"),
     (["--samples", "some"], "Invalid value for '--samples'"),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]

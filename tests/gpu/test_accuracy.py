@@ -116,6 +116,16 @@ def test_an_eye_on_the_surface_trusts_rays_inwards_and_outwards(renderer: tl.Ren
         np.testing.assert_allclose(frame.thickness, exact, atol=1e-5)
 
 
+@pytest.mark.parametrize("gap", [-1e-8, -1e-10, 0.0, 1e-10, 1e-8, 1e-7])
+def test_an_eye_just_off_a_surface_is_no_reason_to_distrust_the_frame(renderer: tl.Renderer, gap: float) -> None:
+    box = Box(low=(-1, -1, -1), high=(1, 1, 1))
+    for target in ((0.1, 0.2, -3.0), (0.3, 0.1, 5.0)):
+        camera = tl.Camera.look_at((0.0, 0.0, 1.0 + gap), target, fov_y=70)
+        frame = renderer.render(_scene(box.tessellate(), camera), (90, 60))
+        assert frame.valid.all()
+        np.testing.assert_allclose(frame.thickness, box.chord(*camera.rays((90, 60))), atol=2e-5)
+
+
 def _rotation(axis: tuple[float, float, float], angle: float) -> np.ndarray:
     x, y, z = np.array(axis) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

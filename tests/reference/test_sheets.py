@@ -10,7 +10,7 @@ from translucent import optics
 from translucent.camera import Camera
 from translucent.medium import Medium
 from translucent.mesh import Mesh
-from translucent.reference import hit_counts, render
+from translucent.reference import render
 from translucent.scene import Object, Scene
 from translucent.solids import Box, Sphere
 from translucent.thickness import ThinLayer
@@ -52,7 +52,9 @@ def test_every_face_a_sheet(mirrored: bool, inverted: bool) -> None:
     _, y, z = np.moveaxis(camera.rays((16, 16))[0], -1, 0)
     x = np.sqrt(1 - y**2 - (z / 2) ** 2)
     cosine = x / np.sqrt(x**2 + y**2 + (z / 4) ** 2)
-    np.testing.assert_allclose(frame.thickness, 2 * 0.02 / cosine, rtol=1e-3)
+    # A face of 256 around is tilted by up to pi / 256 against the sphere, and its cosine by the tangent times that.
+    tilt = np.pi / 256 * np.tan(np.arccos(cosine)) * 2  # the stretch along z at most doubles it
+    assert (np.abs(frame.thickness * cosine / 0.04 - 1) <= tilt + 1e-3).all()
 
 
 def test_declared_sheets_stand_beside_solids() -> None:
@@ -61,12 +63,3 @@ def test_declared_sheets_stand_beside_solids() -> None:
     camera = Camera.orthographic((0, 0, 3), (0, 0, 0), height=0.5)
     assert render(Scene(bodies, camera), (2, 2)).thickness == pytest.approx(np.full((2, 2), 1.01))
     assert render(Scene([sheet], camera), (2, 2), ThinLayer(0.5)).thickness == pytest.approx(np.full((2, 2), 0.01))
-
-
-def test_a_normal_turned_away_counts_as_edge_on() -> None:
-    """A coarse sphere shows faces at its rim whose interpolated normals look away."""
-    camera = Camera.look_at((0, 0.2, 3), (0, 0, 0))
-    sphere = Scene([Object(Sphere().tessellate(8), MEDIUM)], camera)
-    frame = render(sphere, (256, 256), ThinLayer(1.0))
-    assert frame.thickness.max() > 1000
-    assert (frame.thickness <= 1000.0 * hit_counts(sphere, (256, 256))).all()

@@ -159,7 +159,7 @@ def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
 
 def test_exr_without_its_package_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "OpenEXR", None)
-    with pytest.raises(tl.RenderError, match=re.escape("pip install 'translucent-shading[exr]'")):
+    with pytest.raises(tl.RenderError, match="pip install openexr"):
         check_output(tmp_path / "a.exr")
 
 

@@ -22,6 +22,7 @@ import translucent as tl
 from translucent.diagnosis import Diagnosis, Finding
 from translucent.mesh import MAX_COORDINATE, Mesh, load_mesh
 from translucent.repair import WELD_TOLERANCE, weld
+from translucent.solids import Sphere, Torus
 
 Array = npt.NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
@@ -214,7 +215,9 @@ def test_only_a_single_solid_without_dents_is_convex(mesh: Mesh, convex: bool) -
     assert mesh.diagnosis.convex is convex
 
 
-@pytest.mark.parametrize(("depth", "convex"), [(0.0, True), (1e-12, True), (1e-7, True), (1e-5, False), (-1e-7, True), (-0.5, True)])
+@pytest.mark.parametrize(
+    ("depth", "convex"), [(0.0, True), (1e-12, True), (1e-7, True), (1e-5, False), (-1e-7, True), (-0.5, True)]
+)
 def test_a_dent_is_not_convex_unless_it_is_rounding(depth: float, convex: bool) -> None:
     # The wall x = 0 as four triangles around a ninth vertex in its middle, pushed in by `depth`.
     fan = [(a, b, 8) for a, b in itertools.pairwise((*QUADS[0], QUADS[0][0]))]
@@ -709,3 +712,64 @@ def test_a_box_at_the_limit_of_float32_loads_with_its_unit(assets: Path) -> None
     # 3.4e38 um would still be 3.4e32 m; nothing but a scale of the file helps, and nothing overflows on the way.
     with pytest.raises(tl.InputError, match=r"a coordinate of 3.4e\+32 m"):
         load_mesh(assets / "meshes_nasty" / "huge_Cray_right.obj", unit="um")
+
+
+def _joined(*meshes: Mesh) -> Mesh:
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=False)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def _written(mesh: Mesh, path: Path) -> Path:
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(path)
+    return path
+
+
+def test_a_part_in_the_hole_of_a_ring_is_no_cavity_and_a_shell_in_a_ball_is(tmp_path: Path) -> None:
+    """The box around the ring holds both; whether a part is a cavity is for the winding number to say."""
+    ring, ball = Torus().tessellate(24), Sphere(radius=0.15).tessellate(12)
+    inverted = Mesh(ball.vertices, ball.faces[:, ::-1])
+    assert _joined(ring, inverted).diagnosis.inside_out_parts == 1
+    assert "1 closed parts inside out" in _joined(ring, inverted).diagnosis.problems
+    with pytest.warns(tl.TranslucentWarning, match="turned 1 closed part outwards"):
+        mended = load_mesh(_written(_joined(ring, inverted), tmp_path / "ring.ply"))
+    assert mended.volume == pytest.approx(ring.volume + ball.volume, rel=1e-6)
+    shell = _joined(Sphere().tessellate(24), inverted)
+    assert shell.diagnosis.inside_out_parts == 0
+    assert load_mesh(_written(shell, tmp_path / "shell.ply")).repairs == ()
+
+
+def test_a_stray_triangle_far_away_does_not_weld_the_model_into_one_point(tmp_path: Path) -> None:
+    ball, stray = Sphere().tessellate(48), Sphere(center=(1e6, 0.0, 0.0)).tessellate(4)
+    loaded = load_mesh(_written(_joined(ball, stray), tmp_path / "stray.ply"))
+    assert len(loaded.vertices) == len(ball.vertices) + len(stray.vertices)
+
+
+def test_many_parts_are_oriented_in_one_go(tmp_path: Path) -> None:
+    """Every part inside out, 1500 of them: no loop over all parts for each part."""
+    ball = Sphere(radius=0.3).tessellate(4)
+    parts = [Mesh(ball.vertices + (i % 40, i // 40, 0.0), ball.faces[:, ::-1]) for i in range(1500)]
+    with pytest.warns(tl.TranslucentWarning, match="turned 1500 closed parts outwards"):
+        assert load_mesh(_written(_joined(*parts), tmp_path / "parts.ply")).diagnosis.solid
+
+
+@pytest.mark.parametrize("faces", [[[0, 1, 2**63]], [[0.5, 1, 2.7]], [[True, False, True]], [["a", "b", "c"]]])
+def test_indices_that_are_no_indices_are_refused(faces: list[list[object]]) -> None:
+    with pytest.raises(tl.InputError, match="faces are not numbers of int32"):
+        Mesh(np.eye(3), np.array(faces))
+
+
+def test_text_in_latin_1_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "latin.obj"
+    path.write_bytes(
+        "# modèle\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n".encode("latin-1")
+    )
+    assert load_mesh(path).diagnosis.solid
+
+
+@pytest.mark.parametrize(
+    ("distance", "near"), [(0.0, True), (9e-4, True), (1.1e-3, False), (-9e-4, True), (0.4, False)]
+)
+def test_near_a_surface(distance: float, near: bool) -> None:
+    box = Mesh(CORNERS, CUBE)
+    assert box.is_near((0.3, 0.6, 1.0 + distance), 1e-3) is near

@@ -12,6 +12,7 @@ import numpy as np
 
 from translucent import reference
 from translucent.bench.cases import Case
+from translucent.camera import check_size
 from translucent.errors import TranslucentWarning
 from translucent.gpu.passes.depth_only import DepthOnlyPass
 from translucent.gpu.renderer import Renderer
@@ -49,6 +50,7 @@ def measure(
         the depth-only pass of the same round. Errors are thickness errors as shares of the diagonal, on pixels whose
         3 x 3 neighbourhood has equal hit counts.
     """
+    size = check_size(size)
     rows: list[dict[str, Any]] = []
     with Renderer(backend) as renderer:
         for case in cases:

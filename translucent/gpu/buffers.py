@@ -21,24 +21,31 @@ class MeshBuffers:
         self._gl = gl
         self.offsets = gl.buffer((mesh.vertices - mesh.center).astype(np.float32))
         self.indices = gl.buffer(mesh.faces)
-        self._normals: moderngl.Buffer | None = None
+        self._flat: moderngl.Buffer | None = None
         self._arrays: dict[int, moderngl.VertexArray] = {}
 
     def vertex_array(self, program: moderngl.Program, mesh: Mesh) -> moderngl.VertexArray:
-        """The mesh bound to the inputs that `program` has: ``offset``, and ``normal`` where it asks for it."""
+        """The mesh bound to the inputs of `program`: shared vertices, or where it asks for ``normal``, flat faces."""
         if (array := self._arrays.get(program.glo)) is None:
-            content = [(self.offsets, "3f", "offset")]
             if "normal" in program:
-                if self._normals is None:
-                    self._normals = self._gl.buffer(mesh.vertex_normals.astype(np.float32))
-                content.append((self._normals, "3f", "normal"))
-            array = self._gl.vertex_array(program, content, self.indices, index_element_size=4)
+                array = self._gl.vertex_array(program, [(self._flat_faces(mesh), "3f 3f", "offset", "normal")])
+            else:
+                content = [(self.offsets, "3f", "offset")]
+                array = self._gl.vertex_array(program, content, self.indices, index_element_size=4)
             self._arrays[program.glo] = array
         return array
 
+    def _flat_faces(self, mesh: Mesh) -> moderngl.Buffer:
+        """Each face with vertices of its own, which carry its normal."""
+        if self._flat is None:
+            corners = (mesh.vertices - mesh.center)[mesh.faces]
+            normals = np.broadcast_to(mesh.face_normals[:, None], corners.shape)
+            self._flat = self._gl.buffer(np.concatenate([corners, normals], axis=2).astype(np.float32))
+        return self._flat
+
     def release(self) -> None:
         """Free the OpenGL objects now."""
-        for resource in (*self._arrays.values(), self.offsets, self.indices, self._normals):
+        for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat):
             if resource is not None:
                 resource.release()
         self._arrays.clear()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,8 +26,14 @@ Backend = Literal["egl", "window", "osmesa"]
 REQUIRED = 330
 
 
-#: Contexts that `GpuContext.current` has made current, the innermost last.
-_entered: list[GpuContext] = []
+class _Entered(threading.local):
+    """Contexts that `GpuContext.current` has made current in this thread, the innermost last."""
+
+    def __init__(self) -> None:
+        self.stack: list[GpuContext] = []
+
+
+_entered = _Entered()
 
 
 @dataclass(frozen=True)
@@ -49,6 +56,9 @@ class NoContextError(RenderError):
             "`translucent doctor` explains this machine",
         )
         self.attempts = attempts
+
+    def __reduce__(self) -> tuple[type[NoContextError], tuple[tuple[Attempt, ...]]]:
+        return NoContextError, (self.attempts,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,19 +109,19 @@ class GpuContext:
 
         An adopted context is current already, by contract.
         """
-        if not self.owned or _entered[-1:] == [self]:
+        if not self.owned or _entered.stack[-1:] == [self]:
             yield self.gl
             return
         # glcontext remembers one predecessor per context, which nesting would overwrite, so we keep the stack.
-        _entered.append(self)
+        _entered.stack.append(self)
         self.gl.__enter__()
         try:
             yield self.gl
         finally:
-            _entered.pop()
+            _entered.stack.pop()
             self.gl.__exit__(None, None, None)
-            if _entered:
-                _entered[-1].gl.__enter__()
+            if _entered.stack:
+                _entered.stack[-1].gl.__enter__()
 
     def drain(self) -> None:
         """Free what has been dropped since the last call; at a safe moment, with the context current."""

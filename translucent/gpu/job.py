@@ -125,14 +125,16 @@ class FrameJob:
 
         A rasteriser decides coverage on a grid of 1/256 pixel, so at a silhouette a pixel center may lie that far off
         both of its faces. Extended to it, they cross: by a pixel's size where they are steeper than 256, and by up to
-        a face's length where one is seen edge-on.
+        a face's length where one is seen edge-on. Where a mesh has parts inside out, nothing is tolerated.
         """
         camera, size = self.scene.camera, self.targets.size
         distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements) + self.scene.diagonal
         pixel = 2.0 * camera.half_extent(size)[1] / size[1] * (1.0 if camera.fov_y is None else distance)
         # Distances from the camera cancel with an error that grows with them: that is not a flipped face.
         rounding = distance if isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored else 0.0
-        return _NEGATIVE_TOLERANCE * (self.scene.diagonal + rounding) + pixel
+        suspicious = any(body.mesh.diagnosis.inside_out_parts for body in self.scene.objects)
+        share = _COVERAGE_FLOOR if suspicious else _NEGATIVE_TOLERANCE
+        return share * (self.scene.diagonal + rounding) + (0.0 if suspicious else pixel)
 
     def _shade_uniforms(self) -> bytes:
         environment = self.scene.environment

@@ -17,8 +17,8 @@ Array = npt.NDArray[np.float64]
 #: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
 MAX_SCENE_OPTICAL_DEPTH = 1e30
 
-#: With the eye on a surface, what is nearer than this share of the diagonal is clipped.
-_NEAR_ON_SURFACE = 1e-6
+#: An eye nearer to a surface than this share of the diagonal is on it; what is nearer than that ahead is clipped.
+_NEAR_SURFACE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ class Placement:
             forward = camera.forward
             cut = bool(np.where(forward > 0, low, high) @ forward < 0)
         else:
-            cut = bool((low <= 0).all() and (high >= 0).all())
+            margin = _NEAR_SURFACE * float(np.linalg.norm(high - low))
+            cut = bool((low <= margin).all() and (high >= -margin).all())
         return cls(body, cut, anchor, _expected_count(body, camera) if cut else (0.0, 0.0))
 
     @property
@@ -132,7 +133,7 @@ class Placement:
             return np.asarray(w_row * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near))
         if self.on_surface:
             # Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
-            return np.array([0.0, 0.0, 0.0, -_NEAR_ON_SURFACE * self.body.mesh.diagonal])
+            return np.array([0.0, 0.0, 0.0, -_NEAR_SURFACE * self.body.mesh.diagonal])
         return np.zeros(4)
 
 
@@ -141,10 +142,11 @@ def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:
     if body.sheet_thickness is not None or camera.fov_y is None:
         # An orthographic ray is a whole line: it leaves a body as often as it enters, some of it behind the picture.
         return 0.0, 0.0
-    number = body.winding_number(camera.eye)
-    if body.mesh.diagnosis.solid and abs(number - round(number)) > 1e-6:
-        # Only on its surface does the winding number of a solid have a fraction.
-        return float(np.floor(number)), float(np.ceil(number))
+    number = round(body.winding_number(camera.eye), 6)
+    local = np.linalg.solve(body.matrix[:3, :3], camera.eye - body.matrix[:3, 3])
+    if body.mesh.diagnosis.solid and body.mesh.is_near(local, _NEAR_SURFACE * body.mesh.diagonal):
+        # On the surface, and where float32 cannot tell, a ray may start on either side of it.
+        return max(float(np.ceil(number)) - 1.0, 0.0), float(np.floor(number)) + 1.0
     return float(round(number)), float(round(number))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 import warnings
+import weakref
 from functools import cached_property
 from importlib.metadata import version
 from types import TracebackType
@@ -27,6 +28,9 @@ from translucent.gpu.timer import PassTimer
 from translucent.plan import RenderPlan, plan
 from translucent.scene import Scene
 from translucent.thickness import Method
+
+#: More samples per pixel change nothing that 8 bits could show.
+MAX_SAMPLES = 4096
 
 
 class Renderer:
@@ -60,6 +64,8 @@ class Renderer:
         self._present: PresentPass | None = None
         self._plans: WeakKeyDictionary[Scene, dict[Method | None, RenderPlan]] = WeakKeyDictionary()
         self._closed = False
+        # A renderer that nobody closed must not keep its memory; the context takes all its objects along.
+        self._abandoned = weakref.finalize(self, self._gpu.gl.release) if self._gpu.owned else None
 
     def __enter__(self) -> Renderer:
         return self
@@ -111,8 +117,8 @@ class Renderer:
         RenderError
             If the frame is larger than this OpenGL allows.
         """
-        if not isinstance(samples, int) or samples < 1:
-            raise InputError(f"samples {samples!r}", "not a whole number above 0", "give for example 16")
+        if not isinstance(samples, int) or not 1 <= samples <= MAX_SAMPLES:
+            raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
         self._require_open()
         with self._gpu.current():
             job = self.prepare(scene, size, method)
@@ -160,7 +166,10 @@ class Renderer:
 
     def prepare(self, scene: Scene, size: tuple[int, int], method: Method | None = None) -> FrameJob:
         """Everything that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
+        self._require_open()
         size = check_size(size)
+        if method is not None and not isinstance(method, Method):
+            raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         plans = self._plans.setdefault(scene, {})
         if method not in plans:
             plans[method] = plan(scene, method)
@@ -221,8 +230,8 @@ class Renderer:
             self._passes.clear()
             self._present = None
             self._gpu.drain()
-        if self._gpu.owned:
-            self._gpu.gl.release()
+        if self._abandoned is not None:
+            self._abandoned()
 
     def _require_open(self) -> None:
         if self._closed:

@@ -109,10 +109,9 @@ def _paths(scene: Scene, size: tuple[int, int], sheets: Sequence[float | None]) 
 
 
 def _sheet_paths(scene: Scene, size: tuple[int, int], body: Object, hits: Hits, metres: float) -> Array:
-    """(k,): path in metres through the sheet at each hit, by the normals of its vertices."""
+    """(k,): path in metres through the sheet at each hit, by the normal of its face."""
     _, directions = scene.camera.rays(size)
-    corners = body.mesh.vertex_normals[body.mesh.faces[hits.face]]
-    normals = np.einsum("ki,kij->kj", hits.barycentric, corners) @ np.linalg.inv(body.matrix[:3, :3])
+    normals = body.mesh.face_normals[hits.face] @ np.linalg.inv(body.matrix[:3, :3])
     length = np.linalg.norm(normals, axis=1)
     normals /= np.where(length > 0, length, 1.0)[:, None]
     # The normals look to the side from which the faces are counter-clockwise: towards the viewer at a front face.
