@@ -11,10 +11,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from translucent import reference
+from translucent.albedo import scattering_medium
+from translucent.appearance import average_color, medium_for_average_color
 from translucent.camera import Camera
+from translucent.conversion import (
+    DistanceMatch,
+    clamp_colors,
+    color_at_distance,
+    condition_number,
+    distance_for_color,
+    extinction_from_colors,
+)
 from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
+from translucent.fitting import Fit, fit_medium, fit_wedge
 from translucent.frame import Frame
 from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.materials import text_block
+from translucent.materials.gltf import read_materials
+from translucent.materials.gltf_write import write_medium
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.metrics import Errors, compare, interior
@@ -31,8 +45,10 @@ __all__ = [
     "BackFaceDepth",
     "Camera",
     "DirectionalLight",
+    "DistanceMatch",
     "Environment",
     "Errors",
+    "Fit",
     "Frame",
     "InputError",
     "Medium",
@@ -48,14 +64,27 @@ __all__ = [
     "ThinLayer",
     "TranslucentError",
     "TranslucentWarning",
+    "average_color",
+    "clamp_colors",
+    "color_at_distance",
     "compare",
+    "condition_number",
+    "distance_for_color",
+    "extinction_from_colors",
+    "fit_medium",
+    "fit_wedge",
     "interior",
     "load_mesh",
+    "medium_for_average_color",
     "plan",
     "preset",
     "presets",
+    "read_materials",
     "reference",
+    "scattering_medium",
     "showcase",
+    "text_block",
+    "write_medium",
 ]
 
 

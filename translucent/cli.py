@@ -12,6 +12,7 @@ import click
 from translucent.commands.doctor import doctor
 from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
+from translucent.commands.material import material
 from translucent.commands.presets import presets
 from translucent.commands.render import render
 from translucent.errors import InputError, TranslucentError
@@ -56,7 +57,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, explain, extinction, presets, doctor):
+for command in (render, explain, extinction, presets, material, doctor):
     cli.add_command(command)
 
 

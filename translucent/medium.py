@@ -7,12 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
+from translucent import conversion, optics
 from translucent.color import parse_color
 from translucent.errors import InputError
 
 Array = npt.NDArray[np.float64]
 Channels = npt.ArrayLike
+
+#: Largest absorption and scattering in 1/m: far beyond any matter, and their products with lengths stay finite.
+MAX_COEFFICIENT = 1e300
+
+#: Largest emission in radiance per metre: its product with a length stays within float32.
+MAX_EMISSION = 1e18
+
+#: Largest index of refraction; germanium in the infrared has 4.
+MAX_IOR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +58,8 @@ class Medium:
             object.__setattr__(self, field, _channels(field, getattr(self, field)))
         if not -1 < self.anisotropy < 1:
             raise InputError(f"medium anisotropy {self.anisotropy}", "not between -1 and 1", "give for example 0.8")
-        if not 1 <= self.ior < np.inf:
-            raise InputError(f"medium ior {self.ior}", "below 1 or not finite", "give for example 1.5 for glass")
+        if not 1 <= self.ior <= MAX_IOR:
+            raise InputError(f"medium ior {self.ior}", f"not in 1 to {MAX_IOR:g}", "give for example 1.5 for glass")
 
     @classmethod
     def from_color(cls, color: str | npt.ArrayLike, distance: float, ior: float = 1.0) -> Medium:
@@ -59,7 +68,7 @@ class Medium:
         Parameters
         ----------
         color : str or array_like (3,)
-            Transmitted colour: hex and names are sRGB, bare triples linear; each channel in 0 < t_c <= 1.
+            Transmitted color: hex and names are sRGB, bare triples linear; each channel in 0 < t_c <= 1.
         distance : float
             In metres, > 0. Infinity leaves white light white, as an absent glTF attenuationDistance does.
         ior : float
@@ -88,7 +97,7 @@ class Medium:
             raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
         with np.errstate(over="ignore", under="ignore"):
             extinction = optics.extinction_from_color(triple, metres)
-        if not np.isfinite(extinction).all():
+        if not (extinction <= MAX_COEFFICIENT).all():
             raise InputError(f"distance {metres:g} m", "so short that the extinction overflows", "check the unit")
         return cls(absorption=extinction, ior=ior)
 
@@ -99,9 +108,26 @@ class Medium:
 
     def transmittance(self, distance: npt.ArrayLike) -> Array:
         """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
-        with np.errstate(under="ignore"):
+        with np.errstate(under="ignore", invalid="ignore", over="ignore"):
             optical_depth = np.asarray(distance, dtype=np.float64)[..., None] * self.extinction
-        return optics.transmittance(optical_depth)
+        # Without extinction even an infinite way, 0 times infinity, loses nothing.
+        return optics.transmittance(np.where(self.extinction == 0, 0.0, optical_depth))
+
+    @property
+    def mean_free_path(self) -> Array:
+        """(3,): 1 / sigma_t in m, after which 1/e is left; inf where there is no extinction."""
+        return conversion.mean_free_path(self.extinction)
+
+    @property
+    def half_value_thickness(self) -> Array:
+        """(3,): ln 2 / sigma_t in m, after which half is left; inf where there is no extinction."""
+        return conversion.half_value_thickness(self.extinction)
+
+    def _repr_html_(self) -> str:
+        """Swatches of white light after 0.1 to 10 times the 1/e distance, for notebooks."""
+        from translucent.swatches import html_strip
+
+        return html_strip(self.extinction)
 
     @property
     def emits(self) -> bool:
@@ -129,6 +155,9 @@ def _channels(field: str, value: Channels) -> Array:
         triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,)).copy()
     except (TypeError, ValueError):
         raise InputError(f"medium {field} {value!r}", "not one or three numbers", "give (r, g, b)") from None
+    limit = MAX_EMISSION if field == "emission" else MAX_COEFFICIENT
+    if (triple > limit).any() and np.isfinite(triple).all():
+        raise InputError(f"medium {field} {tuple(triple.tolist())}", f"above {limit:g}", "check the unit")
     if not (np.isfinite(triple).all() and (triple >= 0).all()):
         raise InputError(
             f"medium {field} {tuple(triple.tolist())}", "negative or not finite", "give values of 0 and above"

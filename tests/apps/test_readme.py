@@ -41,7 +41,10 @@ def test_all_verbs_are_shown() -> None:
 
 
 def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+    import trimesh
+
     monkeypatch.chdir(tmp_path)
+    trimesh.creation.icosphere(subdivisions=1).export("model.glb")
     for command in cli.commands.values():
         assert command.epilog is not None
         example = command.epilog.removeprefix("Example: translucent ")

@@ -13,6 +13,7 @@ PACKAGE = Path(tl.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 VALUES = sorted(set(PACKAGE.glob("*.py")) - {PACKAGE / name for name in ("cli.py", "doctor.py", "__main__.py")})
 VALUES += sorted((PACKAGE / "reference").glob("*.py"))
+VALUES += sorted((PACKAGE / "materials").glob("*.py"))
 GPU = {"moderngl", "glcontext", "OpenGL"}
 
 

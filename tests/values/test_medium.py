@@ -123,7 +123,7 @@ def test_no_medium_has_such_a_color(color: Any, distance: Any, message: str) -> 
         ({"anisotropy": 1.0}, "medium anisotropy 1.0; not between -1 and 1"),
         ({"anisotropy": -1.0}, "medium anisotropy -1.0"),
         ({"anisotropy": NAN}, "medium anisotropy nan"),
-        ({"ior": 0.9}, "medium ior 0.9; below 1 or not finite"),
+        ({"ior": 0.9}, "medium ior 0.9; not in 1 to 100"),
         ({"ior": INF}, "medium ior inf"),
         ({"ior": NAN}, "medium ior nan"),
     ],
@@ -167,3 +167,20 @@ def test_emits_and_scatters_look_at_every_channel() -> None:
     assert (Medium().emits, Medium().scatters) == (False, False)
     assert Medium(emission=(0, 0, 1e-9)).emits
     assert Medium(scattering=(0, 0, 1e-9)).scatters
+
+
+def test_an_infinite_way_through_nothing_loses_nothing() -> None:
+    assert Medium(absorption=(0.0, 1.0, 2.0)).transmittance(np.inf).tolist() == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"absorption": 1e301}, "medium absorption .* above 1e\\+300"),
+        ({"emission": 1e19}, "medium emission .* above 1e\\+18"),
+        ({"ior": 1e3}, "medium ior 1000.0; not in 1 to 100"),
+    ],
+)
+def test_what_no_float32_could_carry_is_refused(values: dict[str, float], message: str) -> None:
+    with pytest.raises(tl.InputError, match=message):
+        Medium(**values)

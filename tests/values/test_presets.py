@@ -363,7 +363,7 @@ def test_an_entry_is_read() -> None:
         ("[1, 2.0, 3.0]", "[1, nan, 3]", "media.toml, [ink]; medium absorption (1000.0, nan, 3000.0); negative or not"),
         ("0.8, 0.0", "1.0, 0.0", "[ink]; anisotropy = [1.0, 0.0, 0.4]; give between -1 and 1"),
         ('"mm"', '"furlong"', "media.toml, [ink]; unit 'furlong'; not a known unit"),
-        ("1.33", "0.9", "media.toml, [ink]; medium ior 0.9; below 1"),
+        ("1.33", "0.9", "media.toml, [ink]; medium ior 0.9; not in 1 to 100"),
         ("1.33", '"1.33"', "media.toml, [ink]; ior = '1.33'; give a number"),
         ("[ink]", "[Ink]", "media.toml, [Ink]; not a name in lower_snake_case"),
         ("[ink]", "ink = 3\n[other]", "media.toml, [ink]; not a table"),

@@ -1,48 +1,174 @@
-"""``translucent extinction``: from a color at a distance to extinction."""
+"""``translucent extinction``: from colors at distances to extinction, one by one, by the table, or fitted."""
 
 from __future__ import annotations
 
 import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from translucent.commands.common import common_options, triple_text
+from translucent.errors import InputError, TranslucentError
+
+if TYPE_CHECKING:
+    from translucent.fitting import Fit
+
+TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", "usd", "css", "json")
 
 
 @click.command(epilog="Example: translucent extinction '#7b1e3a' 1cm")
-@click.argument("color")
-@click.argument("distance")
+@click.argument("color", required=False)
+@click.argument("distance", required=False)
+@click.option("--unit", default="m", show_default=True, help="Unit of distances that name none.")
+@click.option("--unit-out", default="m", show_default=True, metavar="U", help="Give the extinction per this unit, too.")
+@click.option("--clamp", is_flag=True, help="Take channels below 1e-4 for 1e-4, instead of refusing 0.")
+@click.option("--as", "target", type=click.Choice(TARGETS), help="Print the material for an engine, to paste.")
+@click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
+@click.option("--fit", type=click.Path(path_type=Path), metavar="FILE", help="Fit to rows of distance,color[,weight].")
 @common_options
-def extinction(color: str, distance: str, as_json: bool) -> None:
-    """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance."""
-    import numpy as np
+@click.pass_context
+def extinction(
+    context: click.Context,
+    color: str | None,
+    distance: str | None,
+    unit: str,
+    unit_out: str,
+    clamp: bool,
+    target: str | None,
+    batch: Path | None,
+    output: Path | None,
+    fit: Path | None,
+    as_json: bool,
+) -> None:
+    """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance.
 
-    from translucent.color import parse_color, to_hex
+    COLOR is '#7b1e3a', teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
+    """
+    from translucent.units import metres_per_unit
+
+    metres_per_unit(unit_out)
+    _check_usage({"--batch": batch, "--fit": fit, "COLOR": color}, {"--json": as_json or None, "--as": target})
+    if output is not None and batch is None:
+        raise InputError(f"-o {output}", "only --batch writes a file", "leave it out")
+    if batch is not None:
+        if target is not None:
+            raise InputError(f"--as {target}", "it takes one color, not --batch", "leave one of them out")
+        return _batch(batch, output, unit, unit_out, clamp)
+    if fit is not None:
+        if clamp:
+            raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
+        return _fit(fit, unit, unit_out, target, as_json)
+    for name, value in zip(("COLOR", "DISTANCE"), (color, distance), strict=True):
+        if value is None:
+            raise click.MissingParameter(ctx=context, param_hint=f"'{name}'", param_type="argument")
+    return _one(str(color), str(distance), unit, unit_out, clamp, target, as_json)
+
+
+def _check_usage(*groups: dict[str, object]) -> None:
+    for group in groups:
+        given = [name for name, value in group.items() if value is not None]
+        if len(given) > 1:
+            raise InputError(f"{given[1]} with {given[0]}", "each asks for something else", "give one of them")
+
+
+def _one(color: str, distance: str, unit: str, unit_out: str, clamp: bool, target: str | None, as_json: bool) -> None:
+    from translucent.color import parse_color
+    from translucent.conversion import CLAMP, clamp_colors, summary
     from translucent.medium import Medium
     from translucent.units import parse_length
 
-    metres = parse_length(distance)
-    medium = Medium.from_color(color, metres)
-    factors = (0.1, 0.5, 1.0, 2.0, 10.0)
-    colors = medium.transmittance(np.array(factors) * metres)
-    with np.errstate(divide="ignore"):
-        free_path = 1.0 / medium.extinction
-    if as_json:
-        click.echo(
-            json.dumps(
-                {
-                    "color": parse_color(color).tolist(),
-                    "distance": metres,
-                    "extinction": medium.extinction.tolist(),
-                    "mean_free_path": [value if np.isfinite(value) else None for value in free_path.tolist()],
-                    "transmittance": {f"{factor:g}": row.tolist() for factor, row in zip(factors, colors, strict=True)},
-                }
-            )
-        )
+    metres = parse_length(distance, unit)
+    clamped, changed = clamp_colors(parse_color(color))
+    medium = Medium.from_color(clamped if clamp else color, metres)
+    told = summary(clamped if clamp else parse_color(color), metres, medium.extinction, unit_out)
+    if clamp and changed.any():
+        told["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
+    _tell(told, medium, target, as_json)
+
+
+def _tell(told: dict[str, Any], medium: Any, target: str | None, as_json: bool) -> None:
+    import numpy as np
+
+    if target is not None:
+        from translucent.materials import text_block
+
+        for line in told["warnings"]:
+            click.echo(f"warning: {line}", err=True)
+        click.echo(text_block(target, medium, np.array(told["color"]), told["distance"]))
         return
-    linear = parse_color(color)
-    click.echo(f"color           {triple_text(linear)} linear, {to_hex(linear)} sRGB, after {metres:g} m")
-    click.echo(f"extinction      {triple_text(medium.extinction)} 1/m")
-    click.echo(f"mean free path  {triple_text(free_path)} m")
-    for factor, row in zip(factors, colors, strict=True):
-        click.echo(f"after {factor * metres:<9.4g} m {triple_text(row)} linear, {to_hex(row)}")
+    click.echo(json.dumps(told) if as_json else _report(told))
+
+
+def _report(told: dict[str, Any]) -> str:
+    from translucent.color import to_hex
+    from translucent.swatches import terminal_strip
+
+    distance, colors = told["distance"], told["transmittance"]
+    lines = [
+        f"color           {triple_text(told['color'])} linear, {to_hex(told['color'])} sRGB, after {distance:g} m",
+        f"extinction      {triple_text(told['extinction'])} 1/m",
+    ]
+    if told["unit"] != "m":
+        lines.append(f"                {triple_text(told['extinction_per_unit'])} 1/{told['unit']}")
+    lines += [
+        f"mean free path  {triple_text(_infinite(told['mean_free_path']))} m",
+        f"half-value      {triple_text(_infinite(told['half_value_thickness']))} m",
+        f"                light has the color at {distance:g} m, 1/e (37 %) at a mean free path, half at a half-value",
+    ]
+    if sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb":
+        lines.append(f"swatches        {terminal_strip(list(colors.values()))}")
+    for factor, row in colors.items():
+        lines.append(f"after {float(factor) * distance:<9.4g} m {triple_text(row)} linear, {to_hex(row)}")
+    return "\n".join([*lines, *(f"warning         {line}" for line in told["warnings"])])
+
+
+def _infinite(values: list[float | None]) -> list[float]:
+    return [float("inf") if value is None else value for value in values]
+
+
+def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bool) -> None:
+    from translucent.batch import check_batch_output, convert_table
+
+    if output is not None:
+        check_batch_output(output)
+    done = convert_table(table, unit, unit_out, clamp)
+    if output is None:
+        click.echo(done.to_json(), nl=False)
+    else:
+        done.write(output)
+    for line in done.errors:
+        click.echo(f"error: {line}", err=True)
+    if done.errors:
+        total = len(done.errors) + len(done.records)
+        raise TranslucentError(
+            f"{len(done.errors)} of {total} rows failed", f"the others are in {output or 'the output'}"
+        )
+
+
+def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: bool) -> None:
+    import numpy as np
+
+    from translucent.conversion import summary
+    from translucent.fitting import fit_wedge
+
+    fit = fit_wedge(table, unit)
+    distance = float(np.median(fit.distances))
+    told = summary(fit.medium.transmittance(distance), distance, fit.medium.extinction, unit_out)
+    told["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
+    error = None if fit.standard_error is None else fit.standard_error.tolist()
+    told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
+    _tell(told, fit.medium, target, as_json)
+    if not as_json and target is None:
+        click.echo(_fit_report(fit))
+
+
+def _fit_report(fit: Fit) -> str:
+    error = "unknown with one sample" if fit.standard_error is None else f"{triple_text(fit.standard_error)} 1/m"
+    lines = [f"standard error  {error}", f"residuals of {len(fit.distances)} samples, log(color / fit):"]
+    for distance, residual in zip(fit.distances, fit.residuals, strict=True):
+        lines.append(f"at {distance:<12.4g} m {triple_text(residual)}")
+    return "\n".join(lines)

@@ -1,0 +1,384 @@
+"""glTF files written: what was there stays, what is written is read back, and the Khronos validator accepts it."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import json
+import math
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import translucent as tl
+from translucent.materials.color_distance import BLACKEST
+from translucent.materials.gltf import materials_of, read_materials
+from translucent.materials.gltf_file import GltfFile, read_gltf, write_gltf
+from translucent.materials.gltf_scene import material_uses
+from translucent.materials.gltf_write import write_medium
+
+JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02, ior=1.5)
+
+Json = dict[str, Any]
+
+
+def gltf(*materials: Json, **more: Any) -> Json:
+    return {"asset": {"version": "2.0"}, "materials": list(materials), **more}
+
+
+def saved(path: Path, tree: Json) -> Path:
+    path.write_text(json.dumps(tree), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def two_boxes(tmp_path: Path) -> Path:
+    """Two meshes and three nodes that share one material; a second material is used by nobody."""
+    positions = np.array(trimesh.creation.box((1, 2, 3)).triangles.reshape(-1, 3), dtype="<f4")
+    data = positions.tobytes()
+    primitive = {"attributes": {"POSITION": 0}, "material": 0}
+    tree = gltf(
+        {"name": "Glass", "doubleSided": True, "emissiveFactor": [0, 0.5, 0], "extras": {"kept": [1, 2]}},
+        {"name": "Unused", "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 0.5}}},
+        extensionsUsed=["KHR_materials_clearcoat"],
+        scene=0,
+        scenes=[{"nodes": [0, 1, 2]}],
+        nodes=[
+            {"name": "Left", "mesh": 0, "translation": [1, 2, 3]},
+            {"name": "Right", "mesh": 0},
+            {"name": "Other", "mesh": 1},
+        ],
+        meshes=[{"name": "Box", "primitives": [primitive]}, {"name": "Box2", "primitives": [dict(primitive)]}],
+        accessors=[
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": len(positions),
+                "type": "VEC3",
+                "min": positions.min(axis=0).tolist(),
+                "max": positions.max(axis=0).tolist(),
+            }
+        ],
+        bufferViews=[{"buffer": 0, "byteLength": len(data), "target": 34962}],
+        buffers=[{"byteLength": len(data)}],
+    )
+    path = tmp_path / "boxes.glb"
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    # An unknown chunk at the end has to survive, too.
+    chunks = struct.pack("<II", len(data), 0x004E4942) + data + struct.pack("<II4s", 4, 0x12345678, b"more")
+    header = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(chunks))
+    path.write_bytes(header + struct.pack("<II", len(text), 0x4E4F534A) + text + chunks)
+    return path
+
+
+# Files
+
+
+def test_a_file_written_as_it_was_read_is_the_same(two_boxes: Path, tmp_path: Path) -> None:
+    file = read_gltf(two_boxes)
+    write_gltf(file, tmp_path / "again.glb")
+    again = read_gltf(tmp_path / "again.glb")
+    assert (again.tree, again.chunks) == (file.tree, file.chunks)
+    assert file.chunks.endswith(b"more")
+
+
+def test_the_containers_turn_into_each_other(two_boxes: Path, tmp_path: Path) -> None:
+    glb = read_gltf(two_boxes)
+    write_gltf(glb, tmp_path / "boxes.gltf")
+    text = read_gltf(tmp_path / "boxes.gltf")
+    assert text.chunks == b""
+    assert text.resource(text.tree["buffers"][0]) == glb.resource(glb.tree["buffers"][0])
+    write_gltf(text, tmp_path / "back.glb")
+    back = read_gltf(tmp_path / "back.glb")
+    assert back.tree == glb.tree
+    assert back.resource(back.tree["buffers"][0]) == glb.resource(glb.tree["buffers"][0])
+
+
+def test_links_hold_from_another_folder(tmp_path: Path) -> None:
+    (tmp_path / "in" / "a b").mkdir(parents=True)
+    (tmp_path / "in" / "a b" / "mesh.bin").write_bytes(b"1234")
+    tree = gltf({}, buffers=[{"uri": "a%20b/mesh.bin", "byteLength": 4}])
+    (tmp_path / "out").mkdir()
+    write_gltf(read_gltf(saved(tmp_path / "in" / "m.gltf", tree)), tmp_path / "out" / "m.gltf")
+    moved = read_gltf(tmp_path / "out" / "m.gltf")
+    assert moved.tree["buffers"][0]["uri"] == "../in/a%20b/mesh.bin"
+    assert moved.resource(moved.tree["buffers"][0]) == b"1234"
+
+
+def test_what_a_glb_should_not_hold_is_refused(tmp_path: Path) -> None:
+    uri = "data:application/octet-stream;base64," + base64.b64encode(b"1234").decode()
+    tree = gltf({}, buffers=[{"uri": uri, "byteLength": 4}] * 2)
+    with pytest.raises(tl.InputError, match="several buffers"):
+        write_gltf(GltfFile(tmp_path / "a.gltf", tree), tmp_path / "a.glb")
+    assert not list(tmp_path.iterdir())
+
+
+def test_broken_files_are_refused_in_one_line(two_boxes: Path, tmp_path: Path) -> None:
+    whole = two_boxes.read_bytes()
+    cases = {
+        "cut.glb": (whole[:-10], "cut short"),
+        "head.glb": (whole[:14], "cut short"),
+        "json.glb": (whole.replace(b'"asset":', b'"asset";', 1), "its JSON is broken"),
+        "old.glb": (whole[:4] + b"\1\0\0\0" + whole[8:], "GLB version 1"),
+        "kind.glb": (whole[:16] + b"BIN\0" + whole[20:], "first chunk is not JSON"),
+        "nan.gltf": (b'{"asset": {}, "materials": [{"a": NaN}]}', "NaN is no JSON number"),
+        "long.gltf": (b'{"asset": {}, "a": 1' + b"0" * 999 + b"}", "whole number is too long"),
+        "huge.gltf": (b'{"asset": {}, "a": 1e999}', "beyond the range"),
+        "deep.gltf": (b"[" * 100000, "its JSON is broken"),
+        "bytes.gltf": (b"\xff\xfe\xff", "its JSON is broken"),
+        "list.gltf": (b"[]", "no asset"),
+        "materials.gltf": (b'{"asset": {}, "materials": 3}', "materials is not a list"),
+        "empty.gltf": (b"", "its JSON is broken"),
+        "model.obj": (b"v 0 0 0", "suffix '.obj'"),
+    }
+    for name, (content, message) in cases.items():
+        path = tmp_path / name
+        path.write_bytes(content)
+        with pytest.raises(tl.InputError) as caught:
+            read_materials(path)
+        assert message in str(caught.value)
+        assert name in str(caught.value)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(tl.InputError, match="no such file"):
+        read_materials(tmp_path / "missing.glb")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"meshes": 3}, "meshes is not a list"),
+        ({"meshes": [{}]}, "no list of primitives"),
+        ({"meshes": [{"primitives": [{}]}]}, "no attributes"),
+        ({"meshes": [{"primitives": [{"attributes": {}, "material": []}]}]}, "materials \\[\\] is not one of 2"),
+        ({"meshes": [{"primitives": [{"attributes": {}, "material": 0}]}]}, "accessors None is not one of 1"),
+        ({"meshes": [{"primitives": [{"attributes": {}, "extensions": 3}]}]}, "KHR_materials_variants is malformed"),
+        ({"accessors": [{"max": [1, 2, 3]}]}, "positions without min and max"),
+        ({"extensionsUsed": 3}, "extensionsUsed is 3"),
+        ({"meshes": []}, "it has no mesh"),
+    ],
+)
+def test_a_malformed_scene_is_refused(two_boxes: Path, tmp_path: Path, change: Json, message: str) -> None:
+    file = read_gltf(two_boxes)
+    write_gltf(GltfFile(file.path, {**file.tree, **change}, file.chunks), tmp_path / "bad.glb")
+    with pytest.raises(tl.InputError, match=message):
+        write_medium(tmp_path / "bad.glb", tmp_path / "out.glb", JADE)
+    assert not (tmp_path / "out.glb").exists()
+
+
+# Writing
+
+
+def test_a_written_medium_is_read_back(two_boxes: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    assert write_medium(two_boxes, out, JADE, distance=0.02, thickness=0.5) == [0]
+    (found, unused) = read_materials(out)
+    assert found.attenuation_color == (0.18, 0.62, 0.35)
+    assert (found.attenuation_distance, found.thickness, found.ior) == (0.02, 0.5, 1.5)
+    assert found.warnings == unused.warnings == ()
+    np.testing.assert_allclose(found.medium().extinction, JADE.extinction, rtol=1e-14)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("distance", [None, 1e-9, 1.0, 1e9])
+def test_every_extinction_is_read_back(two_boxes: Path, tmp_path: Path, scale: float, distance: float | None) -> None:
+    medium = tl.Medium(absorption=np.array([0.0, 0.1, 3.0]) * scale, ior=1.25)
+    write_medium(two_boxes, tmp_path / "out.glb", medium, distance=distance)
+    found = read_materials(tmp_path / "out.glb")[0]
+    assert min(found.attenuation_color) >= BLACKEST
+    # A color near white, of a distance far below the mean free path, has few digits left of the extinction.
+    tolerance = max(1e-14, 1e-15 / (3.0 * scale * found.attenuation_distance))
+    np.testing.assert_allclose(found.medium().extinction, medium.extinction, atol=3 * scale * tolerance * 4)
+
+
+def test_a_clear_medium_has_no_distance(two_boxes: Path, tmp_path: Path) -> None:
+    write_medium(two_boxes, tmp_path / "out.glb", tl.Medium(ior=1.3))
+    entry = read_gltf(tmp_path / "out.glb").tree["materials"][0]["extensions"]
+    assert entry["KHR_materials_volume"] == {"thicknessFactor": 1.0}
+    assert read_materials(tmp_path / "out.glb")[0].medium() == tl.Medium(ior=1.3)
+
+
+def test_everything_else_stays(two_boxes: Path, tmp_path: Path) -> None:
+    write_medium(two_boxes, tmp_path / "out.glb", JADE)
+    before, after = read_gltf(two_boxes), read_gltf(tmp_path / "out.glb")
+    assert after.chunks == before.chunks
+    expected = copy.deepcopy(before.tree)
+    material = expected["materials"][0]
+    material["extensions"] = after.tree["materials"][0]["extensions"]
+    material["pbrMetallicRoughness"] = {"metallicFactor": 0}
+    del material["doubleSided"]
+    expected["extensionsUsed"] += ["KHR_materials_transmission", "KHR_materials_volume", "KHR_materials_ior"]
+    assert after.tree == expected
+
+
+@pytest.mark.parametrize(("name", "nodes", "materials"), [("Left", 1, [2]), ("Other", 1, [2]), ("Box", 2, [2])])
+def test_only_the_named_object_is_changed(
+    two_boxes: Path, tmp_path: Path, name: str, nodes: int, materials: list[int]
+) -> None:
+    out = tmp_path / "out.glb"
+    assert write_medium(two_boxes, out, JADE, object_name=name) == materials
+    before, after = read_gltf(two_boxes), read_gltf(out)
+    assert after.tree["materials"][:2] == before.tree["materials"]
+    assert after.tree["materials"][2]["name"] == f"Glass ({name})"
+    found = materials_of(after)
+    filled = [use.name for use in material_uses(after) if found[use.material].medium() is not None]
+    assert len(filled) == nodes
+    assert filled == (["Left", "Right"] if name == "Box" else [name])
+    assert after.chunks == before.chunks
+
+
+def test_a_material_of_its_own_is_not_duplicated(two_boxes: Path, tmp_path: Path) -> None:
+    write_medium(two_boxes, tmp_path / "1.glb", JADE, object_name="Other")
+    again = tl.Medium.from_color((0.5, 0.5, 0.5), 1.0, ior=1.2)
+    assert write_medium(tmp_path / "1.glb", tmp_path / "1.glb", again, object_name="Other") == [2]
+    found = read_materials(tmp_path / "1.glb")
+    assert len(found) == 3
+    np.testing.assert_allclose(found[2].medium().extinction, again.extinction, rtol=1e-14)
+    assert read_gltf(tmp_path / "1.glb").tree["extensionsUsed"].count("KHR_materials_volume") == 1
+
+
+def test_the_thickness_is_kept_given_or_that_of_the_box(two_boxes: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    for given, expected in ((None, 1.0), (0.25, 0.25), (None, 0.25)):
+        write_medium(two_boxes if not out.exists() else out, out, JADE, thickness=given)
+        assert read_materials(out)[0].thickness == expected
+
+
+def test_the_index_of_refraction_can_stay(two_boxes: Path, tmp_path: Path) -> None:
+    write_medium(two_boxes, tmp_path / "a.glb", tl.Medium(absorption=1.0, ior=1.1))
+    write_medium(tmp_path / "a.glb", tmp_path / "a.glb", tl.Medium(absorption=2.0), keep_ior=True)
+    medium = read_materials(tmp_path / "a.glb")[0].medium()
+    assert medium.ior == 1.1
+    np.testing.assert_allclose(medium.extinction, 2.0, rtol=1e-14)
+
+
+def test_a_mesh_without_a_material_gets_one(two_boxes: Path, tmp_path: Path) -> None:
+    file = read_gltf(two_boxes)
+    tree = copy.deepcopy(file.tree)
+    del tree["materials"]
+    for mesh in tree["meshes"]:
+        del mesh["primitives"][0]["material"]
+    write_gltf(GltfFile(file.path, tree, file.chunks), tmp_path / "bare.glb")
+    assert write_medium(tmp_path / "bare.glb", tmp_path / "out.glb", JADE) == [0]
+    assert {use.material for use in material_uses(read_gltf(tmp_path / "out.glb"))} == {0}
+
+
+def test_what_gltf_cannot_hold_is_a_warning(two_boxes: Path, tmp_path: Path) -> None:
+    milk = tl.Medium(absorption=1.0, scattering=2.0)
+    with pytest.warns(tl.TranslucentWarning, match="scattering is written as extinction"):
+        write_medium(two_boxes, tmp_path / "out.glb", milk)
+    np.testing.assert_allclose(read_materials(tmp_path / "out.glb")[0].medium().extinction, 3.0, rtol=1e-14)
+
+
+def test_a_bad_request_writes_nothing(two_boxes: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    out.write_bytes(b"precious")
+    unlit = read_gltf(two_boxes)
+    unlit.tree["materials"][0]["extensions"] = {"KHR_materials_unlit": {}}
+    write_gltf(unlit, tmp_path / "unlit.glb")
+    before = sorted(tmp_path.iterdir())
+    for model, options, message in (
+        (two_boxes, {"object_name": "Nobody"}, "object 'Nobody'.*use one of Left, Other, Right"),
+        (two_boxes, {"thickness": 0.0}, "thickness 0.0; not above 0"),
+        (two_boxes, {"thickness": math.inf}, "not above 0 and finite"),
+        (two_boxes, {"distance": -1.0}, "distance -1.0; not above 0"),
+        (tmp_path / "unlit.glb", {}, "KHR_materials_unlit excludes a volume"),
+        (tmp_path / "missing.glb", {}, "no such file"),
+    ):
+        with pytest.raises(tl.InputError, match=message):
+            write_medium(model, out, JADE, **options)
+    assert out.read_bytes() == b"precious"
+    assert sorted(tmp_path.iterdir()) == before
+    for name, message in (("out.obj", "suffix '.obj'"), ("none/out.glb", "no folder")):
+        with pytest.raises(tl.InputError, match=message):
+            write_medium(two_boxes, tmp_path / name, JADE)
+
+
+def test_a_failure_while_writing_leaves_the_old_file(
+    two_boxes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out.glb"
+    out.write_bytes(b"precious")
+
+    def full(path: Path, content: bytes) -> int:
+        with path.open("wb") as half:
+            half.write(content[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(tl.RenderError, match="No space left"):
+        write_medium(two_boxes, out, JADE)
+    assert out.read_bytes() == b"precious"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["boxes.glb", "out.glb"]
+
+
+# The Khronos validator
+
+SCRIPT = """
+const v = require(process.argv[1]), fs = require('fs'), path = require('path');
+const file = process.argv[2];
+const external = uri => Promise.resolve(new Uint8Array(fs.readFileSync(path.join(path.dirname(file), uri))));
+v.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction: external})
+  .then(r => console.log(JSON.stringify(r.issues)));
+"""
+
+
+@pytest.fixture(scope="session")
+def validate() -> Any:
+    """Issues that gltf-validator finds; the module is looked for from the working folder, and by NODE_PATH."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is absent, so gltf-validator cannot run")
+    where = subprocess.run(
+        [node, "-p", "require.resolve('gltf-validator')"], capture_output=True, text=True, check=False
+    )
+    if where.returncode:
+        pytest.skip("the node module gltf-validator is absent: npm install gltf-validator, and set NODE_PATH")
+
+    def _validate(path: Path) -> Json:
+        done = subprocess.run(
+            [node, "-e", SCRIPT, where.stdout.strip(), str(path)], capture_output=True, text=True, check=True
+        )
+        issues = json.loads(done.stdout)
+        assert isinstance(issues, dict)
+        return issues
+
+    return _validate
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+@pytest.mark.parametrize("name", [None, "Left"])
+def test_the_validator_accepts_what_is_written(
+    validate: Any, two_boxes: Path, tmp_path: Path, suffix: str, name: str | None
+) -> None:
+    out = tmp_path / f"out{suffix}"
+    write_medium(two_boxes, out, JADE, object_name=name)
+    before, after = validate(two_boxes), validate(out)
+    # The fixture's unknown chunk, which only a .glb can hold, is a warning before and after.
+    assert before["numErrors"] == after["numErrors"] == 0, after
+    assert after["numWarnings"] == (before["numWarnings"] if suffix == ".glb" else 0), after
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+@pytest.mark.parametrize("name", ["R4_Block_2.0", "R3_Block_Row", None])
+def test_the_validator_accepts_a_third_party_file_that_is_changed(
+    validate: Any, assets: Path, tmp_path: Path, suffix: str, name: str | None
+) -> None:
+    source, out = assets / "gltf" / "AttenuationTest.glb", tmp_path / f"out{suffix}"
+    before = validate(source)
+    assert (before["numErrors"], before["numWarnings"]) == (0, 0)
+    changed = write_medium(source, out, JADE, object_name=name, thickness=1.0)
+    after = validate(out)
+    assert (after["numErrors"], after["numWarnings"]) == (0, 0), after
+    found = read_materials(out)
+    for index in changed:
+        np.testing.assert_allclose(found[index].medium().extinction, JADE.extinction, rtol=1e-13)
+    if name is not None:
+        # The blocks that share the material of R4_Block_2.0 keep it.
+        assert found[:18] == read_materials(source)[:18] if name.startswith("R4") else changed == [6]

@@ -1,0 +1,115 @@
+"""Color at a distance to extinction for whole tables of materials; a bad row does not stop the others."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from translucent.conversion import CLAMP, clamp_colors, summary
+from translucent.errors import InputError
+from translucent.frame import write_atomically
+from translucent.medium import Medium
+from translucent.tables import Row, check_cells, read_table
+from translucent.units import metres_per_unit
+
+_TRIPLES = ("color", "extinction", "mean_free_path", "half_value_thickness", "condition_number", "extinction_per_unit")
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What became of a table.
+
+    Attributes
+    ----------
+    records : list of dict
+        Per good row its name, and what `conversion.summary` says.
+    errors : list of str
+        Per bad row its place and what is wrong.
+    """
+
+    records: list[dict[str, Any]]
+    errors: list[str]
+
+    def write(self, path: Path) -> None:
+        """Write the records to a ``.json`` or ``.csv`` file, which appears complete or not at all."""
+        check_batch_output(path)
+        text = self.to_csv() if path.suffix.lower() == ".csv" else self.to_json()
+
+        def fill(temporary: Path) -> None:
+            temporary.write_text(text, encoding="utf-8", newline="")
+
+        write_atomically(path, fill)
+
+    def to_json(self) -> str:
+        """The records as a JSON list, one record per line; null stands for infinity."""
+        return "[\n" + ",\n".join(json.dumps(record) for record in self.records) + "\n]\n"
+
+    def to_csv(self) -> str:
+        """The records as CSV: triples in columns ``_r``, ``_g``, ``_b``, warnings joined by `` | ``."""
+        columns = ["name", "distance", "unit", *(f"{name}_{c}" for name in _TRIPLES for c in "rgb"), "warnings"]
+        stream = io.StringIO(newline="")
+        writer = csv.DictWriter(stream, columns, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        for record in self.records:
+            triples = {
+                f"{name}_{c}": "inf" if value is None else repr(value)
+                for name in _TRIPLES
+                for c, value in zip("rgb", record[name], strict=True)
+            }
+            writer.writerow({**record, **triples, "warnings": " | ".join(record["warnings"])})
+        return stream.getvalue()
+
+
+def convert_table(path: str | Path, unit: str = "m", unit_out: str = "m", clamp: bool = False) -> Batch:
+    """Convert every row of a table.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV with the columns ``name``, ``color``, ``distance`` and, if lengths name none, ``unit``; or a JSON list of
+        objects with these keys, in which a color may also be a linear triple.
+    unit : str
+        Of distances for which neither they nor their row name one.
+    unit_out : str
+        The records also hold the extinction per this unit.
+    clamp : bool
+        Whether channels of 0 become 1e-4; a record's warnings say where it happened.
+
+    Raises
+    ------
+    InputError
+        If the table as a whole cannot be used.
+    """
+    metres_per_unit(unit), metres_per_unit(unit_out)
+    records: list[dict[str, Any]] = []
+    errors: list[str] = []
+    for row in read_table(path, needs=[("name",), ("color",), ("distance",)]):
+        try:
+            records.append(_record(row, unit, unit_out, clamp))
+        except InputError as error:
+            errors.append(f"{row.place}: {error}")
+    return Batch(records, errors)
+
+
+def check_batch_output(path: Path) -> None:
+    """Raise before any work is done where a table could not be written to `path`."""
+    if path.suffix.lower() not in (".json", ".csv"):
+        raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .json or .csv")
+    if not path.parent.is_dir():
+        raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
+
+
+def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> dict[str, Any]:
+    check_cells(row)
+    name, color = str(row.need("name")), row.color()
+    distance = row.length("distance", str(row.cells.get("unit", unit)))
+    clamped, changed = clamp_colors(color) if clamp else (color, None)
+    medium = Medium.from_color(clamped, distance)
+    told = summary(clamped, distance, medium.extinction, unit_out)
+    if changed is not None and changed.any():
+        told["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
+    return {"name": name, **told}

@@ -1,0 +1,95 @@
+"""``translucent material``: the volume materials of a glTF file, shown and replaced."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from translucent.commands.common import common_options, medium_options, read_medium, triple_text
+from translucent.errors import InputError
+
+if TYPE_CHECKING:
+    from translucent.materials.gltf import GltfMaterial
+
+
+@click.group(epilog="Example: translucent material show model.glb")
+def material() -> None:
+    """Show or replace the materials of a glTF file that light passes."""
+
+
+@material.command(epilog="Example: translucent material show model.glb")
+@click.argument("model")
+@common_options
+def show(model: str, as_json: bool) -> None:
+    """List the materials of MODEL, a .glb or .gltf file, with the volume that each of them states."""
+    from translucent.materials.gltf import read_materials
+
+    found = read_materials(model)
+    if as_json:
+        click.echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
+        return
+    click.echo(f"{model}: {len(found)} material{'' if len(found) == 1 else 's'}")
+    for entry in found:
+        _describe(entry)
+
+
+def _describe(entry: GltfMaterial) -> None:
+    medium = entry.medium()
+    kind = "opaque" if not entry.transmits else "thin wall" if medium is None else "volume"
+    click.echo(f"{entry.index} {entry.name!r}: {kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
+    if entry.has_volume:
+        texture = f" times texture {entry.thickness_texture}" if entry.has_thickness_texture else ""
+        click.echo(f"  thickness   {entry.thickness:10.5g}{texture} (mesh space)")
+        click.echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
+    if medium is not None:
+        click.echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
+    if entry.dispersion:
+        click.echo(f"  dispersion  {entry.dispersion:10.5g}")
+    if any(entry.emissive):
+        click.echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
+    for warning in entry.warnings:
+        click.echo(f"  warning: {warning}")
+
+
+@material.command(
+    epilog="Example: translucent material apply model.glb --color '#7b1e3a' --distance 1cm --object Wine -o out.glb"
+)
+@click.argument("model")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="A .glb or .gltf file.")
+@medium_options
+@click.option("--object", "object_name", metavar="NAME", help="Only the objects of this name. Default: all.")
+@click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
+@common_options
+def apply(
+    model: str,
+    output: Path,
+    color: str | None,
+    distance: str | None,
+    preset_name: str | None,
+    object_name: str | None,
+    thickness: str | None,
+    as_json: bool,
+) -> None:
+    """Write a medium into MODEL's materials; a color leaves them their index of refraction, a preset brings its own."""
+    from translucent.materials.gltf_write import write_medium
+    from translucent.units import parse_length
+
+    medium = read_medium(color, distance, preset_name)
+    if medium is None:
+        raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
+    changed = write_medium(
+        model,
+        output,
+        medium,
+        distance=None if distance is None else parse_length(distance),
+        object_name=object_name,
+        thickness=None if thickness is None else parse_length(thickness),
+        keep_ior=preset_name is None,
+    )
+    if as_json:
+        click.echo(json.dumps({"output": str(output), "materials": changed}))
+        return
+    click.echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")

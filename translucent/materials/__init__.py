@@ -1,0 +1,91 @@
+"""Media in the terms of other systems: one file per target, each with its formula, its source and what it loses.
+
+`TARGETS` names the systems that `text_block` writes for. Reading and writing whole glTF files:
+`translucent.materials.gltf` and `translucent.materials.gltf_write`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.materials.blender import blender_snippet
+from translucent.materials.css import css_text
+from translucent.materials.json_text import write_json
+from translucent.materials.openpbr import write_openpbr
+from translucent.materials.standard_surface import write_standard_surface
+from translucent.materials.unity import unity_text
+from translucent.materials.unreal import unreal_text
+from translucent.materials.usd import usda_text
+from translucent.medium import Medium
+
+__all__ = ["TARGETS", "text_block"]
+
+#: Largest difference between the color that is given and that of the medium: a channel that was raised from black.
+_SAME_COLOR = 1e-3
+
+
+def _gltf_text(medium: Medium, distance: float) -> str:
+    from translucent.materials.gltf_write import volume_extensions
+
+    extensions = volume_extensions(medium, distance, thickness=distance, ior=medium.ior)
+    return json.dumps({"extensions": extensions}, indent=2) + "\n"
+
+
+_WRITERS: dict[str, Callable[[Medium, float], str]] = {
+    "gltf": _gltf_text,
+    "openpbr": write_openpbr,
+    "standard_surface": write_standard_surface,
+    "blender": lambda medium, _: blender_snippet(medium),
+    "unreal": unreal_text,
+    "unity": unity_text,
+    "usd": usda_text,
+    "css": lambda medium, distance: css_text(medium, medium.transmittance(distance), distance),
+    "json": lambda medium, _: write_json(medium),
+}
+
+#: Names of the systems that a medium can be written for.
+TARGETS: tuple[str, ...] = tuple(_WRITERS)
+
+
+def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: float) -> str:
+    """A copy-ready block of text that holds the medium in the terms of another system.
+
+    Parameters
+    ----------
+    target : str
+        One of `TARGETS`; case, ``-`` and spaces do not matter.
+    medium : Medium
+    color : array_like (3,)
+        Linear color that white light has after `distance` of the medium: a check that the three belong together.
+    distance : float
+        In metres, > 0 and finite: where the block states the color, and glTF's thickness. Shorter where the color there
+        would be too dark to be stored; the medium is the same.
+
+    Returns
+    -------
+    str
+        Lines, the last without a line break.
+
+    Raises
+    ------
+    InputError
+        If the target is unknown, the distance is not positive and finite, or the color is not that of the medium.
+    """
+    writer = _WRITERS.get(target.lower().replace("-", "_").replace(" ", "_"))
+    if writer is None:
+        raise InputError(f"target {target!r}", "not a known target", f"use one of {', '.join(TARGETS)}")
+    if not 0 < distance < np.inf:
+        raise InputError(f"distance {distance!r}", "not above 0 and finite", "give it in metres, for example 0.02")
+    given, own = np.asarray(color, dtype=np.float64), medium.transmittance(distance)
+    if given.shape != (3,) or not (np.abs(given - own) <= _SAME_COLOR).all():
+        raise InputError(
+            f"color {given.tolist()} after {distance:g} m",
+            f"the medium has {tuple(own.round(4).tolist())} there",
+            "give medium.transmittance(distance)",
+        )
+    return writer(medium, distance).rstrip("\n")

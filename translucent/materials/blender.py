@@ -1,0 +1,113 @@
+"""Blender's volume nodes: Volume Absorption and Principled Volume.
+
+Their colors are **not** colors at a distance. Volume Absorption has sigma_a = (1 - Color) Density, which is not
+-ln(Color) Density: with Color 0.5 and Density 1 it lets exp(-0.5) = 0.61 pass after one unit, not 0.5. So a color that
+is picked for a distance must be converted, as here.
+
+Formulas, per unit of the scene (a metre unless the scene's unit scale says otherwise):
+Volume Absorption: sigma_a = (1 - Color) Density.
+Principled Volume: sigma_s = Color Density; sigma_a = (1 - Color) (1 - sqrt(Absorption Color)) Density; q = Emission
+Strength times Emission Color; Anisotropy = g.
+Inverted: Density is the largest channel of sigma_a (absorption) or of sigma_t (principled), the smallest for which all
+colors are in 0..1. Colors are linear, as sockets store them.
+Source: Blender manual, Volume Absorption, Principled Volume and "Volume Coefficients".
+
+Not carried over: index of refraction, which belongs to a surface shader; heterogeneous density.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.medium import Medium
+
+Array = npt.NDArray[np.float64]
+
+
+def absorption_node(medium: Medium) -> tuple[Array, float]:
+    """Color (3,) and Density in 1/m of a Volume Absorption node with the absorption of the medium."""
+    sigma = np.asarray(medium.absorption)
+    density = float(sigma.max())
+    return (1.0 - sigma / density if density > 0 else np.ones(3)), density
+
+
+def from_absorption_node(color: npt.ArrayLike, density: float) -> Medium:
+    """Medium of a Volume Absorption node; raises `InputError` outside 0 <= Color <= 1 and Density >= 0."""
+    return Medium(absorption=(1.0 - _color("Color", color)) * _density(density))
+
+
+def principled_node(medium: Medium) -> tuple[Array, Array, float]:
+    """Color (3,), Absorption Color (3,) and Density in 1/m of a Principled Volume node for the medium."""
+    density = float(medium.extinction.max())
+    if density == 0:
+        return np.zeros(3), np.ones(3), 0.0
+    scattering, absorption = np.asarray(medium.scattering), np.asarray(medium.absorption)
+    left = density - scattering
+    # A channel that scatters all that it takes has no absorption, whatever its absorption color.
+    share = np.where(left > 0, absorption / np.where(left > 0, left, 1.0), 0.0)
+    return scattering / density, (1.0 - np.minimum(share, 1.0)) ** 2, density
+
+
+def from_principled_node(
+    color: npt.ArrayLike, absorption_color: npt.ArrayLike, density: float, anisotropy: float = 0.0
+) -> Medium:
+    """Medium of a Principled Volume node without emission; raises `InputError` where a value is out of its range."""
+    scatter, absorb = _color("Color", color), _color("Absorption Color", absorption_color)
+    return Medium(
+        absorption=(1.0 - scatter) * (1.0 - np.sqrt(absorb)) * _density(density),
+        scattering=scatter * density,
+        anisotropy=anisotropy,
+    )
+
+
+def _color(socket: str, value: npt.ArrayLike) -> Array:
+    triple = np.asarray(value, dtype=np.float64)
+    if triple.shape != (3,) or not ((triple >= 0).all() and (triple <= 1).all()):
+        raise InputError(f"Blender {socket} {value!r}", "not three numbers in 0..1", "give the linear color")
+    return triple
+
+
+def _density(value: float) -> float:
+    if not 0 <= value < np.inf:
+        raise InputError(f"Blender Density {value!r}", "negative or not finite", "give the node's density")
+    return float(value)
+
+
+def blender_snippet(medium: Medium, name: str = "translucent") -> str:
+    """Python for Blender's text editor that makes a material with this volume; scene unit: metre."""
+    if medium.scatters or medium.emits:
+        color, absorption, density = principled_node(medium)
+        emission = np.asarray(medium.emission)
+        strength = float(emission.max())
+        node = "ShaderNodeVolumePrincipled"
+        sockets = {
+            "Color": _rgba(color),
+            "Absorption Color": _rgba(absorption),
+            "Density": repr(density),
+            "Anisotropy": repr(float(medium.anisotropy)),
+            "Emission Strength": repr(strength),
+            "Emission Color": _rgba(emission / strength if strength > 0 else np.ones(3)),
+        }
+    else:
+        color, density = absorption_node(medium)
+        node, sockets = "ShaderNodeVolumeAbsorption", {"Color": _rgba(color), "Density": repr(density)}
+    lines = [
+        "# Blender's volume colors are no colors at a distance: sigma_a = (1 - Color) * Density, per metre.",
+        "import bpy",
+        "",
+        f"material = bpy.data.materials.new({name!r})",
+        "material.use_nodes = True",
+        "nodes, links = material.node_tree.nodes, material.node_tree.links",
+        "nodes.clear()",
+        'output = nodes.new("ShaderNodeOutputMaterial")',
+        f'volume = nodes.new("{node}")',
+        *(f'volume.inputs["{socket}"].default_value = {value}' for socket, value in sockets.items()),
+        'links.new(volume.outputs["Volume"], output.inputs["Volume"])',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _rgba(color: Array) -> str:
+    return f"({', '.join(repr(channel) for channel in [*color.tolist(), 1.0])})"

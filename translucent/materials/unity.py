@@ -1,0 +1,35 @@
+"""Unity's High Definition Render Pipeline: transmittance color at an absorption distance, of the Lit shader.
+
+Formula: sigma_t = -ln(color) / distance, as here; the distance is in metres. Properties of the shader:
+_TransmittanceColor, _ATDistance, _Ior. Unity's color properties are sRGB-encoded; the shader gets them linear.
+Source: Unity HDRP documentation, Lit shader, Transparency Inputs.
+
+Not carried over: scattering (its extinction is written), anisotropy, emission; thickness is the shader's own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.color import linear_to_srgb, srgb_to_linear
+from translucent.materials.color_distance import color_at, extinction_at
+from translucent.medium import Medium
+
+
+def from_unity(color: npt.ArrayLike, distance: float, ior: float = 1.5) -> Medium:
+    """Medium of a transmittance color (sRGB-encoded, 0..1, as Unity stores it) at a distance in metres."""
+    return Medium(absorption=extinction_at(srgb_to_linear(color), distance), ior=ior)
+
+
+def unity_text(medium: Medium, distance: float | None = None) -> str:
+    """C# that sets the properties on a ``material``; the color is stated at `distance` in metres, see `color_at`."""
+    color, metres = color_at(medium, distance)
+    red, green, blue = np.clip(linear_to_srgb(color), 0.0, 1.0)
+    return (
+        f'material.SetColor("_TransmittanceColor", new Color({red:.9g}f, {green:.9g}f, {blue:.9g}f)); // sRGB\n'
+        f'material.SetFloat("_ATDistance", {metres if math.isfinite(metres) else 1.0:.9g}f); // metres\n'
+        f'material.SetFloat("_Ior", {medium.ior:.9g}f);\n'
+    )

@@ -1,0 +1,59 @@
+"""Unreal Engine's Substrate: mean free path in centimeters, or transmittance at a thickness.
+
+Formula: MFP = 1 / sigma_t, and for a transmittance T (seen along the normal) at a thickness t: MFP = -t / ln(T).
+The node Transmittance-To-MeanFreePath takes T and t in **centimeters** (0.01 by default) and gives the MFP of a slab.
+Source: Unreal Engine documentation, Substrate Transmittance-To-MeanFreePath.
+
+Not carried over: scattering as such (a slab derives it from its diffuse albedo), emission of the volume. A channel
+without extinction has an infinite mean free path; the text shows `LONGEST_CM` there, as engines take finite numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.materials.color_distance import color_at
+from translucent.medium import Medium
+
+Array = npt.NDArray[np.float64]
+
+CENTIMETERS_PER_METRE = 100.0
+#: Mean free path in cm that the text gives to a channel without extinction: 10 km.
+LONGEST_CM = 1e6
+
+
+def mean_free_path_cm(medium: Medium) -> Array:
+    """(3,): mean free path in cm; infinite where there is no extinction."""
+    extinction = medium.extinction
+    safe = np.where(extinction > 0, extinction, 1.0)
+    return np.where(extinction > 0, CENTIMETERS_PER_METRE / safe, math.inf)
+
+
+def from_mean_free_path_cm(mean_free_path: npt.ArrayLike) -> Medium:
+    """Absorbing medium of a mean free path (3,) in cm, > 0; infinity is no extinction."""
+    path = np.asarray(mean_free_path, dtype=np.float64)
+    if path.shape != (3,) or not (path > 0).all():
+        raise InputError(f"mean free path {mean_free_path!r}", "not three lengths above 0", "give them in cm")
+    return Medium(absorption=CENTIMETERS_PER_METRE / path)
+
+
+def unreal_text(medium: Medium, distance: float | None = None) -> str:
+    """Inputs of the Substrate nodes; the color is stated at `distance` in metres, see `color_at`."""
+    color, metres = color_at(medium, distance)
+    thickness = CENTIMETERS_PER_METRE * metres if math.isfinite(metres) else 1.0
+    path = np.minimum(mean_free_path_cm(medium), LONGEST_CM)
+    return (
+        "Substrate Transmittance-To-MeanFreePath\n"
+        f"  Transmittance Color (linear) = {_triple(color)}\n"
+        f"  Thickness (cm)               = {thickness:.9g}\n"
+        "or Substrate Slab BSDF\n"
+        f"  SSS MFP (cm)                 = {_triple(path)}\n"
+    )
+
+
+def _triple(values: Array) -> str:
+    return f"({', '.join(f'{value:.9g}' for value in values)})"
