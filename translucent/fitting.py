@@ -47,6 +47,10 @@ class Fit:
     weights: Array
     clipped: tuple[str, ...]
 
+    def _repr_html_(self) -> str:
+        """Swatches of the fitted medium, for notebooks."""
+        return self.medium._repr_html_()
+
 
 def fit_medium(
     distances: npt.ArrayLike,

@@ -86,6 +86,10 @@ class Preset:
     channel_anisotropy: Triple = (0.0, 0.0, 0.0)
     reduced: bool = False
 
+    def _repr_html_(self) -> str:
+        """Name and swatches, for notebooks."""
+        return f"<div>{self.name} ({self.kind})</div>{self.medium._repr_html_()}"
+
     @property
     def absorption(self) -> Array:
         """(3,): sigma_a in 1/m."""

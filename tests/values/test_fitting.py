@@ -124,3 +124,8 @@ def test_a_bad_wedge_is_refused_with_its_line(tmp_path: Path, text: str, message
     (tmp_path / "wedge.csv").write_text(text)
     with pytest.raises(tl.InputError, match=message):
         fit_wedge(tmp_path / "wedge.csv")
+
+
+def test_a_notebook_shows_the_fit() -> None:
+    fit = fit_medium([0.01, 0.02], [(0.5, 0.4, 0.3), (0.25, 0.16, 0.09)])
+    assert fit._repr_html_() == fit.medium._repr_html_()

@@ -395,3 +395,9 @@ def test_an_entry_with_a_color_that_is_wrong_is_named(old: str, new: str, messag
     assert old in COLOR_ENTRY
     with pytest.raises(tl.InputError, match=re.escape(message)):
         read_presets(COLOR_ENTRY.replace(old, new, 1))
+
+
+def test_a_notebook_shows_swatches() -> None:
+    shown = tl.preset("merlot")._repr_html_()
+    assert "merlot (measured)" in shown
+    assert shown.count("background:#") == 5
