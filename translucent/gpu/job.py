@@ -88,6 +88,16 @@ class FrameJob:
             self._cleared.add(name)
         return framebuffer
 
+    def begin_adding(self, target: str) -> None:
+        """Set the state in which every face adds to an accumulator.
+
+        No depth test and no culling: all faces count, and order cannot matter to a sum.
+        """
+        self.accumulator(target).use()
+        self.gl.enable_only(moderngl.BLEND)
+        self.gl.blend_equation = moderngl.FUNC_ADD
+        self.gl.blend_func = moderngl.ONE, moderngl.ONE
+
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state; front faces are those where a ray enters."""
         for i in objects:

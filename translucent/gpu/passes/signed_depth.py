@@ -22,10 +22,5 @@ class SignedDepthPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies."""
-        gl = job.gl
-        job.accumulator(spec.target).use()
-        # No depth test and no culling: every face counts. Order cannot matter to a sum.
-        gl.enable_only(moderngl.BLEND)
-        gl.blend_equation = moderngl.FUNC_ADD
-        gl.blend_func = moderngl.ONE, moderngl.ONE
+        job.begin_adding(spec.target)
         job.draw(self._programs[job.plan.spectral], spec.objects)

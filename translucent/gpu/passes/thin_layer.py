@@ -25,9 +25,5 @@ class ThinLayerPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the sheets."""
-        gl = job.gl
-        job.accumulator(spec.target).use()
-        gl.enable_only(moderngl.BLEND)
-        gl.blend_equation = moderngl.FUNC_ADD
-        gl.blend_func = moderngl.ONE, moderngl.ONE
+        job.begin_adding(spec.target)
         job.draw(self._programs[job.plan.spectral], spec.objects)
