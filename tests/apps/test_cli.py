@@ -445,3 +445,23 @@ def test_without_opengl_doctor_prints_one_json_object(run: Run, no_opengl: None)
     result = run("doctor", "--json")
     assert result.code == 1
     assert strict_json(result.out)["backend"] is None
+
+
+def test_a_body_too_large_for_its_medium_is_said_to_be_black(run: Run, tmp_path: Path) -> None:
+    """A model in millimetres taken for metres is the usual reason, and its picture shows nothing of it."""
+    trimesh.creation.icosphere(subdivisions=2).export(tmp_path / "ball.stl")
+    command = [
+        "render",
+        str(tmp_path / "ball.stl"),
+        "-o",
+        str(tmp_path / "a.png"),
+        "--size",
+        "16x16",
+        "--preset",
+        "jade",
+    ]
+    result = run(*command)
+    assert result.code == 0
+    assert result.err.startswith("warning: only 0.")
+    assert "check --unit, or take a longer --distance" in result.err
+    assert run(*command, "--unit", "cm").err == ""

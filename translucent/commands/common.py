@@ -12,11 +12,15 @@ from translucent.errors import InputError
 
 if TYPE_CHECKING:
     from translucent.camera import Camera
+    from translucent.frame import Frame
     from translucent.lights import Environment
     from translucent.medium import Medium
     from translucent.mesh import Mesh
     from translucent.scene import Scene
     from translucent.thickness import Method
+
+#: Below this mean share of light a picture shows little but black.
+NEARLY_BLACK = 0.02
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -156,3 +160,15 @@ def medium_text(scene: Scene) -> str:
     seen = to_hex(body.medium.transmittance(reach)) if body.medium is not None else ""
     sigma = body.medium.extinction if body.medium is not None else ()
     return f"extinction {', '.join(f'{value:.4g}' for value in sigma)} 1/m: white light is {seen} after {reach:.3g} m"
+
+
+def warn_if_black(frame: Frame) -> None:
+    """Say so where hardly any light passes: most often the file's unit is not what it was taken for."""
+    seen = frame.coverage & frame.valid
+    if seen.any() and (passed := float(frame.transmittance[seen].mean())) < NEARLY_BLACK:
+        metres = float(frame.summary()["thickness"]["median"])
+        click.echo(
+            f"warning: only {passed:.2%} of the light passes, at a median thickness of {metres:.3g} m; "
+            "check --unit, or take a longer --distance",
+            err=True,
+        )

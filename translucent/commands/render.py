@@ -18,6 +18,7 @@ from translucent.commands.common import (
     read_method,
     read_size,
     unit_option,
+    warn_if_black,
 )
 
 
@@ -71,6 +72,7 @@ def render(
     with Renderer(backend) as renderer:
         frame = renderer.render(scene, pixels, method, samples)
     frame.save(output)
+    warn_if_black(frame)
     if as_json:
         click.echo(json.dumps({"output": str(output), "medium": medium_text(scene), **frame.summary()}))
         return
