@@ -456,7 +456,7 @@ def test_a_body_too_large_for_its_medium_is_said_to_be_black(run: Run, tmp_path:
         "-o",
         str(tmp_path / "a.png"),
         "--size",
-        "16x16",
+        "160x160",
         "--preset",
         "jade",
     ]
