@@ -25,6 +25,7 @@ from translucent.conversion import (
 from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
 from translucent.fitting import Fit, fit_medium, fit_wedge
 from translucent.frame import Frame
+from translucent.gltf.load import load_scene
 from translucent.lights import DirectionalLight, Environment, PointLight
 from translucent.materials import text_block
 from translucent.materials.gltf import read_materials
@@ -32,25 +33,29 @@ from translucent.materials.gltf_write import write_medium
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.metrics import Errors, compare, interior
-from translucent.plan import RenderPlan, plan
+from translucent.plan import plan
 from translucent.presets import Preset, preset, presets
+from translucent.render_plan import RenderPlan
 from translucent.scene import Object, Scene
 from translucent.showcase import showcase
-from translucent.thickness import BackFaceDepth, SignedDepth, ThinLayer
+from translucent.thickness import BackFaceDepth, DepthPeeling, FragmentLists, KBuffer, SignedDepth, ThinLayer
 
 if TYPE_CHECKING:
-    from translucent.gpu.renderer import Renderer
+    from translucent.renderer import Renderer
 
 __all__ = [
     "BackFaceDepth",
     "Camera",
+    "DepthPeeling",
     "DirectionalLight",
     "DistanceMatch",
     "Environment",
     "Errors",
     "Fit",
+    "FragmentLists",
     "Frame",
     "InputError",
+    "KBuffer",
     "Medium",
     "Mesh",
     "Object",
@@ -75,6 +80,7 @@ __all__ = [
     "fit_wedge",
     "interior",
     "load_mesh",
+    "load_scene",
     "medium_for_average_color",
     "plan",
     "preset",
@@ -95,7 +101,7 @@ def __getattr__(name: str) -> Any:
         return version("translucent-shading")
     # The values need no OpenGL, so importing them does not load it.
     if name == "Renderer":
-        from translucent.gpu.renderer import Renderer
+        from translucent.renderer import Renderer
 
         return Renderer
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

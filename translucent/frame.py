@@ -14,10 +14,13 @@ import numpy.typing as npt
 
 from translucent.color import linear_to_srgb
 from translucent.errors import InputError, RenderError
-from translucent.plan import RenderPlan
+from translucent.render_plan import RenderPlan
 
 #: The arrays of a frame, under the names that .npz files use.
 ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage", "valid")
+
+#: More of them, that frames of ordered methods have.
+LAYER_ARRAYS = ("layers", "truncated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,10 @@ class Frame:
         Time per pass, and ``total`` for the whole call.
     provenance : dict of str to str
         Backend, driver and versions.
+    layers : (h, w) int32, optional
+        Surfaces of media that the pixel's ray crosses; only of methods that find ordered intervals.
+    truncated : (h, w) int32, optional
+        How many of them the method had to leave out.
     """
 
     radiance: npt.NDArray[Any]
@@ -50,7 +57,9 @@ class Frame:
     valid: npt.NDArray[np.bool_]
     plan: RenderPlan
     seconds: Mapping[str, float] = field(default_factory=dict)
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    provenance: dict[str, str] = field(default_factory=dict)
+    layers: npt.NDArray[np.int32] | None = None
+    truncated: npt.NDArray[np.int32] | None = None
 
     def __repr__(self) -> str:
         covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())
@@ -102,7 +111,9 @@ class Frame:
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **{name: getattr(self, name) for name in ARRAYS})
+            arrays = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS)}
+            arrays = {name: array for name, array in arrays.items() if array is not None}
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
 
     def _write_exr(self, path: Path) -> None:
         import OpenEXR

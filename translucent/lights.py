@@ -38,6 +38,27 @@ class PointLight:
         object.__setattr__(self, "position", _vector("light position", self.position))
         object.__setattr__(self, "intensity", _positive("light intensity", self.intensity))
 
+    def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
+        """Irradiance I cos / r^2 on surfaces that nothing shadows, (..., 3) in W/m^2; at most 1e18, and 0 in the light.
+
+        Parameters
+        ----------
+        points : array_like (..., 3)
+            In metres.
+        normals : array_like (..., 3)
+            Unit vectors.
+        """
+        towards = np.asarray(self.position) - np.asarray(points, dtype=np.float64)
+        # In units of the largest coordinate no square overflows or vanishes.
+        reach = np.maximum(np.abs(towards).max(axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+        with np.errstate(over="ignore", under="ignore"):
+            scaled = towards / reach
+            length = np.linalg.norm(scaled, axis=-1, keepdims=True)
+            length = np.where(length > 0, length, 1.0)
+            cosine = np.maximum(np.sum(scaled * np.asarray(normals), axis=-1, keepdims=True) / length, 0.0)
+            irradiance = np.asarray(self.intensity) * cosine / (reach * length) / (reach * length)
+        return np.asarray(np.minimum(irradiance, MAX_RADIANCE))
+
 
 @dataclass(frozen=True, eq=False)
 class DirectionalLight:
@@ -62,6 +83,12 @@ class DirectionalLight:
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "irradiance", _positive("light irradiance", self.irradiance))
+
+    def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
+        """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3) in W/m^2, at any point."""
+        with np.errstate(under="ignore"):
+            cosine = np.maximum(-np.sum(np.asarray(normals) * np.asarray(self.direction), axis=-1, keepdims=True), 0.0)
+            return np.asarray(cosine * np.asarray(self.irradiance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +152,30 @@ class Environment:
             share = np.zeros(np.asarray(directions).shape[:-1])
         return self.first + (self.second - self.first) * share[..., None]
 
+    def irradiance_on(self, normals: npt.ArrayLike) -> Array:
+        """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3).
+
+        A backdrop fixed to the picture lights like the mean of its squares.
+        """
+        if self.kind == "gradient":
+            share = gradient_irradiance_share(normals)
+        else:
+            share = np.full(np.asarray(normals).shape[:-1], 0.5)
+        with np.errstate(under="ignore"):
+            return np.asarray(np.pi * (self.first + (self.second - self.first) * share[..., None]))
+
 
 def gradient_share(direction: npt.ArrayLike) -> Array:
     """Share of a gradient's top in direction (..., 3): (1 + y) / 2."""
     return np.asarray(0.5 + 0.5 * np.asarray(direction, dtype=np.float64)[..., 1])
+
+
+def gradient_irradiance_share(normal: npt.ArrayLike) -> Array:
+    """Share of a gradient's top in what a surface with unit normal (..., 3) receives.
+
+    The cosine-weighted mean of `gradient_share` over the hemisphere: the mean of y there is 2/3 of the normal's y.
+    """
+    return np.asarray(0.5 + np.asarray(normal, dtype=np.float64)[..., 1] / 3.0)
 
 
 def checkerboard_share(backdrop: npt.ArrayLike, tiles: npt.ArrayLike) -> Array:

@@ -11,14 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.camera import Camera
+from translucent.color import parse_color
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.lights import ColorLike, DirectionalLight, Environment, PointLight
 from translucent.medium import Medium
 from translucent.mesh import MAX_COORDINATE, Mesh
 
 Array = npt.NDArray[np.float64]
 Overlap = Literal["add", "union", "priority"]
 Light = PointLight | DirectionalLight
+
+#: What opaque objects reflect unless told otherwise: a light grey, as of clay.
+OPAQUE_COLOR = (0.6, 0.6, 0.6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +41,8 @@ class Object:
         With ``overlap="priority"`` the higher one displaces the lower.
     sheet_thickness : float, optional
         Declares the mesh a thin sheet of this thickness in metres, not the border of a solid.
+    color : str or array_like (3,)
+        What an opaque object diffusely reflects, 0 to 1: a color as text, or linear RGB.
     """
 
     mesh: Mesh
@@ -44,6 +50,7 @@ class Object:
     transform: npt.ArrayLike | None = None
     priority: int = 0
     sheet_thickness: float | None = None
+    color: ColorLike = OPAQUE_COLOR
 
     def __post_init__(self) -> None:
         _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
@@ -70,6 +77,7 @@ class Object:
                 "not above 0",
                 "give metres, for example 1e-3",
             )
+        object.__setattr__(self, "color", _reflectance(self.color, self.mesh.name))
 
     def __repr__(self) -> str:
         return f"Object({self.mesh!r}, {self.medium!r})"
@@ -119,7 +127,9 @@ class Scene:
     environment : Environment
         Default: white from everywhere.
     overlap : {"add", "union", "priority"}
-        What fills a place that several bodies claim: the mixture of all, each medium once, or the highest priority.
+        What fills a place that several bodies claim. ``add``: the mixture of all, and thickness counts each of them.
+        ``union``: each medium once, however many bodies bring it. ``priority``: the medium of the highest priority.
+        With the last two, thickness counts a place once.
     """
 
     objects: Sequence[Object]
@@ -152,6 +162,11 @@ class Scene:
         """Objects that are filled with a medium."""
         return tuple(body for body in self.objects if body.medium is not None)
 
+    @property
+    def opaque(self) -> tuple[Object, ...]:
+        """Objects that nothing is seen through."""
+        return tuple(item for item in self.objects if item.medium is None)
+
     @cached_property
     def bounds(self) -> Array:
         """(2, 3): smallest and largest world coordinates of all objects."""
@@ -162,6 +177,20 @@ class Scene:
     def diagonal(self) -> float:
         """Length of the diagonal of the bounds in metres."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def _reflectance(color: ColorLike, name: str) -> Array:
+    where = f"color of {name!r}"
+    try:
+        values = np.array(parse_color(color) if isinstance(color, str) else color, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        values = np.zeros(0)
+    if values.shape != (3,) or not ((values >= 0) & (values <= 1)).all():
+        raise InputError(f"{where} {color!r}", "not three numbers in 0 to 1", "give for example (0.6, 0.6, 0.6)")
+    values.setflags(write=False)
+    return values
 
 
 def _require_type(what: str, value: object, kinds: type | tuple[type, ...], do: str) -> None:

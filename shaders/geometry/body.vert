@@ -7,6 +7,9 @@ in vec3 offset;
 in vec3 normal;
 out vec3 world_normal;
 #endif
+#if WITH_POSITION
+out vec3 from_eye;  // world axes
+#endif
 
 // Metres along the camera's forward axis, from the body's anchor. All points of one pixel lie on one ray, so the ray's
 // length is this, times a factor of the pixel: one interpolated number carries the whole distance.
@@ -20,5 +23,8 @@ void main() {
     axial = dot(axis.xyz, offset) + axis.w;
 #if WITH_NORMAL
     world_normal = mat3(world_from_normal) * normal;
+#endif
+#if WITH_POSITION
+    from_eye = (eye_from_offset * vec4(offset, 1.0)).xyz;
 #endif
 }

@@ -6,6 +6,12 @@ float gradient_share(vec3 direction) {
     return 0.5 + 0.5 * direction.y;
 }
 
+// Share of a gradient's top in what a surface with a unit normal receives: the mean of y over its hemisphere, weighted by
+// the cosine, is 2/3 of the normal's.
+float gradient_irradiance_share(vec3 normal) {
+    return 0.5 + normal.y / 3.0;
+}
+
 // 1 in the second squares of a checkerboard, else 0. backdrop: right and down from the top left corner of the picture,
 // in heights of the picture.
 float checkerboard_share(vec2 backdrop, float tiles) {

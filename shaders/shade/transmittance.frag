@@ -3,13 +3,25 @@
 
 #include <View>
 #include <Shade>
+#include <Environment>
 #include "lib/optics.glsl"
 #include "lib/environment.glsl"
 #include "lib/ray.glsl"
 
+#if ORDERED
+uniform sampler2D ordered_depth;
+uniform sampler2D ordered_emitted;
+uniform sampler2D ordered_layers;
+#endif
+#if ACCUMULATED
 uniform sampler2D accumulated;
 #if SPECTRAL
 uniform sampler2D accumulated_path;
+#endif
+#endif
+#if OPAQUE
+uniform sampler2D opaque_place;
+uniform sampler2D opaque_radiance;
 #endif
 #if FALLBACK
 uniform sampler2D fallback;
@@ -45,7 +57,12 @@ Path read_path(sampler2D sums, ivec2 texel, float advance) {
 }
 #endif
 
-vec3 background(vec2 pixel, vec3 ray) {
+vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
+#if OPAQUE
+    if (texelFetch(opaque_place, texel, 0).r < NOTHING) {
+        return texelFetch(opaque_radiance, texel, 0).rgb;
+    }
+#endif
     float share = 0.0;
     if (environment_kind == ENVIRONMENT_GRADIENT) {
         share = gradient_share(normalize(ray));
@@ -61,12 +78,27 @@ void main() {
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
     float advance = length(ray);
 
+#if ACCUMULATED
 #if SPECTRAL
     Path path = read_path(accumulated, accumulated_path, texel, advance);
 #else
     Path path = read_path(accumulated, texel, advance);
 #endif
+#else
+    Path path = Path(0.0, vec3(0.0), 0.0);
+#endif
+    vec3 emitted = vec3(0.0);
+#if ORDERED
+    vec4 ordered = texelFetch(ordered_depth, texel, 0);
+    vec4 emitted_and_thickness = texelFetch(ordered_emitted, texel, 0);
+    // Sheets have no place in the order: they dim all of it.
+    emitted = emitted_and_thickness.rgb * transmittance(path.optical_depth);
+    path.optical_depth += ordered.rgb;
+    path.thickness += emitted_and_thickness.a;
+    bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= negative_tolerance;
+#else
     bool balanced = path.count >= expected_count.x && path.count <= expected_count.y;
+#endif
     // NaN fails every comparison, so this refuses it, too.
     bool valid = balanced && path.thickness >= -negative_tolerance && path.thickness < NOTHING;
     bool covered = path.thickness > coverage_floor || !valid;
@@ -80,15 +112,16 @@ void main() {
 #else
         path = Path(0.0, vec3(0.0), 0.0);
 #endif
+        emitted = vec3(0.0);
     }
     path.thickness = max(path.thickness, 0.0);
     path.optical_depth = max(path.optical_depth, vec3(0.0));
 
     vec3 through = transmittance(path.optical_depth);
-    vec3 radiance = background(pixel, ray) * through;
 #if EMISSION
-    radiance += emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
+    emitted = emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
 #endif
+    vec3 radiance = background(pixel, ray, texel) * through + emitted;
     out_radiance = vec4(radiance, 1.0);
     out_transmittance = vec4(through, 1.0);
 #if !AVERAGE

@@ -2,12 +2,18 @@
 
 #include <constants>
 #include <Body>
+#if OPAQUE
+#include "intervals/last_axial.glsl"
+#endif
 
 in float axial;
 
 layout(location = 0) out vec4 nearest_and_farthest;
 
 void main() {
-    float start = max(axial, axial_start);
-    nearest_and_farthest = gl_FrontFacing ? vec4(-start, -NOTHING, 0.0, 1.0) : vec4(-NOTHING, start, 0.0, 1.0);
+    float reached = max(axial, axial_start);
+#if OPAQUE
+    reached = min(reached, last_axial());
+#endif
+    nearest_and_farthest = gl_FrontFacing ? vec4(-reached, -NOTHING, 0.0, 1.0) : vec4(-NOTHING, reached, 0.0, 1.0);
 }

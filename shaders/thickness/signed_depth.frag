@@ -2,6 +2,9 @@
 // The sum is the path inside the body; a count that does not balance betrays a hole or a flipped face.
 
 #include <Body>
+#if OPAQUE
+#include "intervals/last_axial.glsl"
+#endif
 
 in float axial;
 
@@ -14,7 +17,11 @@ layout(location = 0) out vec2 path_and_count;
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
-    float signed_path = side * max(axial, axial_start);
+    float reached = max(axial, axial_start);
+#if OPAQUE
+    reached = min(reached, last_axial());
+#endif
+    float signed_path = side * reached;
 #if SPECTRAL
     optical_depth_and_count = vec4(signed_path * extinction.rgb, side * count_weight);
     path = signed_path;

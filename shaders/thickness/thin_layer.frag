@@ -4,6 +4,9 @@
 #include <View>
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
+#if OPAQUE
+#include "intervals/last_axial.glsl"
+#endif
 
 in float axial;
 in vec3 world_normal;
@@ -16,6 +19,10 @@ layout(location = 0) out vec2 path_and_count;
 #endif
 
 void main() {
+#if OPAQUE
+    // What lies on an opaque surface is seen, also where rounding puts it behind.
+    if (axial > last_axial() + sheet_tolerance) { discard; }
+#endif
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
     float advance = length(ray);

@@ -65,7 +65,7 @@ def test_a_compile_error_names_file_and_line(renderer: tl.Renderer, files: Path)
     (files / "main.frag").write_text(
         '#include "good.glsl"\n\n#include "bad.glsl"\nout vec4 c;\nvoid main() { c = vec4(oops); }\n'
     )
-    with renderer.gpu.current() as gl, pytest.raises(tl.RenderError) as caught:
+    with renderer.gpu.context.current() as gl, pytest.raises(tl.RenderError) as caught:
         build_program(gl, "full.vert", "main.frag")
     assert "shaders/bad.glsl:3" in str(caught.value)
     assert "shaders/main.frag:5" in str(caught.value)
@@ -73,7 +73,7 @@ def test_a_compile_error_names_file_and_line(renderer: tl.Renderer, files: Path)
 
 def test_unknown_uniforms_and_defines_are_errors(renderer: tl.Renderer, files: Path) -> None:
     (files / "main.frag").write_text("uniform float stops;\nout vec4 c;\nvoid main() { c = vec4(stops); }\n")
-    with renderer.gpu.current() as gl:
+    with renderer.gpu.context.current() as gl:
         program = build_program(gl, "full.vert", "main.frag")
         set_uniform(program, "stops", 1.0)
         with pytest.raises(tl.RenderError, match="uniform 'stop'; the program has only stops"):
@@ -94,13 +94,13 @@ def test_block_layout_is_what_the_driver_uses(renderer: tl.Renderer, block: Unif
     weight = 1.0
     for name, _, shape in block.fields:
         for index in np.ndindex(*shape):
-            weight = weight * 1.25 % 7 + 0.5
-            # GLSL indexes a matrix by column first.
-            place = "".join(f"[{i}]" for i in index[::-1])
+            weight = round(weight * 1.25 % 7 + 0.5, 6)
+            # GLSL indexes a matrix by column first, an array by element.
+            place = "".join(f"[{i}]" for i in (index[::-1] if shape == (4, 4) else index))
             terms.append(f"{weight!r} * float({name}{place})")
             expected += weight * float(np.asarray(values[name])[index])
     code = f"#version 330 core\n{block.glsl}out float total;\nvoid main() {{ total = {' + '.join(terms)}; }}\n"
-    with renderer.gpu.current() as gl:
+    with renderer.gpu.context.current() as gl:
         program = gl.program(vertex_shader=code, varyings=["total"])
         program[block.name].binding = block.binding
         uniforms, output = gl.buffer(block.pack(**values)), gl.buffer(reserve=4)

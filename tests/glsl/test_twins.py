@@ -84,6 +84,7 @@ ARGUMENTS = {
     "luminance": [_triples(UNIT)],
     "exposure_scale": [np.linspace(-12, 12, 49, dtype=np.float32)],
     "gradient_share": [_unit_vectors()],
+    "gradient_irradiance_share": [_unit_vectors()],
     "checkerboard_share": _backdrop_arguments(),
     "view_ray": _ray_arguments(),
 }
@@ -150,7 +151,7 @@ def test_function_equals_its_twin(renderer: tl.Renderer, library: str, name: str
     arguments = ARGUMENTS[name]
     path = next(p for p in shader_library() if p.stem == library)
     signature = signatures(path)[name]
-    with renderer.gpu.current() as gl:
+    with renderer.gpu.context.current() as gl:
         found = run_function(gl, f"lib/{library}.glsl", signature, *arguments).astype(np.float64)
     wide = [a.astype(np.float64) for a in arguments]
     if library == "optics" and signature.returns == "vec3":
@@ -171,7 +172,7 @@ def test_function_equals_its_twin(renderer: tl.Renderer, library: str, name: str
 def test_transmittance_underflows_to_exactly_zero_and_never_to_nan(renderer: tl.Renderer) -> None:
     path = next(p for p in shader_library() if p.stem == "optics")
     depths = np.array([[1e4, 1e30, np.inf], [0.0, 1e-12, 104.0]], np.float32)
-    with renderer.gpu.current() as gl:
+    with renderer.gpu.context.current() as gl:
         found = run_function(gl, "lib/optics.glsl", signatures(path)["transmittance"], depths)
     assert found[0].tolist() == [0.0, 0.0, 0.0]
     assert found[1, 0] == 1.0

@@ -22,14 +22,14 @@ NAMES = range(1, 4000)
 
 def _counter(renderer: tl.Renderer) -> Callable[[], dict[str, int]]:
     """Counts living OpenGL objects by asking the driver about every name, independent of any bookkeeping of ours."""
-    if renderer.gpu.backend == "osmesa":
+    if renderer.gpu.context.backend == "osmesa":
         pytest.skip("glIsTexture and its kin are reached through libGL, which OSMesa does without")
     library = ctypes.CDLL("libGL.so.1")
     for kind in KINDS:
         getattr(library, f"glIs{kind}").restype = ctypes.c_ubyte
 
     def count() -> dict[str, int]:
-        with renderer.gpu.current():
+        with renderer.gpu.context.current():
             return {kind: sum(getattr(library, f"glIs{kind}")(name) for name in NAMES) for kind in KINDS}
 
     return count
@@ -107,7 +107,7 @@ def test_contexts_nest() -> None:
     scene = _scene(Sphere().tessellate(24))
     with tl.Renderer() as one, tl.Renderer() as other:
         alone = one.render(scene, (40, 30))
-        with one.gpu.current() as gl:
+        with one.gpu.context.current() as gl:
             np.testing.assert_array_equal(other.render(scene, (40, 30)).thickness, alone.thickness)
             np.testing.assert_array_equal(one.render(scene, (40, 30)).thickness, alone.thickness)
             # Only with its own context current does this read what was written.
@@ -118,7 +118,7 @@ def test_contexts_nest() -> None:
 def test_an_adopted_context_stays_alive_and_is_used() -> None:
     with tl.Renderer() as owner:
         scene = _scene(Box().tessellate())
-        with owner.gpu.current() as gl:
+        with owner.gpu.context.current() as gl:
             with tl.Renderer(context=gl) as guest:
                 frame = guest.render(scene, (20, 10))
                 assert frame.provenance["backend"] == "adopted"

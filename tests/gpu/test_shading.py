@@ -306,10 +306,10 @@ def test_samples_average_transmittance_not_thickness(renderer: tl.Renderer) -> N
 
 def test_present_shows_the_picture_that_save_writes(renderer: tl.Renderer) -> None:
     scene = tl.showcase(BOX.tessellate(), size=SIZE)
-    with renderer.gpu.current() as gl:
+    with renderer.gpu.context.current() as gl:
         window = gl.framebuffer([gl.texture(SIZE, 4)])
     plan = renderer.draw(scene, window, exposure=0.5)
-    with renderer.gpu.current():
+    with renderer.gpu.context.current():
         shown = np.frombuffer(window.read(components=3, alignment=1), np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1]
     frame = renderer.render(scene, SIZE)
     assert plan is frame.plan

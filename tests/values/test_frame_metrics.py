@@ -16,7 +16,7 @@ from PIL import Image
 import translucent as tl
 from translucent.frame import ARRAYS, Frame, check_output, write_atomically
 from translucent.metrics import interior
-from translucent.plan import PassSpec, RenderPlan
+from translucent.render_plan import PassSpec, RenderPlan
 
 PLAN = RenderPlan(tl.SignedDepth(), (PassSpec("signed_depth", "a test", (0,), 1),))
 #: 2 rows of 3 pixels, all numbers different.

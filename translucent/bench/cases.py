@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from translucent.assets import mesh_path
 from translucent.mesh import Mesh, load_mesh
 from translucent.solids import Sphere, Torus
-from translucent.thickness import BackFaceDepth, Method, SignedDepth, ThinLayer
+from translucent.thickness import BackFaceDepth, DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth, ThinLayer
 
 
 @dataclass(frozen=True)
@@ -51,4 +51,8 @@ METHODS: dict[str, Method] = {
     "signed-depth from the camera": SignedDepth(anchored=False),
     "back-face-depth": BackFaceDepth(),
     "thin-layer": ThinLayer(),
+    "fragment-lists": FragmentLists(),
+    "depth-peeling": DepthPeeling(),
+    "depth-peeling, 8 layers": DepthPeeling(max_layers=8),
+    "k-buffer, 8": KBuffer(k=8),
 }

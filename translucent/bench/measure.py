@@ -15,8 +15,8 @@ from translucent.bench.cases import Case
 from translucent.camera import check_size
 from translucent.errors import TranslucentWarning
 from translucent.gpu.passes.depth_only import DepthOnlyPass
-from translucent.gpu.renderer import Renderer
 from translucent.metrics import compare, interior
+from translucent.renderer import Renderer
 from translucent.scene import Scene
 from translucent.showcase import showcase
 from translucent.solids import Sphere
@@ -55,7 +55,7 @@ def measure(
     with Renderer(backend) as renderer:
         for case in cases:
             scene = showcase(case.mesh(), size=size)
-            with renderer.gpu.current() as gl:
+            with renderer.gpu.context.current() as gl:
                 timings = _interleaved(_workloads(renderer, scene, size, methods), gl.finish, seconds)
             truth = reference.render(scene, size)
             inside = interior(reference.hit_counts(scene, size))
@@ -86,8 +86,8 @@ def host_overhead(renderer: Renderer, frames: int = 200) -> dict[str, float]:
     turn; the difference of the medians is the host's part.
     """
     scene, size = showcase(Sphere().tessellate(64), size=(64, 64)), (64, 64)
-    with renderer.gpu.current():
-        job = renderer.prepare(scene, size)
+    with renderer.gpu.context.current():
+        job = renderer.gpu.prepare(scene, size, renderer.plan(scene))
         whole, device = [], []
         for _ in range(frames):
             begin = time.perf_counter()
@@ -95,8 +95,8 @@ def host_overhead(renderer: Renderer, frames: int = 200) -> dict[str, float]:
             middle = time.perf_counter()
             job.place((0.0, 0.0))
             bound = time.perf_counter()
-            renderer.run(job)
-            renderer.read(job)
+            renderer.gpu.run(job)
+            renderer.gpu.read(job)
             whole.append(middle - begin)
             device.append(time.perf_counter() - bound)
         job.release()
@@ -108,8 +108,8 @@ def _workloads(
     renderer: Renderer, scene: Scene, size: tuple[int, int], methods: dict[str, Method]
 ) -> dict[str, Callable[[], None]]:
     """What is timed, by name; each draws with its own uniforms, prepared beforehand."""
-    gl = renderer.gpu.gl
-    floor_job = renderer.prepare(scene, size, SignedDepth())
+    gl = renderer.gpu.context.gl
+    floor_job = renderer.gpu.prepare(scene, size, renderer.plan(scene, SignedDepth()))
     floor_pass = DepthOnlyPass(gl)
 
     def depth_only() -> None:
@@ -119,15 +119,15 @@ def _workloads(
 
     workloads: dict[str, Callable[[], None]] = {"depth-only": depth_only}
     for name, method in methods.items():
-        job = renderer.prepare(scene, size, method)
+        job = renderer.gpu.prepare(scene, size, renderer.plan(scene, method))
 
         def thickness(job: Any = job) -> None:
             job.place((0.0, 0.0))
-            renderer.run(job, geometry_only=True)
+            renderer.gpu.run(job, geometry_only=True)
 
         def frame(job: Any = job) -> None:
             job.place((0.0, 0.0))
-            renderer.run(job)
+            renderer.gpu.run(job)
 
         workloads[f"{name}/thickness"] = thickness
         workloads[f"{name}/frame"] = frame

@@ -8,12 +8,23 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.buffers import MeshCache
-from translucent.gpu.layout import BODY, SHADE, VIEW
-from translucent.gpu.placement import MAX_SCENE_OPTICAL_DEPTH, Placement, depth_range, view_uniforms
-from translucent.gpu.shaders import CONSTANTS
+from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SHADE, VIEW
+from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.targets import Targets
-from translucent.plan import FALLBACK_SHEET, RenderPlan
+from translucent.gpu.uniforms import (
+    BodyRole,
+    View,
+    body_uniforms,
+    environment_uniforms,
+    light_uniforms,
+    media_uniforms,
+    shade_uniforms,
+    view_uniforms,
+)
+from translucent.plan import FALLBACK_SHEET
+from translucent.render_plan import RenderPlan
 from translucent.scene import Object, Scene
+from translucent.slots import medium_slots
 from translucent.thickness import SignedDepth, ThinLayer
 
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
@@ -46,39 +57,52 @@ class FrameJob:
         self.plan = plan
         self.targets = targets
         self.meshes = meshes
-        self.samples = 1
+        self.averaging = False
         self.started = time.perf_counter()
+        self.slots = medium_slots(scene)
         self._placements = [Placement.of(body, scene.camera) for body in scene.objects]
-        self._count_weights = _count_weights(scene)
+        self._media_range = AxialRange.of(scene.bodies, scene.camera)
+        self._opaque_range = AxialRange.of(scene.opaque, scene.camera) if scene.opaque else None
+        self._roles = self._body_roles()
         self._stride = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
         self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
         self._bodies = gl.buffer(reserve=self._stride * len(scene.objects))
-        self._shade = gl.buffer(self._shade_uniforms())
+        self._constant = {
+            SHADE: gl.buffer(
+                shade_uniforms(
+                    scene, self._expected_counts(), self._negative_tolerance(), _COVERAGE_FLOOR * scene.diagonal
+                )
+            ),
+            MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self._media_range)),
+            LIGHTS: gl.buffer(light_uniforms(scene)),
+            ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
+        }
         self._cleared: set[str] = set()
         self.place((0.0, 0.0))
 
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
-        camera, size = self.scene.camera, self.targets.size
-        depths = depth_range(self.scene) if with_depth else None
-        anchored = not (isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored)
-        limit = MAX_SCENE_OPTICAL_DEPTH / max(self.scene.diagonal, np.finfo(np.float64).tiny)
-        for i, placement in enumerate(self._placements):
-            record = placement.uniforms(
-                camera,
-                size,
-                shift,
-                anchored=anchored,
-                sheet_thickness=self._sheet_thickness(placement.body),
-                count_weight=self._count_weights[i],
-                max_extinction=limit,
-                depth_range=depths,
-            )
+        scene = self.scene
+        depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
+        view = View(scene.camera, self.targets.size, shift, depths)
+        for i, (placement, role) in enumerate(zip(self._placements, self._roles, strict=True)):
+            record = body_uniforms(placement, view, role, self._media_range, scene.diagonal)
             self._bodies.write(record, offset=i * self._stride)
-        self._view.write(view_uniforms(camera, size, shift))
+        self._view.write(view_uniforms(view, self._media_range, self._opaque_range))
         self._view.bind_to_uniform_block(VIEW.binding)
-        self._shade.bind_to_uniform_block(SHADE.binding)
+        for block, buffer in self._constant.items():
+            buffer.bind_to_uniform_block(block.binding)
         self._cleared.clear()
+
+    @property
+    def has_opaque(self) -> bool:
+        """Whether rays may end on an opaque surface."""
+        return any(step.name == "opaque" for step in self.plan.passes)
+
+    @property
+    def emits(self) -> bool:
+        """Whether any medium emits light."""
+        return any(body.medium is not None and body.medium.emits for body in self.scene.bodies)
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
         """Target in which thickness passes add up, cleared when a frame first asks for it."""
@@ -98,6 +122,11 @@ class FrameJob:
         self.gl.blend_equation = moderngl.FUNC_ADD
         self.gl.blend_func = moderngl.ONE, moderngl.ONE
 
+    def bind_opaque(self, unit: int) -> None:
+        """Give the places where rays end to the shader that reads texture `unit`, if there are any."""
+        if self.has_opaque:
+            self.targets.opaque().color_attachments[0].use(unit)
+
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state; front faces are those where a ray enters."""
         for i in objects:
@@ -109,8 +138,17 @@ class FrameJob:
 
     def release(self) -> None:
         """Free the uniform buffers."""
-        for buffer in (self._view, self._bodies, self._shade):
+        for buffer in (self._view, self._bodies, *self._constant.values()):
             buffer.release()
+
+    def _body_roles(self) -> list[BodyRole]:
+        anchored = not (isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored)
+        slot_of = {i: number for number, slot in enumerate(self.slots) for i in slot.objects}
+        weights = _count_weights(self.scene)
+        return [
+            BodyRole(anchored, self._sheet_thickness(body), weights[i], slot_of.get(i, 0))
+            for i, body in enumerate(self.scene.objects)
+        ]
 
     def _sheet_thickness(self, body: Object) -> float:
         if body.sheet_thickness is not None:
@@ -124,8 +162,8 @@ class FrameJob:
         if isinstance(self.plan.method, ThinLayer):
             return 0.0, 0.0
         pairs = [
-            (weight * placement.expected_count[0], weight * placement.expected_count[1])
-            for weight, placement in zip(self._count_weights, self._placements, strict=True)
+            (role.count_weight * placement.expected_count[0], role.count_weight * placement.expected_count[1])
+            for role, placement in zip(self._roles, self._placements, strict=True)
         ]
         low, high = zip(*pairs, strict=True)
         return sum(low), sum(high)
@@ -135,32 +173,20 @@ class FrameJob:
 
         A rasteriser decides coverage on a grid of 1/256 pixel, so at a silhouette a pixel center may lie that far off
         both of its faces. Extended to it, they cross: by a pixel's size where they are steeper than 256, and by up to
-        a face's length where one is seen edge-on. Where a mesh has parts inside out, nothing is tolerated.
+        a face's length where one is seen edge-on. Where a mesh has parts inside out, nothing is tolerated. Ordered
+        methods leave such a place out; that it is no flipped face, the diagnosis of the mesh has to tell.
         """
+        bodies = [body.mesh.diagnosis for body in self.scene.bodies]
+        suspicious = any(found.inside_out_parts for found in bodies)
+        if self.plan.ordered and not suspicious and all(found.solid for found in bodies):
+            return self.scene.diagonal
         camera, size = self.scene.camera, self.targets.size
         distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements) + self.scene.diagonal
         pixel = 2.0 * camera.half_extent(size)[1] / size[1] * (1.0 if camera.fov_y is None else distance)
         # Distances from the camera cancel with an error that grows with them: that is not a flipped face.
         rounding = distance if isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored else 0.0
-        suspicious = any(body.mesh.diagnosis.inside_out_parts for body in self.scene.objects)
         share = _COVERAGE_FLOOR if suspicious else _NEGATIVE_TOLERANCE
         return share * (self.scene.diagonal + rounding) + (0.0 if suspicious else pixel)
-
-    def _shade_uniforms(self) -> bytes:
-        environment = self.scene.environment
-        medium = next((body.medium for body in self.scene.bodies), None)
-        limit = MAX_SCENE_OPTICAL_DEPTH / max(self.scene.diagonal, np.finfo(np.float64).tiny)
-        return SHADE.pack(
-            extinction=[*(np.zeros(3) if medium is None else np.minimum(medium.extinction, limit)), 0.0],
-            emission=[*(np.zeros(3) if medium is None else np.asarray(medium.emission)), 0.0],
-            environment_first=[*environment.first, 0.0],
-            environment_second=[*environment.second, 0.0],
-            expected_count=self._expected_counts(),
-            negative_tolerance=self._negative_tolerance(),
-            coverage_floor=_COVERAGE_FLOOR * self.scene.diagonal,
-            environment_tiles=environment.tiles,
-            environment_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
-        )
 
 
 def _count_weights(scene: Scene) -> list[float]:
@@ -168,7 +194,7 @@ def _count_weights(scene: Scene) -> list[float]:
     weights = []
     used = 0
     for body in scene.objects:
-        is_open = not body.mesh.diagnosis.solid
+        is_open = body.medium is not None and not body.mesh.diagnosis.solid
         weights.append(_OPEN_WEIGHTS[min(used, len(_OPEN_WEIGHTS) - 1)] if is_open else 1.0)
         used += is_open
     return weights

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.slots import MAX_SLOTS
+
 #: GLSL type, size and alignment in bytes (std140) of a NumPy field. Other shapes are not used: std140 pads them oddly.
 _TYPES: dict[tuple[str, tuple[int, ...]], tuple[str, int, int]] = {
     ("f", ()): ("float", 4, 4),
@@ -17,6 +19,9 @@ _TYPES: dict[tuple[str, tuple[int, ...]], tuple[str, int, int]] = {
     ("f", (4,)): ("vec4", 16, 16),
     ("f", (4, 4)): ("mat4", 64, 16),
 }
+
+#: Lights that shine on opaque objects.
+MAX_LIGHTS = 32
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,8 @@ class UniformBlock:
     binding : int
         Binding point, the same in every program.
     fields : tuple of (name, base, shape)
-        base is "f4" or "i4"; shape one of (), (2,), (4,) or (4, 4), matrices in row-major order for column vectors.
+        base is "f4" or "i4"; shape one of (), (2,), (4,) or (4, 4), matrices in row-major order for column vectors;
+        or (n, 4) with n > 4, an array of n vec4.
     """
 
     name: str
@@ -43,7 +49,7 @@ class UniformBlock:
         offset = 0
         offsets = []
         for _, base, shape in self.fields:
-            _, size, alignment = _TYPES[base[0], shape]
+            size, alignment = (16 * shape[0], 16) if _is_array(shape) else _TYPES[base[0], shape][1:]
             offset = -(-offset // alignment) * alignment
             offsets.append(offset)
             offset += size
@@ -59,7 +65,10 @@ class UniformBlock:
     @property
     def glsl(self) -> str:
         """Declaration for a shader."""
-        members = "".join(f"    {_TYPES[base[0], shape][0]} {name};\n" for name, base, shape in self.fields)
+        members = "".join(
+            f"    vec4 {name}[{shape[0]}];\n" if _is_array(shape) else f"    {_TYPES[base[0], shape][0]} {name};\n"
+            for name, base, shape in self.fields
+        )
         return f"layout(std140, row_major) uniform {self.name} {{\n{members}}};\n"
 
     def pack(self, **values: npt.ArrayLike) -> bytes:
@@ -73,6 +82,10 @@ class UniformBlock:
         return record.tobytes()
 
 
+def _is_array(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 2 and shape[0] > 4
+
+
 #: Per frame: the view rays. Pixels count right and down from the top left corner.
 VIEW = UniformBlock(
     "View",
@@ -82,6 +95,7 @@ VIEW = UniformBlock(
         ("ray_right", "f4", (4,)),
         ("ray_up", "f4", (4,)),
         ("ray_forward", "f4", (4,)),
+        ("opaque_range", "f4", (2,)),  # place of the nearest opaque point, and 1 / how many places it is to the last
     ),
 )
 
@@ -94,10 +108,18 @@ BODY = UniformBlock(
         ("world_from_normal", "f4", (4, 4)),
         ("axis", "f4", (4,)),  # camera's forward axis in object space; w: the anchor's place along it
         ("extinction", "f4", (4,)),
+        ("eye_from_offset", "f4", (4, 4)),  # world axes, from the eye
+        ("color", "f4", (4,)),  # what an opaque object reflects
         ("sheet_thickness", "f4", ()),
         ("sheet_ior", "f4", ()),
+        ("sheet_tolerance", "f4", ()),  # metres that a sheet may be behind an opaque surface and still count
         ("axial_start", "f4", ()),  # rays start here: what is behind counts as if it were at the start
         ("count_weight", "f4", ()),  # what one face adds to the count
+        # The place of a point: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
+        ("place_scale", "f4", ()),  # places per metre
+        ("place_start", "f4", ()),  # place of the anchor
+        ("slot", "i4", ()),
+        ("starts_unknown", "i4", ()),  # whether the eye is on the surface, so that rays start on either side of it
     ),
 )
 
@@ -108,14 +130,45 @@ SHADE = UniformBlock(
     (
         ("extinction", "f4", (4,)),
         ("emission", "f4", (4,)),
-        ("environment_first", "f4", (4,)),
-        ("environment_second", "f4", (4,)),
         ("expected_count", "f4", (2,)),  # least and greatest signed count of a trustworthy pixel
         ("negative_tolerance", "f4", ()),
         ("coverage_floor", "f4", ()),  # a path not longer than this is rounding
+    ),
+)
+
+#: Per frame: what intervals are filled with.
+MEDIA = UniformBlock(
+    "Media",
+    3,
+    (
+        ("slot_extinction", "f4", (MAX_SLOTS, 4)),  # w: least winding number at the start of a ray
+        ("slot_emission", "f4", (MAX_SLOTS, 4)),  # w: greatest
+        ("place_metres", "f4", ()),  # metres along the forward axis from place 0 to place 1
+        ("slot_bits", "i4", ()),  # bits that tell slots apart
+    ),
+)
+
+#: Per frame: what is far behind everything.
+ENVIRONMENT = UniformBlock(
+    "Environment",
+    5,
+    (
+        ("environment_first", "f4", (4,)),
+        ("environment_second", "f4", (4,)),
         ("environment_tiles", "f4", ()),
         ("environment_kind", "i4", ()),
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE)}
+#: Per frame: lights on opaque objects.
+LIGHTS = UniformBlock(
+    "Lights",
+    4,
+    (
+        ("light_place", "f4", (MAX_LIGHTS, 4)),  # point: position from the eye, w = 1; directional: towards it, w = 0
+        ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance
+        ("light_count", "i4", ()),
+    ),
+)
+
+BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT)}

@@ -15,6 +15,9 @@ from translucent.errors import RenderError
 from translucent.gpu.layout import BLOCKS
 from translucent.optics import MIN_THIN_LAYER_COSINE
 
+#: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
+PEEL_BATCH = 8
+
 #: Numbers that shaders share; Python is the only place where they are written.
 CONSTANTS: dict[str, str] = {
     "PI": "3.14159265358979",
@@ -24,6 +27,11 @@ CONSTANTS: dict[str, str] = {
     "SERIES_LIMIT": "0.5",
     "NOTHING": "1e30",  # beyond every distance: coordinates end at 1e18
     "UNEXPECTED": "1e6",  # a count that no pixel expects
+    "PLACE_BITS": "29",  # of a crossing's 30 bits, those that place and slot share; one is the side's
+    "LARGEST_WORD": "0x3fffffffu",
+    "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
+    "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
+    "PEEL_BATCH": str(PEEL_BATCH),
     "FLAG_COVERED": "1.0",
     "FLAG_VALID": "2.0",
     "ENVIRONMENT_CONSTANT": "0",
@@ -130,7 +138,12 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
 
 
 def build_program(
-    gl: moderngl.Context, vertex: str, fragment: str, defines: Mapping[str, int] | None = None, **samplers: int
+    gl: moderngl.Context,
+    vertex: str,
+    fragment: str,
+    defines: Mapping[str, int] | None = None,
+    version: int = 330,
+    **samplers: int,
 ) -> moderngl.Program:
     """Compile and link two files.
 
@@ -140,6 +153,8 @@ def build_program(
         Files under ``shaders/``.
     defines : dict, optional
         Switches; each stage gets those that it asks for, and at least one stage must ask for each.
+    version : int
+        Of GLSL: 330, or 430 where shaders write to buffers.
     samplers : int
         Texture unit of each sampler.
 
@@ -149,7 +164,7 @@ def build_program(
         With the compiler's message, by file and line.
     """
     given = dict(defines or {})
-    stages = [_stage(name, given) for name in (vertex, fragment)]
+    stages = [_stage(name, given, version) for name in (vertex, fragment)]
     used = {key for stage in stages for key in given if f"#define {key} " in stage.text}
     if unused := sorted(given.keys() - used):
         raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither asks for {unused}", "check the spelling")
@@ -169,11 +184,11 @@ def build_program(
     return program
 
 
-def _stage(name: str, defines: Mapping[str, int]) -> ShaderSource:
+def _stage(name: str, defines: Mapping[str, int], version: int) -> ShaderSource:
     """The stage with those of the defines that it asks for."""
     collector = _Collector()
     collector.add(name, ())
-    return preprocess(name, {key: value for key, value in defines.items() if key in collector.switches})
+    return preprocess(name, {key: value for key, value in defines.items() if key in collector.switches}, version)
 
 
 def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import moderngl
 
 from translucent.errors import RenderError
@@ -21,6 +23,7 @@ class Targets:
         self._gl = gl
         self.size = size
         self._framebuffers: dict[str, moderngl.Framebuffer] = {}
+        self._buffers: dict[str, moderngl.Buffer] = {}
 
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:
         """Where thickness passes add up: RG32F (path, count), or RGBA32F (optical depth, count) and R32F (path)."""
@@ -29,6 +32,26 @@ class Targets:
     def nearest_and_farthest(self) -> moderngl.Framebuffer:
         """RGBA32F: nearest front face, farthest back face, nothing, number of faces."""
         return self._get("nearest_and_farthest", (4,))
+
+    def opaque(self) -> moderngl.Framebuffer:
+        """R32F place and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
+        return self._get("opaque", (1, 4), with_depth=True)
+
+    def ordered(self) -> moderngl.Framebuffer:
+        """RGBA32F optical depth and soundness, emitted radiance and thickness, and counts of layers."""
+        return self._get("ordered", (4, 4, 4))
+
+    def peeled(self, number: int) -> moderngl.Framebuffer:
+        """RGBA32F: what one pass of depth peeling finds."""
+        return self._get(f"peeled-{number}", (4,))
+
+    def peel_state(self, number: int) -> moderngl.Framebuffer:
+        """Two walks along each ray while peeling goes on: five RGBA32F and two RGBA32UI."""
+        return self._get(f"peel_state-{number}", (4, 4, 4, 4, 4), windings=2)
+
+    def nothing(self) -> moderngl.Framebuffer:
+        """Something to draw into for passes that write to buffers only."""
+        return self._get("nothing", (-1,))
 
     def result(self) -> moderngl.Framebuffer:
         """What a frame holds: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
@@ -44,15 +67,52 @@ class Targets:
             self._framebuffers["depth_only"] = self._gl.framebuffer(depth_attachment=self._gl.depth_texture(self.size))
         return self._framebuffers["depth_only"]
 
-    def bytes_per_pixel(self) -> int:
-        """Bytes that the color targets in use take for each pixel."""
-        textures = [t for f in self._framebuffers.values() for t in f.color_attachments]
-        return sum(t.components * (1 if t.dtype == "f1" else 4) for t in textures)
+    def storage(self, name: str, size: int) -> moderngl.Buffer:
+        """A buffer of at least `size` bytes that shaders write to; what it held is lost where it has to grow.
 
-    def _get(self, name: str, components: tuple[int, ...]) -> moderngl.Framebuffer:
+        Raises
+        ------
+        RenderError
+            If a shader of this OpenGL cannot reach that many bytes, or there is no room for them.
+        """
+        buffer = self._buffers.get(name)
+        if buffer is not None and buffer.size >= size:
+            return buffer
+        if buffer is not None:
+            buffer.release()
+            del self._buffers[name]
+        try:
+            if size > self.largest_storage:
+                raise moderngl.Error(f"a shader reaches {self.largest_storage / 1e6:.0f} MB")
+            self._buffers[name] = self._gl.buffer(reserve=size)
+        except moderngl.Error as error:
+            raise RenderError(
+                f"frame size {self.size[0]}x{self.size[1]}",
+                f"OpenGL has no room for {size / 1e6:.0f} MB of surfaces ({error})",
+                "use DepthPeeling, render in parts, or smaller",
+            ) from error
+        return self._buffers[name]
+
+    @cached_property
+    def largest_storage(self) -> int:
+        """Bytes of a buffer that a shader can write to."""
+        return int(self._gl.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
+
+    def bytes_per_pixel(self) -> int:
+        """Bytes that the color targets and buffers in use take for each pixel."""
+        textures = [t for f in self._framebuffers.values() for t in f.color_attachments]
+        buffers = sum(buffer.size for buffer in self._buffers.values())
+        return sum(t.components * (1 if t.dtype == "f1" else 4) for t in textures) + buffers // (
+            self.size[0] * self.size[1]
+        )
+
+    def _get(
+        self, name: str, components: tuple[int, ...], *, with_depth: bool = False, windings: int = 0
+    ) -> moderngl.Framebuffer:
+        """The framebuffer of this name: float textures, or bytes where a count is negative, then RGBA32UI ones."""
         if name not in self._framebuffers:
             try:
-                self._framebuffers[name] = self._make(components)
+                self._framebuffers[name] = self._make(components, with_depth, windings)
             except moderngl.Error as error:
                 megabytes = sum(4 * abs(count) for count in components) * self.size[0] * self.size[1] / 1e6
                 raise RenderError(
@@ -62,13 +122,14 @@ class Targets:
                 ) from error
         return self._framebuffers[name]
 
-    def _make(self, components: tuple[int, ...]) -> moderngl.Framebuffer:
+    def _make(self, components: tuple[int, ...], with_depth: bool, windings: int) -> moderngl.Framebuffer:
         attachments = [
             self._gl.texture(self.size, abs(count), dtype="f4" if count > 0 else "f1") for count in components
         ]
+        attachments += [self._gl.texture(self.size, 4, dtype="u4") for _ in range(windings)]
         for texture in attachments:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return self._gl.framebuffer(attachments)
+        return self._gl.framebuffer(attachments, self._gl.depth_renderbuffer(self.size) if with_depth else None)
 
     def release(self) -> None:
         """Free all textures and framebuffers."""
@@ -79,3 +140,6 @@ class Targets:
                 framebuffer.depth_attachment.release()
             framebuffer.release()
         self._framebuffers.clear()
+        for buffer in self._buffers.values():
+            buffer.release()
+        self._buffers.clear()

@@ -8,10 +8,14 @@ import moderngl
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
+from translucent.gpu.passes.depth_peeling import DepthPeelingPass
+from translucent.gpu.passes.fragment_lists import FragmentListsPass
+from translucent.gpu.passes.k_buffer import KBufferPass
+from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
-from translucent.plan import PassSpec
+from translucent.render_plan import PassSpec
 
 
 class Pass(Protocol):
@@ -29,5 +33,9 @@ PASSES: dict[str, type[Pass]] = {
     "thin_layer": ThinLayerPass,
     "thin_layer_fallback": ThinLayerPass,
     "back_face_depth": BackFaceDepthPass,
+    "opaque": OpaquePass,
+    "depth_peeling": DepthPeelingPass,
+    "fragment_lists": FragmentListsPass,
+    "k_buffer": KBufferPass,
     "transmittance": TransmittancePass,
 }

@@ -5,15 +5,16 @@ from __future__ import annotations
 import moderngl
 
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import CONSTANTS, build_program
-from translucent.plan import PassSpec
+from translucent.render_plan import PassSpec
 
 
 class BackFaceDepthPass:
     """Keeps the extreme distances by maximum blending and counts the faces, so that concave pixels are found out."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._faces = build_program(gl, "geometry/body.vert", "thickness/back_face_depth.frag", {"WITH_NORMAL": 0})
+        self._faces = Variants(gl, "geometry/body.vert", "thickness/back_face_depth.frag", opaque_place=0)
         self._combine = build_program(
             gl, "geometry/fullscreen.vert", "thickness/back_face_combine.frag", nearest_and_farthest=0
         )
@@ -29,9 +30,11 @@ class BackFaceDepthPass:
         gl.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX, moderngl.FUNC_ADD
+        job.bind_opaque(0)
+        program = self._faces.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
         for culled in ("back", "front"):
             gl.cull_face = culled
-            job.draw(self._faces, spec.objects)
+            job.draw(program, spec.objects)
         gl.cull_face = "back"
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)

@@ -12,7 +12,9 @@ class DepthOnlyPass:
     """Draws all objects, both sides, into a depth buffer. The job must be placed ``with_depth``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._program = build_program(gl, "geometry/body.vert", "thickness/depth_only.frag", {"WITH_NORMAL": 0})
+        self._program = build_program(
+            gl, "geometry/body.vert", "thickness/depth_only.frag", {"WITH_NORMAL": 0, "WITH_POSITION": 0}
+        )
 
     def run(self, job: FrameJob) -> None:
         """Draw everything with the depth test on."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import moderngl
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.shaders import build_program
-from translucent.plan import PassSpec
+from translucent.gpu.passes.variants import Variants
+from translucent.render_plan import PassSpec
 
 
 class ThinLayerPass:
@@ -16,14 +16,11 @@ class ThinLayerPass:
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._programs = {
-            spectral: build_program(
-                gl, "geometry/body.vert", "thickness/thin_layer.frag", {"SPECTRAL": spectral, "WITH_NORMAL": 1}
-            )
-            for spectral in (False, True)
-        }
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/thin_layer.frag", opaque_place=0)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the sheets."""
         job.begin_adding(spec.target)
-        job.draw(self._programs[job.plan.spectral], spec.objects)
+        job.bind_opaque(0)
+        switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.has_opaque}
+        job.draw(self._variants.program(WITH_NORMAL=1, WITH_POSITION=0, **switches), spec.objects)

@@ -5,26 +5,41 @@ from __future__ import annotations
 import moderngl
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.shaders import build_program
-from translucent.plan import PassSpec
+from translucent.gpu.passes.variants import Variants
+from translucent.render_plan import PassSpec
 
-_SAMPLERS = ("accumulated", "accumulated_path", "fallback", "fallback_path")
+_SAMPLERS = (
+    "accumulated",
+    "accumulated_path",
+    "fallback",
+    "fallback_path",
+    "ordered_depth",
+    "ordered_emitted",
+    "ordered_layers",
+    "opaque_place",
+    "opaque_radiance",
+)
 
 
 class TransmittancePass:
-    """Beer-Lambert over the background, per pixel; see ``shaders/shade/transmittance.frag``."""
+    """Beer-Lambert over what is behind, per pixel; see ``shaders/shade/transmittance.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._gl = gl
-        self._variants: dict[tuple[bool, ...], moderngl.VertexArray] = {}
+        units = {name: unit for unit, name in enumerate(_SAMPLERS)}
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/transmittance.frag", **units)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Resolve the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
-        gl = job.gl
-        fallback = any(step.target == "fallback" for step in job.plan.passes)
-        emission = any(body.medium is not None and body.medium.emits for body in job.scene.bodies)
-        inputs = [job.accumulator()] + ([job.accumulator("fallback")] if fallback else [])
-        if job.samples > 1:
+        gl, plan = job.gl, job.plan
+        fallback = any(step.target == "fallback" for step in plan.passes)
+        accumulated = not plan.ordered or any(step.name == "thin_layer" for step in plan.passes)
+        inputs = {
+            "accumulated": job.accumulator() if accumulated else None,
+            "fallback": job.accumulator("fallback") if fallback else None,
+            "ordered_depth": job.targets.ordered() if plan.ordered else None,
+            "opaque_place": job.targets.opaque() if job.has_opaque else None,
+        }
+        if job.averaging:
             job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
             gl.blend_equation = moderngl.FUNC_ADD
@@ -32,25 +47,17 @@ class TransmittancePass:
         else:
             job.targets.result().use()
             gl.enable_only(moderngl.NOTHING)
-        for first, framebuffer in zip((0, 2), inputs, strict=False):
-            for unit, texture in enumerate(framebuffer.color_attachments, first):
-                texture.use(unit)
-        variant = self._variant(job.plan.spectral, fallback, job.samples > 1, emission)
-        variant.render(moderngl.TRIANGLES, vertices=3)
-
-    def _variant(self, spectral: bool, fallback: bool, average: bool, emission: bool) -> moderngl.VertexArray:
-        key = (spectral, fallback, average, emission)
-        if key not in self._variants:
-            defines = {"SPECTRAL": spectral, "FALLBACK": fallback, "AVERAGE": average, "EMISSION": emission}
-            used = [
-                name for name in _SAMPLERS if (spectral or "path" not in name) and (fallback or "fallback" not in name)
-            ]
-            program = build_program(
-                self._gl,
-                "geometry/fullscreen.vert",
-                "shade/transmittance.frag",
-                defines,
-                **{name: _SAMPLERS.index(name) for name in used},
-            )
-            self._variants[key] = self._gl.vertex_array(program, [])
-        return self._variants[key]
+        for first, framebuffer in inputs.items():
+            if framebuffer is not None:
+                for unit, texture in enumerate(framebuffer.color_attachments, _SAMPLERS.index(first)):
+                    texture.use(unit)
+        program = self._variants.program(
+            SPECTRAL=plan.spectral,
+            FALLBACK=fallback,
+            AVERAGE=job.averaging,
+            EMISSION=job.emits and not plan.ordered,
+            ORDERED=plan.ordered,
+            ACCUMULATED=accumulated,
+            OPAQUE=job.has_opaque,
+        )
+        self._variants.draw_fullscreen(program)

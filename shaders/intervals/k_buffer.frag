@@ -1,0 +1,19 @@
+// k-buffer (Bavoil et al. 2007): the k nearest crossings of each pixel, in order. A crossing takes the first slot whose
+// word is greater, and passes on what was there; atomic minima keep every word, whatever else is drawn meanwhile.
+
+#include <View>
+#include "intervals/place.glsl"
+#include "intervals/k_slots.glsl"
+
+void main() {
+    float place = fragment_place();
+    if (place > last_place()) { return; }
+    uint base = k_base(gl_FragCoord.xy, frame_size.x);
+    atomicAdd(words[base], 1u);
+    uint word = fragment_word(place);
+    for (uint i = 1u; i <= uint(k); ++i) {
+        uint former = atomicMin(words[base + i], word);
+        if (former == NO_CROSSING) { break; }
+        word = max(word, former);
+    }
+}

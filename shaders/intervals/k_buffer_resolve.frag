@@ -1,0 +1,25 @@
+// Walks along the crossings that the k-buffer has kept.
+
+#include <View>
+#include "intervals/k_slots.glsl"
+#include "intervals/resolve.glsl"
+
+void main() {
+    uint base = k_base(gl_FragCoord.xy, frame_size.x);
+    uint counted = words[base];
+    uint kept = min(counted, uint(k));
+    int excess[SLOTS];
+    for (int slot = 0; slot < SLOTS; ++slot) { excess[slot] = 0; }
+    for (uint i = 1u; i <= kept; ++i) {
+        uint word = words[base + i];
+        for (int slot = 0; slot < SLOTS; ++slot) {
+            excess[slot] += slot == crossing_slot(word) ? (crossing_leaves(word) ? 1 : -1) : 0;
+        }
+    }
+    Walk walk = walk_from_start(excess);
+    float metres_per_step = metres_of_a_step(ray_advance());
+    for (uint i = 1u; i <= kept; ++i) {
+        cross_surface(walk, words[base + i], 1, false, metres_per_step);
+    }
+    end_walk(walk, metres_per_step, float(counted), float(kept));
+}

@@ -1,0 +1,9 @@
+// For each pixel: how many crossings there were, and the k nearest of them in order.
+
+layout(std430, binding = 0) buffer Words { uint words[]; };
+
+uniform int k;
+
+uint k_base(vec2 position, float width) {
+    return (uint(position.y) * uint(width) + uint(position.x)) * uint(k + 1);
+}

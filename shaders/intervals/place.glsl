@@ -1,0 +1,28 @@
+// Place and word of the fragment at hand. Needs the inputs of geometry/body.vert.
+
+#include <Body>
+#include "intervals/crossing.glsl"
+
+#if OPAQUE
+uniform sampler2D opaque_place;
+#endif
+
+in float axial;
+
+// Where the ray has come when it meets this fragment: 0 at the start of the media or of the ray, 1 at their end.
+float fragment_place() {
+    return max(axial, axial_start) * place_scale + place_start;
+}
+
+// Where the ray ends.
+float last_place() {
+#if OPAQUE
+    return texelFetch(opaque_place, ivec2(gl_FragCoord.xy), 0).r;
+#else
+    return NOTHING;
+#endif
+}
+
+uint fragment_word(float place) {
+    return pack_crossing(place, slot, !gl_FrontFacing);
+}

@@ -1,0 +1,43 @@
+// From a pixel's walk to what shade/transmittance.frag reads. Needs <View>.
+
+#include "lib/ray.glsl"
+#include "intervals/walk.glsl"
+
+#if OPAQUE
+uniform sampler2D opaque_place;
+#endif
+
+layout(location = 0) out vec4 out_optical_depth;  // alpha: 1 where the walk ends outside
+layout(location = 1) out vec4 out_emitted;        // alpha: thickness
+layout(location = 2) out vec4 out_layers;         // counted, kept, metres with a negative winding number
+
+// Metres along this pixel's ray per metre along the camera's forward axis.
+float ray_advance() {
+    vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
+    return length(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
+}
+
+void write_walk(Walk walk, bool sound, float counted, float kept) {
+    out_optical_depth = vec4(walk.optical_depth, sound ? 1.0 : 0.0);
+    out_emitted = vec4(walk.emitted, walk.thickness);
+    out_layers = vec4(counted, kept, walk.inside_out, 0.0);
+}
+
+// The last segment, up to the opaque surface if there is one, and what is left of the walk then.
+void end_walk(Walk walk, float metres_per_step, float counted, float kept) {
+    bool sound = counted == kept;
+#if OPAQUE
+    float last = texelFetch(opaque_place, ivec2(gl_FragCoord.xy), 0).r;
+    if (last <= 1.0) {
+        // Nothing is known of what lies behind: what has been entered may stay so.
+        sound = sound && !is_negative(walk);
+        uint place = step_of_place(last);
+        if (sound && place > walk.place) {
+            add_segment(walk, float(place - walk.place) * metres_per_step, false);
+        }
+        write_walk(walk, sound, counted, kept);
+        return;
+    }
+#endif
+    write_walk(walk, sound && is_outside(walk), counted, kept);
+}

@@ -1,0 +1,113 @@
+// A walk along a ray from crossing to crossing: what fills each segment, and what it does to light.
+// Max 1995, "Optical models for direct volume rendering": a segment of length d with constant extinction and emission
+// passes T = exp(-sigma_t d) and adds q / sigma_t (1 - T).
+
+#include "lib/optics.glsl"
+#include "intervals/crossing.glsl"
+
+#if SLOTS < 1
+#error a walk needs a slot
+#endif
+
+struct Walk {
+    uint place;              // in steps
+    int winding[SLOTS];      // how often the bodies of each slot are wound around this place
+    vec3 optical_depth;
+    vec3 emitted;            // radiance: towards the start for a walk that goes on, from the end for one that comes back
+    float thickness;
+    float inside_out;        // metres with a negative winding number
+};
+
+struct Contents {
+    vec3 extinction;
+    vec3 emission;
+    float count;             // how often thickness counts this place
+    bool inside_out;
+};
+
+Contents contents(int winding[SLOTS]) {
+    Contents mix = Contents(vec3(0.0), vec3(0.0), 0.0, false);
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        int turns = winding[slot];
+        mix.inside_out = mix.inside_out || turns < 0;
+        // Left before it is entered: next to a silhouette, where rounding has the two change places.
+        if (turns <= 0) { continue; }
+#if UNION || PRIORITY
+        turns = 1;
+#endif
+        mix.extinction += float(turns) * slot_extinction[slot].rgb;
+        mix.emission += float(turns) * slot_emission[slot].rgb;
+#if UNION
+        mix.count = 1.0;
+#else
+        mix.count += float(turns);
+#endif
+#if PRIORITY
+        break;  // slots are sorted by priority
+#endif
+    }
+    return mix;
+}
+
+void add_segment(inout Walk walk, float metres, bool backwards) {
+    Contents mix = contents(walk.winding);
+    vec3 depth = mix.extinction * metres;
+#if EMISSION
+    vec3 added = emitted_radiance(mix.emission, mix.extinction, metres);
+    if (backwards) {
+        walk.emitted = walk.emitted * transmittance(depth) + added;
+    } else {
+        walk.emitted += transmittance(walk.optical_depth) * added;
+    }
+#endif
+    walk.optical_depth += depth;
+    walk.thickness += mix.count * metres;
+    walk.inside_out += mix.inside_out ? metres : 0.0;
+}
+
+// Goes to a crossing, and over it as many times as there are faces alike.
+void cross_surface(inout Walk walk, uint word, int times, bool backwards, float metres_per_step) {
+    uint place = crossing_step(word);
+    uint steps = backwards ? walk.place - place : place - walk.place;
+    if (steps > 0u) {
+        add_segment(walk, float(steps) * metres_per_step, backwards);
+    }
+    walk.place = place;
+    int turns = crossing_leaves(word) == backwards ? times : -times;
+    int crossed = crossing_slot(word);
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        walk.winding[slot] += slot == crossed ? turns : 0;
+    }
+}
+
+// A walk that starts with the given excess of exits over entries ahead, from which an unknown start is found.
+Walk walk_from_start(int excess[SLOTS]) {
+    Walk walk;
+    walk.place = 0u;
+    walk.optical_depth = vec3(0.0);
+    walk.emitted = vec3(0.0);
+    walk.thickness = 0.0;
+    walk.inside_out = 0.0;
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        walk.winding[slot] = clamp(excess[slot], int(slot_extinction[slot].w), int(slot_emission[slot].w));
+    }
+    return walk;
+}
+
+float metres_of_a_step(float advance) {
+    return place_metres * advance / float(place_steps());
+}
+
+bool is_outside(Walk walk) {
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        if (walk.winding[slot] != 0) { return false; }
+    }
+    return true;
+}
+
+bool is_negative(Walk walk) {
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        if (walk.winding[slot] < 0) { return true; }
+    }
+    return false;
+}

@@ -1,0 +1,94 @@
+"""Depth peeling: every pass over the geometry finds the next crossings of each ray, and walks go along them."""
+
+from __future__ import annotations
+
+import moderngl
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants, walk_switches
+from translucent.gpu.shaders import CONSTANTS, PEEL_BATCH, set_uniform
+from translucent.render_plan import PassSpec
+from translucent.thickness import DepthPeeling
+
+_STATE = ("near_depth", "near_emitted", "layers", "far_depth", "far_emitted", "near_winding", "far_winding")
+
+#: Texture unit of what the previous pass has found, and of where rays end, for shaders that draw bodies.
+_PREVIOUS, _OPAQUE = 0, 1
+
+
+class DepthPeelingPass:
+    """Peels from one end of the rays or from both; see ``shaders/intervals/peel.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._peel = Variants(gl, "geometry/body.vert", "intervals/peel.frag", previous=_PREVIOUS, opaque_place=_OPAQUE)
+        self._remaining = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_remaining.frag", found=0)
+        batch = {f"pass_{i}": i for i in range(PEEL_BATCH)}
+        state = {name: PEEL_BATCH + i for i, name in enumerate(_STATE)}
+        self._fold = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_fold.frag", **batch, **state)
+        self._any = gl.query(samples=True)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Peel until a pass finds nothing more, or the layers of the method are used up."""
+        assert isinstance(job.plan.method, DepthPeeling)
+        method = job.plan.method
+        both = method.order == "both-ends"
+        ends = {"NEAR": method.order != "back-to-front", "FAR": method.order != "front-to-back"}
+        # Every pass but the first also counts the faces of the one before.
+        most = 1 + (-(-method.max_layers // 2) if both else method.max_layers)
+        batch: list[moderngl.Framebuffer] = []
+        folds = 0
+        for number in range(most):
+            batch.append(job.targets.peeled(number % PEEL_BATCH))
+            self._find(job, spec, batch, ends, first=number == 0)
+            last = number + 1 == most or not self._found_any(job, batch[-1])
+            if last or len(batch) == PEEL_BATCH:
+                self._go_along(job, batch, ends, folds, last)
+                folds += 1
+                # The crossings that the last pass has found are walked along when the next has counted their faces.
+                batch = [batch[-1]]
+            if last:
+                return
+
+    def _find(
+        self, job: FrameJob, spec: PassSpec, batch: list[moderngl.Framebuffer], ends: dict[str, bool], *, first: bool
+    ) -> None:
+        gl = job.gl
+        target = batch[-1]
+        nothing = float(CONSTANTS["NOTHING"])
+        target.use()
+        target.clear(nothing, nothing, nothing, 0.0)
+        gl.enable_only(moderngl.BLEND)
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        gl.blend_equation = moderngl.MIN, moderngl.FUNC_ADD
+        if not first:
+            batch[-2].color_attachments[0].use(_PREVIOUS)
+        job.bind_opaque(_OPAQUE)
+        switches = {"FIRST": first, "OPAQUE": job.has_opaque, **ends}
+        job.draw(self._peel.program(WITH_NORMAL=0, WITH_POSITION=0, **switches), spec.objects)
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.enable_only(moderngl.NOTHING)
+
+    def _found_any(self, job: FrameJob, found: moderngl.Framebuffer) -> bool:
+        """Whether a pass has found a crossing in any pixel."""
+        job.targets.nothing().use()
+        found.color_attachments[0].use(0)
+        with self._any:
+            self._remaining.draw_fullscreen(self._remaining.program())
+        return bool(self._any.samples)
+
+    def _go_along(
+        self, job: FrameJob, batch: list[moderngl.Framebuffer], ends: dict[str, bool], folds: int, last: bool
+    ) -> None:
+        """Walk along the crossings of a batch of passes, as far as the faces of each are counted."""
+        (job.targets.ordered() if last else job.targets.peel_state(folds % 2)).use()
+        # Samplers of passes that this batch is short of must not stay with what is drawn into.
+        for unit in range(PEEL_BATCH):
+            batch[min(unit, len(batch) - 1)].color_attachments[0].use(unit)
+        if folds:
+            for unit, texture in enumerate(job.targets.peel_state((folds - 1) % 2).color_attachments, PEEL_BATCH):
+                texture.use(unit)
+        # Crossings that an opaque surface hides have been moved onto it: the walks need not know of it.
+        switches = {**walk_switches(job), **ends, "BEGIN": folds == 0, "END": last, "OPAQUE": False}
+        program = self._fold.program(**switches)
+        set_uniform(program, "passes", len(batch))
+        self._fold.draw_fullscreen(program)

@@ -1,0 +1,87 @@
+"""Fragment lists: one draw into a list for each pixel, then a walk along each list in order."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from translucent.errors import RenderError
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants, walk_switches
+from translucent.render_plan import PassSpec
+
+#: Bytes of a node: a word and the number of the next node.
+_NODE = 8
+
+#: Nodes for each pixel in the first buffer; frames that need more get a larger one, and keep it.
+_FIRST_NODES_PER_PIXEL = 2
+
+#: Room beyond what a frame needed, so that the next one does not have to grow again.
+_SLACK = 1.25
+
+_COUNT, _HEADS, _NODES = 0, 1, 2
+
+
+class FragmentListsPass:
+    """An A-buffer that never drops a fragment; see ``shaders/intervals/fragment_lists.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
+        self._resolve = Variants(
+            gl, "geometry/fullscreen.vert", "intervals/fragment_lists_resolve.frag", 430, opaque_place=0
+        )
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Draw and resolve the frame, in bands of rows where one buffer cannot hold it all."""
+        width, height = job.targets.size
+        pending = [(0, height)]
+        while pending:
+            first, last = pending.pop()
+            needed = self._draw(job, spec, first, last)
+            capacity = self._nodes(job).size // _NODE
+            if needed <= capacity:
+                self._walk(job, first, last)
+            elif needed * _NODE <= job.targets.largest_storage:
+                size = min(int(needed * _SLACK) * _NODE, job.targets.largest_storage // _NODE * _NODE)
+                job.targets.storage("nodes", size)
+                pending.append((first, last))
+            elif last - first > 1:
+                middle = (first + last) // 2
+                pending += [(first, middle), (middle, last)]
+            else:
+                raise RenderError(
+                    f"frame of {width}x{height} with FragmentLists",
+                    f"one row has {needed} surfaces, and this OpenGL holds {job.targets.largest_storage // _NODE}",
+                    "use DepthPeeling",
+                )
+        job.gl.scissor = None
+
+    def _nodes(self, job: FrameJob) -> moderngl.Buffer:
+        width, height = job.targets.size
+        first = min(_FIRST_NODES_PER_PIXEL * width * height * _NODE, job.targets.largest_storage // _NODE * _NODE)
+        return job.targets.storage("nodes", first)
+
+    def _draw(self, job: FrameJob, spec: PassSpec, first: int, last: int) -> int:
+        """Make the lists of some rows; returns how many nodes they need."""
+        gl = job.gl
+        width, height = job.targets.size
+        count, heads = job.targets.storage("count", 4), job.targets.storage("heads", 4 * width * height)
+        count.write(np.zeros(1, np.uint32))
+        heads.clear()
+        for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, self._nodes(job))):
+            buffer.bind_to_storage_buffer(binding)
+        job.targets.nothing().use()
+        gl.scissor = (0, first, width, last - first)
+        gl.enable_only(moderngl.NOTHING)
+        job.bind_opaque(0)
+        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
+        job.draw(program, spec.objects)
+        gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
+        return int(np.frombuffer(count.read(), np.uint32)[0])
+
+    def _walk(self, job: FrameJob, first: int, last: int) -> None:
+        framebuffer = job.targets.ordered()
+        framebuffer.use()
+        job.gl.scissor = (0, first, job.targets.size[0], last - first)
+        job.bind_opaque(0)
+        self._resolve.draw_fullscreen(self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque))

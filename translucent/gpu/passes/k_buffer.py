@@ -1,0 +1,41 @@
+"""k-buffer: one draw, of which each pixel keeps the k nearest crossings in order."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants, walk_switches
+from translucent.gpu.shaders import set_uniform
+from translucent.render_plan import PassSpec
+from translucent.thickness import KBuffer
+
+
+class KBufferPass:
+    """Inserts every crossing with atomic minima; see ``shaders/intervals/k_buffer.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", 430, opaque_place=0)
+        self._resolve = Variants(gl, "geometry/fullscreen.vert", "intervals/k_buffer_resolve.frag", 430, opaque_place=0)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Draw the bodies, then walk along what is kept."""
+        assert isinstance(job.plan.method, KBuffer)
+        gl, k = job.gl, job.plan.method.k
+        width, height = job.targets.size
+        words = job.targets.storage("words", 4 * (k + 1) * width * height)
+        # A count of 0, and k times no crossing.
+        words.clear(chunk=np.array([0] + [0xFFFFFFFF] * k, np.uint32).tobytes(), size=4 * (k + 1) * width * height)
+        words.bind_to_storage_buffer(0)
+        job.targets.nothing().use()
+        gl.enable_only(moderngl.NOTHING)
+        job.bind_opaque(0)
+        program = self._insert.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
+        set_uniform(program, "k", k)
+        job.draw(program, spec.objects)
+        gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT)
+        job.targets.ordered().use()
+        program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque)
+        set_uniform(program, "k", k)
+        self._resolve.draw_fullscreen(program)

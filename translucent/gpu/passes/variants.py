@@ -1,0 +1,56 @@
+"""Programs of one pair of shaders, by their switches; each is compiled when a scene first needs it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+
+from translucent.gpu.shaders import build_program
+
+
+class Variants:
+    """Programs that differ in their switches only.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    vertex, fragment : str
+        Files under ``shaders/``.
+    version : int
+        Of GLSL.
+    samplers : int
+        Texture unit of each sampler.
+    """
+
+    def __init__(self, gl: moderngl.Context, vertex: str, fragment: str, version: int = 330, **samplers: int) -> None:
+        self._gl = gl
+        self._files = vertex, fragment
+        self._version = version
+        self._samplers = samplers
+        self._programs: dict[tuple[tuple[str, int], ...], moderngl.Program] = {}
+        self._fullscreen: dict[int, moderngl.VertexArray] = {}
+
+    def program(self, **switches: bool | int) -> moderngl.Program:
+        """The program with these switches."""
+        key = tuple(sorted((name, int(value)) for name, value in switches.items()))
+        if key not in self._programs:
+            self._programs[key] = build_program(self._gl, *self._files, dict(key), self._version, **self._samplers)
+        return self._programs[key]
+
+    def draw_fullscreen(self, program: moderngl.Program) -> None:
+        """Run one of the programs for every pixel of the current framebuffer."""
+        if program.glo not in self._fullscreen:
+            self._fullscreen[program.glo] = self._gl.vertex_array(program, [])
+        self._fullscreen[program.glo].render(moderngl.TRIANGLES, vertices=3)
+
+
+def walk_switches(job: Any) -> dict[str, bool | int]:
+    """Switches of ``shaders/intervals/walk.glsl`` for a frame: what fills segments, and how many slots there are."""
+    return {
+        # Powers of two, so that scenes which differ by a medium share programs.
+        "SLOTS": 1 << max(len(job.slots) - 1, 0).bit_length(),
+        "UNION": job.scene.overlap == "union",
+        "PRIORITY": job.scene.overlap == "priority",
+        "EMISSION": job.emits,
+    }

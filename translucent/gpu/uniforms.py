@@ -1,0 +1,226 @@
+"""Contents of the uniform blocks: what the shaders are told about a frame and its bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera
+from translucent.errors import InputError
+from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MAX_LIGHTS, MEDIA, SHADE, VIEW
+from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
+from translucent.gpu.shaders import CONSTANTS
+from translucent.lights import Environment, PointLight
+from translucent.medium import Medium
+from translucent.reference.sheets import SHEET_ON_OPAQUE
+from translucent.scene import Scene
+from translucent.slots import MAX_SLOTS, Slot
+
+Array = npt.NDArray[np.float64]
+
+#: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
+MAX_SCENE_OPTICAL_DEPTH = 1e30
+
+
+@dataclass(frozen=True)
+class View:
+    """The camera, and the sample points of a frame.
+
+    Attributes
+    ----------
+    camera : Camera
+    size : (int, int)
+        Width and height in pixels.
+    shift : (float, float)
+        Of the sample points from the pixel centers, right and down, in pixels.
+    depth_range : (float, float), optional
+        Write depth between these metres; else all depths are alike, so that nothing is clipped but what is behind.
+    """
+
+    camera: Camera
+    size: tuple[int, int]
+    shift: tuple[float, float] = (0.0, 0.0)
+    depth_range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class BodyRole:
+    """What a body is in a frame, besides where it is.
+
+    Attributes
+    ----------
+    anchored : bool
+        Distances count from the body's center, not from the camera.
+    sheet_thickness : float
+        In metres, for passes that draw the body as a sheet.
+    count_weight : float
+        What one face adds to the count.
+    slot : int
+        Whose winding number its crossings change.
+    """
+
+    anchored: bool
+    sheet_thickness: float
+    count_weight: float
+    slot: int
+
+
+def body_uniforms(placement: Placement, view: View, role: BodyRole, media: AxialRange, diagonal: float) -> bytes:
+    """Contents of the Body block.
+
+    Parameters
+    ----------
+    placement, view, role
+    media : AxialRange
+        Of all media of the scene.
+    diagonal : float
+        Of the scene, in metres.
+    """
+    body, camera = placement.body, view.camera
+    seen = placement.camera_from_offset(camera)
+    axis = seen[2].copy()
+    if role.anchored and not placement.cut:
+        axis[3] = 0.0
+    anchor = seen[2, 3] - axis[3]
+    eye_from_offset = np.eye(4)
+    eye_from_offset[:3, :3], eye_from_offset[:3, 3] = body.matrix[:3, :3], placement.anchor
+    return BODY.pack(
+        clip_from_offset=_clip_rows(placement, view, seen),
+        world_from_normal=_normal_matrix(placement),
+        eye_from_offset=eye_from_offset,
+        axis=axis,
+        extinction=[*bounded_extinction(body.medium, diagonal), 0.0],
+        color=[*np.asarray(body.color), 0.0],
+        sheet_thickness=role.sheet_thickness,
+        sheet_ior=1.0 if body.medium is None else body.medium.ior,
+        sheet_tolerance=SHEET_ON_OPAQUE * diagonal,
+        axial_start=0.0 if camera.fov_y is None and placement.cut else -float(CONSTANTS["NOTHING"]),
+        count_weight=role.count_weight,
+        place_scale=1.0 / media.length,
+        place_start=(anchor - media.near) / media.length,
+        slot=role.slot,
+        starts_unknown=placement.on_surface,
+    )
+
+
+def _clip_rows(placement: Placement, view: View, seen: Array) -> Array:
+    camera = view.camera
+    half_width, half_height = camera.half_extent(view.size)
+    clip = np.zeros((4, 4))
+    clip[0], clip[1] = seen[0] / half_width, seen[1] / half_height
+    if camera.fov_y is None:
+        clip[3, 3] = 1.0
+    else:
+        clip[3] = seen[2]
+    clip[0] -= 2.0 * view.shift[0] / view.size[0] * clip[3]
+    clip[1] += 2.0 * view.shift[1] / view.size[1] * clip[3]
+    if view.depth_range is not None:
+        near, far = view.depth_range
+        if camera.fov_y is None:
+            clip[2] = (2.0 * seen[2] - (near + far) * clip[3]) / (far - near)
+        else:
+            clip[2] = clip[3] * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near)
+    elif placement.on_surface:
+        # Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
+        clip[2, 3] = -NEAR_SURFACE * placement.body.mesh.diagonal
+    return clip
+
+
+def _normal_matrix(placement: Placement) -> Array:
+    body = placement.body
+    matrix = np.eye(4)
+    # The inverse transpose keeps outwards outwards under a mirror; only an inverted mesh has its normals inside.
+    matrix[:3, :3] = np.linalg.inv(body.matrix[:3, :3]).T * (-1.0 if body.mesh.diagnosis.inverted else 1.0)
+    # The scale of a normal is lost when it is normalised; unit scale keeps it within float32.
+    matrix[:3, :3] /= np.abs(matrix[:3, :3]).max()
+    return matrix
+
+
+def bounded_extinction(medium: Medium | None, diagonal: float) -> Array:
+    """(3,): extinction in 1/m that float32 can multiply with lengths of the scene; 0 without a medium."""
+    limit = MAX_SCENE_OPTICAL_DEPTH / max(diagonal, float(np.finfo(np.float64).tiny))
+    return np.zeros(3) if medium is None else np.minimum(medium.extinction, limit)
+
+
+def view_uniforms(view: View, media: AxialRange, opaque: AxialRange | None) -> bytes:
+    """Contents of the View block."""
+    camera = view.camera
+    half_width, half_height = camera.half_extent(view.size)
+    perspective = camera.fov_y is not None
+    reach = (0.0, 0.0)
+    if opaque is not None:
+        reach = ((opaque.near - media.near) / media.length, media.length / opaque.length)
+    return VIEW.pack(
+        frame_size=[*view.size, *view.shift],
+        ray_right=[*(camera.right * half_width * perspective), 0.0],
+        ray_up=[*(camera.up * half_height * perspective), 0.0],
+        ray_forward=[*camera.forward, 0.0],
+        opaque_range=reach,
+    )
+
+
+def media_uniforms(scene: Scene, slots: tuple[Slot, ...], placements: list[Placement], media: AxialRange) -> bytes:
+    """Contents of the Media block."""
+    extinction, emission = np.zeros((MAX_SLOTS, 4)), np.zeros((MAX_SLOTS, 4))
+    for i, slot in enumerate(slots[:MAX_SLOTS]):
+        extinction[i, :3] = bounded_extinction(slot.medium, scene.diagonal)
+        emission[i, :3] = slot.medium.emission
+        extinction[i, 3] = sum(placements[k].expected_count[0] for k in slot.objects)
+        emission[i, 3] = sum(placements[k].expected_count[1] for k in slot.objects)
+    return MEDIA.pack(
+        slot_extinction=extinction,
+        slot_emission=emission,
+        place_metres=media.length,
+        slot_bits=slot_bits(len(slots)),
+    )
+
+
+def slot_bits(count: int) -> int:
+    """Bits that tell `count` slots apart."""
+    return max(count - 1, 0).bit_length()
+
+
+def light_uniforms(scene: Scene) -> bytes:
+    """Contents of the Lights block.
+
+    Raises
+    ------
+    InputError
+        If there are more lights than the block holds.
+    """
+    if len(scene.lights) > MAX_LIGHTS:
+        raise InputError("lighting opaque objects", f"{len(scene.lights)} lights", f"use at most {MAX_LIGHTS}")
+    place, power = np.zeros((MAX_LIGHTS, 4)), np.zeros((MAX_LIGHTS, 4))
+    for i, light in enumerate(scene.lights):
+        if isinstance(light, PointLight):
+            place[i], power[i, :3] = [*(np.asarray(light.position) - scene.camera.eye), 1.0], light.intensity
+        else:
+            place[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
+    return LIGHTS.pack(light_place=place, light_power=power, light_count=len(scene.lights))
+
+
+def shade_uniforms(
+    scene: Scene, expected_count: tuple[float, float], negative_tolerance: float, coverage_floor: float
+) -> bytes:
+    """Contents of the Shade block; the first body's medium stands for all where they are alike."""
+    medium = scene.bodies[0].medium
+    assert medium is not None
+    return SHADE.pack(
+        extinction=[*bounded_extinction(medium, scene.diagonal), 0.0],
+        emission=[*np.asarray(medium.emission), 0.0],
+        expected_count=expected_count,
+        negative_tolerance=negative_tolerance,
+        coverage_floor=coverage_floor,
+    )
+
+
+def environment_uniforms(environment: Environment) -> bytes:
+    """Contents of the Environment block."""
+    return ENVIRONMENT.pack(
+        environment_first=[*environment.first, 0.0],
+        environment_second=[*environment.second, 0.0],
+        environment_tiles=environment.tiles,
+        environment_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
+    )

@@ -1,0 +1,123 @@
+"""What a plan is made of: passes, each with its reason and its expected cost, and what the machine can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from translucent.thickness import Method, OrderedMethod
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What the machine that a plan is made for can do.
+
+    Attributes
+    ----------
+    shader_storage : bool
+        Shaders can write to buffers: OpenGL 4.3.
+    """
+
+    shader_storage: bool = True
+
+
+@dataclass(frozen=True)
+class PassSpec:
+    """One pass of a plan.
+
+    Attributes
+    ----------
+    name : str
+        What the pass is called in `Frame.seconds`.
+    reason : str
+        Why the scene needs it.
+    objects : tuple of int
+        Indices into `Scene.objects` of what it draws; empty for a pass over pixels.
+    geometry_passes : int
+        How often it draws them, or for depth peeling is expected to.
+    target : {"accumulated", "fallback"}
+        Where its paths add up: the fallback is read where the other does not balance.
+    cost : float
+        Expected time, in multiples of drawing the same objects into a depth buffer.
+    """
+
+    name: str
+    reason: str
+    objects: tuple[int, ...] = ()
+    geometry_passes: int = 0
+    target: Literal["accumulated", "fallback"] = "accumulated"
+    cost: float = 0.0
+
+
+@dataclass(frozen=True)
+class RenderPlan:
+    """What runs and why.
+
+    Attributes
+    ----------
+    method : Method
+        How thickness is found.
+    passes : tuple of PassSpec
+        In order.
+    spectral : bool
+        The passes add up optical depth per channel, since media differ, and not only thickness.
+    limits : tuple of str
+        Where thickness and transmittance are not exact, and why; empty for an exact plan.
+    unmodelled : tuple of str
+        What the scene asks for and no pass renders.
+    """
+
+    method: Method
+    passes: tuple[PassSpec, ...]
+    spectral: bool = False
+    limits: tuple[str, ...] = ()
+    unmodelled: tuple[str, ...] = ()
+
+    @property
+    def exact(self) -> bool:
+        """Whether thickness and transmittance are exact for the meshes as given and straight rays, up to float32."""
+        return not self.limits
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the method finds the intervals of each ray in their order."""
+        return isinstance(self.method, OrderedMethod)
+
+    @property
+    def geometry_passes(self) -> int:
+        """How often geometry is drawn in all."""
+        return sum(step.geometry_passes for step in self.passes)
+
+    @property
+    def cost(self) -> float:
+        """Expected time, in multiples of drawing the objects into a depth buffer."""
+        return sum(step.cost for step in self.passes)
+
+    def summary(self) -> dict[str, object]:
+        """The plan in values that JSON can hold."""
+        return {
+            "method": str(self.method),
+            "exact": self.exact,
+            "cost": round(self.cost, 2),
+            "passes": [
+                {
+                    "name": step.name,
+                    "reason": step.reason,
+                    "geometry_passes": step.geometry_passes,
+                    "cost": round(step.cost, 2),
+                }
+                for step in self.passes
+            ],
+            "limits": list(self.limits),
+            "unmodelled": list(self.unmodelled),
+        }
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}, "
+            f"about {self.cost:.1f} times the cost of a depth-only draw"
+        ]
+        lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
+        lines += [f"  limit: {limit}" for limit in self.limits]
+        lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
+        return "\n".join(lines)

@@ -1,0 +1,203 @@
+"""The renderer that users see: plans a scene, and hands the plan to OpenGL, or to the CPU where there is none."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib.metadata import version
+from types import TracebackType
+from typing import TYPE_CHECKING, get_args
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from translucent.camera import check_size
+from translucent.errors import InputError, RenderError, TranslucentWarning
+from translucent.frame import Frame
+from translucent.gpu.context import Backend, NoContextError
+from translucent.gpu.renderer import GpuRenderer
+from translucent.plan import plan
+from translucent.render_plan import RenderPlan
+from translucent.scene import Scene
+from translucent.thickness import Method
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from translucent.cpu.renderer import CpuRenderer
+
+#: What a user may ask for.
+BACKENDS = (*get_args(Backend), "cpu")
+
+#: More samples per pixel change nothing that 8 bits could show.
+MAX_SAMPLES = 4096
+
+
+class Renderer:
+    """Renders scenes with OpenGL, or on the CPU. Use it as a context manager: leaving it frees everything.
+
+    Parameters
+    ----------
+    backend : {"egl", "window", "osmesa", "cpu"}, optional
+        None picks: EGL, else OSMesa, else, with a `TranslucentWarning`, the CPU.
+    context : moderngl.Context, optional
+        Draw with a context that somebody else owns, such as a window's. It must be current during every call, and is
+        never released.
+
+    Raises
+    ------
+    InputError
+        If the backend is not known.
+    RenderError
+        If nothing can render here; the message lists what was tried.
+    """
+
+    def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
+        if backend is not None and backend not in BACKENDS:
+            raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
+        if context is not None and backend is not None:
+            raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
+        self._plans: WeakKeyDictionary[Scene, dict[Method | None, RenderPlan]] = WeakKeyDictionary()
+        self._closed = False
+        self._engine: GpuRenderer | CpuRenderer = _engine(backend, context)
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def gpu(self) -> GpuRenderer:
+        """What draws with OpenGL.
+
+        Raises
+        ------
+        RenderError
+            If this renderer has none.
+        """
+        if not isinstance(self._engine, GpuRenderer):
+            raise RenderError("drawing with OpenGL", "this renderer works on the CPU", 'use another backend than "cpu"')
+        return self._engine
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Backend, device, driver and versions, as every frame records them."""
+        return {
+            **self._engine.provenance,
+            "numpy": np.__version__,
+            "python": sys.version.split()[0],
+            "translucent": version("translucent-shading"),
+        }
+
+    def plan(self, scene: Scene, method: Method | None = None) -> RenderPlan:
+        """The plan that `render` would run here."""
+        if method is not None and not isinstance(method, Method):
+            raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
+        plans = self._plans.setdefault(scene, {})
+        if method not in plans:
+            plans[method] = plan(scene, method, self._engine.capabilities)
+        return plans[method]
+
+    def render(self, scene: Scene, size: tuple[int, int], method: Method | None = None, samples: int = 1) -> Frame:
+        """Render a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+        size : (width, height)
+            In pixels.
+        method : Method, optional
+            How to find thickness; None lets the planner pick.
+        samples : int
+            Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
+            belong to the ray through the pixel center, as all do with 1.
+
+        Returns
+        -------
+        Frame
+            With float32 arrays. Pixels that cannot be trusted are False in `valid`, and one `TranslucentWarning`
+            counts them.
+
+        Raises
+        ------
+        InputError
+            If the size is not positive, or no method can render the scene.
+        RenderError
+            If the frame is larger than this OpenGL allows.
+        """
+        if not isinstance(samples, int) or not 1 <= samples <= MAX_SAMPLES:
+            raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
+        self._require_open()
+        size = check_size(size)
+        frame = self._engine.render(scene, size, self.plan(scene, method), samples)
+        frame.provenance.update(self.provenance)
+        _warn(frame)
+        return frame
+
+    def draw(
+        self,
+        scene: Scene,
+        framebuffer: moderngl.Framebuffer,
+        method: Method | None = None,
+        exposure: float = 0.0,
+    ) -> RenderPlan:
+        """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
+
+        Parameters
+        ----------
+        scene : Scene
+        framebuffer : moderngl.Framebuffer
+            Its size is the frame's.
+        method : Method, optional
+        exposure : float
+            Stops brighter.
+        """
+        self._require_open()
+        chosen = self.plan(scene, method)
+        self.gpu.draw(scene, framebuffer, chosen, exposure)
+        return chosen
+
+    def close(self) -> None:
+        """Free everything. Closing twice is fine."""
+        if not self._closed:
+            self._closed = True
+            self._engine.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise RenderError("rendering", "the renderer is closed", "make a new one")
+
+
+def _engine(backend: str | None, context: moderngl.Context | None) -> GpuRenderer | CpuRenderer:
+    if backend == "cpu":
+        return _cpu_renderer()
+    try:
+        return GpuRenderer(backend, context)
+    except NoContextError as error:
+        if backend is not None:
+            raise
+        try:
+            engine = _cpu_renderer()
+        except RenderError as other:
+            raise error from other
+        warnings.warn(f"rendering on the CPU, for want of OpenGL: {error}", TranslucentWarning, stacklevel=3)
+        return engine
+
+
+def _cpu_renderer() -> CpuRenderer:
+    # Where there is OpenGL, nobody waits for Embree to load.
+    from translucent.cpu.renderer import CpuRenderer
+
+    return CpuRenderer()
+
+
+def _warn(frame: Frame) -> None:
+    if invalid := int(np.count_nonzero(~frame.valid)):
+        covered = int(np.count_nonzero(frame.coverage))
+        why = "; ".join(frame.plan.limits) or "a surface that does not balance"
+        warnings.warn(
+            f"{invalid} pixels are not valid ({covered} are covered): {why}", TranslucentWarning, stacklevel=3
+        )
