@@ -11,7 +11,7 @@ from translucent.camera import Camera
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.reference import render
-from translucent.scene import Object, Scene
+from translucent.scene import Object, Overlap, Scene
 
 MESHES = Path(__file__).parents[3] / "shared" / "assets" / "meshes_clean"
 MEDIUM = Medium(absorption=1e-3)
@@ -47,13 +47,24 @@ def test_unit_cube() -> None:
     np.testing.assert_array_equal(frame.thickness[frame.coverage], 1.0)
 
 
-def test_overlapping_balls_add_up() -> None:
-    bodies = [Object(load(name), MEDIUM) for name in ("ballA.off", "ballB.off")]
+@pytest.mark.parametrize(("overlap", "volume"), [("add", 2802.21), ("union", 2477.66), ("priority", 2477.66)])
+@pytest.mark.parametrize("axis", [0, 2])
+def test_volumes_of_overlapping_balls(overlap: Overlap, volume: float, axis: int) -> None:
+    """The volumes of the two meshes, of their union, and with that of their intersection, are known (324.55)."""
+    media = [MEDIUM, MEDIUM if overlap == "union" else Medium(absorption=2e-3, emission=1.0)]
+    bodies = [
+        Object(load(name), medium, priority=i)
+        for i, (name, medium) in enumerate(zip(("ballA.off", "ballB.off"), media, strict=True))
+    ]
     bounds = np.stack([np.min([b.bounds[0] for b in bodies], axis=0), np.max([b.bounds[1] for b in bodies], axis=0)])
-    camera, height = above(bounds, axis=2)
-    frame = render(Scene(bodies, camera), (512, 512))
+    camera, height = above(bounds, axis)
+    frame = render(Scene(bodies, camera, overlap=overlap), (512, 512))
     assert frame.valid.all()
-    assert frame.thickness.sum() * (height / 512) ** 2 == pytest.approx(2802.21, rel=1e-4)
+    assert frame.thickness.sum() * (height / 512) ** 2 == pytest.approx(volume, rel=1e-4)
+    depth = frame.optical_depth[..., 0].sum() * (height / 512) ** 2 / 1e-3
+    both, inner = 2802.21, 324.55
+    expected = {"add": 1.5 * both, "union": both - inner, "priority": 1.5 * both - inner}[overlap]
+    assert depth == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from importlib import import_module
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -13,7 +16,7 @@ from translucent.frame import ARRAYS
 from translucent.lights import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
-from translucent.reference import hit_counts, render
+from translucent.reference import hit_counts, line_hits, pixel_rays, render, shade_hits
 from translucent.scene import Object, Scene
 from translucent.solids import Box, Solid, Sphere, SphericalShell, Torus, TwoSpheres
 from translucent.thickness import BackFaceDepth
@@ -214,7 +217,41 @@ def test_frame_is_complete(size: tuple[int, int]) -> None:
 
 def test_what_cannot_be_rendered_is_refused() -> None:
     camera = Camera.look_at((0, 0, 4), (0, 0, 0))
-    with pytest.raises(InputError, match="opaque objects are not supported yet"):
-        render(Scene([Object(Sphere().tessellate(8))], camera), SIZE)
     with pytest.raises(InputError, match="frame size"):
         render(scene(Sphere().tessellate(8), camera), (0, 4))
+
+
+def test_a_picture_in_parts_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    glow = Medium(absorption=1.0, emission=(0.3, 0.2, 0.1))
+    bodies = [Object(BOX.tessellate(), glow), Object(Torus().tessellate(24), MEDIUM), Object(Sphere().tessellate(8))]
+    whole_scene = Scene(bodies, CAMERAS["perspective"])
+    whole = render(whole_scene, SIZE)
+    for most in (1, 40, 1000):
+        monkeypatch.setattr(import_module("translucent.reference.render"), "CHUNK", most)
+        parts = render(whole_scene, SIZE)
+        for name in ARRAYS:
+            np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_any_rays_can_be_shaded_alone() -> None:
+    body = scene(BOX.tessellate(), CAMERAS["orthographic"])
+    frame, rays = render(body, SIZE), pixel_rays(body.camera, SIZE)
+    chosen = np.arange(5, len(rays), 7)
+    line = line_hits(body.objects[0].mesh, body.objects[0].matrix, body.camera, SIZE)
+    own = line.where(np.isin(line.pixel, chosen))
+    renumbered = replace(own, pixel=np.searchsorted(chosen, own.pixel), barycentric=np.zeros((len(own.pixel), 3)))
+    found = shade_hits(body, rays.where(chosen), [renumbered], [None])
+    assert tuple(found) == ARRAYS
+    for name in ARRAYS:
+        array = getattr(frame, name)
+        np.testing.assert_array_equal(found[name], array.reshape(-1, *array.shape[2:])[chosen])
+
+
+@pytest.mark.parametrize("name", ["perspective", "orthographic"])
+def test_rays_are_those_of_the_camera_seen_from_the_eye(name: str) -> None:
+    camera, offset = CAMERAS[name], (0.25, -0.125)
+    rays = pixel_rays(camera, SIZE, offset)
+    origins, directions = (array.reshape(-1, 3) for array in camera.rays(SIZE, offset))
+    np.testing.assert_array_equal(rays.directions, directions)
+    np.testing.assert_allclose(rays.origins + camera.eye, origins, atol=1e-15)
+    np.testing.assert_allclose(rays.backdrop[SIZE[0] * 3 + 5] * SIZE[1], [5.75, 3.375], rtol=1e-15)

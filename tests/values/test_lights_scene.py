@@ -101,6 +101,104 @@ def test_lights_hold_read_only_arrays_and_one_number_stands_for_all_channels() -
         assert not np.asarray(array).flags.writeable
 
 
+# Irradiance
+
+
+def hemisphere(normal: np.ndarray[Any, Any], count: int = 16) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """Directions (n, 3) over the hemisphere around a normal, and weights (n,) that hold the cosine: a quadrature.
+
+    Gauss-Legendre in the cosine, even steps around: exact for polynomials of the direction up to a degree of `count`.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    cosine, angle = np.meshgrid((nodes + 1) / 2, 2 * np.pi * np.arange(count) / count, indexing="ij")
+    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
+    around = np.cos(angle)[..., None] * u + np.sin(angle)[..., None] * v
+    directions = np.sqrt(1 - cosine**2)[..., None] * around + cosine[..., None] * normal
+    weight = cosine * (weights / 2)[:, None] * 2 * np.pi / count
+    return directions.reshape(-1, 3), weight.ravel()
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [tl.Environment.constant((0.1, 0.2, 3.0)), tl.Environment.gradient((0.1, 2.0, 0.0), (1.0, 0.5, 0.25))],
+    ids=["constant", "gradient"],
+)
+def test_irradiance_is_the_integral_of_radiance_and_cosine(environment: tl.Environment) -> None:
+    normals = np.random.default_rng(3).normal(size=(20, 3))
+    normals = np.vstack([normals / np.linalg.norm(normals, axis=1, keepdims=True), np.eye(3), -np.eye(3)])
+    for normal in normals:
+        directions, weights = hemisphere(normal)
+        integral = weights @ environment.radiance(directions, np.zeros((len(directions), 2)))
+        assert environment.irradiance_on(normal) == pytest.approx(integral, rel=1e-13)
+    assert environment.irradiance_on(normals.reshape(2, 13, 3)).shape == (2, 13, 3)
+
+
+def test_a_checkerboard_lights_like_the_mean_of_its_squares() -> None:
+    environment = tl.Environment.checkerboard((1, 0, 0.5), (0, 0.5, 0.5), tiles=3)
+    assert environment.irradiance_on((0, 1, 0)) == pytest.approx(np.pi * np.array((0.5, 0.25, 0.5)), rel=2 * EPS)
+
+
+def test_irradiance_of_a_point_light_falls_with_the_square_and_the_cosine() -> None:
+    light = tl.PointLight((1, 2, 3), (4, 8, 0))
+    up, down = (0, 0, 1), (0, 0, -1)
+    assert light.irradiance_on((1, 2, 1), up) == pytest.approx((1, 2, 0), rel=2 * EPS)
+    assert light.irradiance_on((1, 2, 1), down).tolist() == [0, 0, 0]
+    assert light.irradiance_on((4, 6, 3), up).tolist() == [0, 0, 0]
+    # 5 m away, of which 3 m are along the normal.
+    assert light.irradiance_on((5, 2, 0), up) == pytest.approx(np.array((4, 8, 0)) * 0.6 / 25, rel=4 * EPS)
+    points = np.zeros((4, 1, 3))
+    assert light.irradiance_on(points, np.tile(up, (5, 1))).shape == (4, 5, 3)
+
+
+def test_a_disc_receives_what_goes_into_its_solid_angle() -> None:
+    """A disc of radius R that lies h below the light is seen from it under 2 pi (1 - h / sqrt(h^2 + R^2))."""
+    light, height, radius = tl.PointLight((0, 0, 0.5), 3.0), 0.5, 2.0
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    r = radius * (nodes + 1) / 2
+    points = np.stack([r, 0 * r, 0 * r], axis=-1)
+    power = (weights * radius / 2 * 2 * np.pi * r) @ light.irradiance_on(points, (0, 0, 1))
+    assert power == pytest.approx(np.full(3, 2 * np.pi * 3 * (1 - height / math.hypot(height, radius))), rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("position", "irradiance"),
+    [
+        ((0, 0, 0), 0.0),
+        ((0, 0, 1e-310), 1e18),
+        ((0, 0, 1e-200), 1e18),
+        ((0, 0, 1e-9), 1e18),
+        ((0, 0, 1e150), 5e-300),
+        ((0, 0, 1e200), 0.0),
+        ((1.7e308, 1.7e308, 1.7e308), 0.0),
+        ((1.7e308, 1.7e308, -1.7e308), 0.0),
+    ],
+)
+def test_a_point_light_anywhere_gives_a_number(position: tuple[float, ...], irradiance: float) -> None:
+    found = tl.PointLight(position, (5.0, 0.0, 1e-308)).irradiance_on((0, 0, 0), (0, 0, 1))
+    assert found[0] == pytest.approx(irradiance, rel=1e-14)
+    assert found[1] == 0
+    assert 0 <= found[2] <= 1e18
+
+
+def test_irradiance_of_a_directional_light_goes_with_the_cosine() -> None:
+    sun = tl.DirectionalLight((0, -3, -4), (1, 2, 5))
+    normals = np.array([(0, 0, 1), (0, 1, 0), (0, 0.6, 0.8), (1, 0, 0), (0, 0, -1)])
+    found = sun.irradiance_on(np.zeros(3), normals)
+    assert found == pytest.approx(np.outer((0.8, 0.6, 1, 0, 0), (1, 2, 5)), abs=8 * EPS)
+
+
+def test_the_faintest_light_does_not_underflow_aloud() -> None:
+    tiny = 3e-308
+    for irradiance in (
+        tl.DirectionalLight((0, -3, -4), tiny).irradiance_on((0, 0, 0), (0, 0.28, 0.96)),
+        tl.PointLight((0, 0, 3), tiny).irradiance_on((0, 0, 0), (0, 0, 1)),
+        tl.Environment.gradient(tiny / 3, tiny).irradiance_on((0, 0.28, 0.96)),
+    ):
+        assert (irradiance > 0).all()
+
+
 # Objects
 
 
@@ -120,6 +218,38 @@ def test_lights_hold_read_only_arrays_and_one_number_stands_for_all_channels() -
 def test_there_is_no_such_object(options: dict[str, Any], message: str) -> None:
     with pytest.raises(tl.InputError, match=re.escape(message)):
         tl.Object(BOX, GLASS, **options)
+
+
+@pytest.mark.parametrize(
+    ("color", "linear"),
+    [
+        ("#808080", [0.2158605] * 3),
+        ("red", [1.0, 0.0, 0.0]),
+        ("linear(0.25, 0.5, 1)", [0.25, 0.5, 1.0]),
+        ((0, 0.5, 1), [0.0, 0.5, 1.0]),
+        (np.zeros(3), [0.0, 0.0, 0.0]),
+    ],
+)
+def test_a_color_is_text_or_linear(color: Any, linear: list[float]) -> None:
+    kept = np.asarray(tl.Object(BOX, None, color=color).color)
+    assert kept == pytest.approx(linear, abs=1e-7)
+    assert not kept.flags.writeable
+    assert np.asarray(tl.Object(BOX).color).tolist() == [0.6, 0.6, 0.6]
+
+
+@pytest.mark.parametrize("color", [(1.1, 0, 0), (-1e-9, 0, 0), (NAN, 0, 0), (1, 1), 0.5, None, [("a", "b", "c")]])
+def test_no_object_reflects_more_than_it_receives(color: Any) -> None:
+    message = f"color of 'box' {color!r}; not three numbers in 0 to 1; give for example (0.6, 0.6, 0.6)"
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        tl.Object(BOX, None, color=color)
+
+
+@pytest.mark.parametrize(
+    ("color", "message"), [("reddish", "color 'reddish'; neither"), ("linear(2, 0, 0)", "not three numbers in 0 to 1")]
+)
+def test_the_text_of_a_color_is_checked(color: str, message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        tl.Object(BOX, None, color=color)
 
 
 def test_an_object_needs_finite_coordinates() -> None:
@@ -201,6 +331,7 @@ def test_a_scene_knows_its_bodies_and_bounds() -> None:
     glass, rock = tl.Object(BOX, GLASS), tl.Object(BOX, None, trimesh.transformations.translation_matrix((10, 0, 0)))
     scene = tl.Scene([glass, rock], CAMERA)
     assert scene.bodies == (glass,)
+    assert scene.opaque == (rock,)
     assert scene.bounds.tolist() == [[-1, -2, -3], [11, 2, 3]]
     assert scene.diagonal == pytest.approx(math.sqrt(144 + 16 + 36), rel=2 * EPS)
     assert scene.environment.first.tolist() == [1, 1, 1]

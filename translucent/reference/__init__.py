@@ -1,7 +1,21 @@
 """Ground truth in float64 on the CPU, independent of any GPU: `render`, and the hits and intervals below it."""
 
 from translucent.reference.hits import Hits, camera_hits, line_hits
-from translucent.reference.intervals import Intervals, scene_intervals
-from translucent.reference.render import hit_counts, render
+from translucent.reference.intervals import Intervals
+from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.render import hit_counts, render, shade_hits
+from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
 
-__all__ = ["Hits", "Intervals", "camera_hits", "hit_counts", "line_hits", "render", "scene_intervals"]
+__all__ = [
+    "SHEET_ON_OPAQUE",
+    "Hits",
+    "Intervals",
+    "Rays",
+    "camera_hits",
+    "hit_counts",
+    "line_hits",
+    "pixel_rays",
+    "render",
+    "shade_hits",
+    "sheet_thicknesses",
+]

@@ -51,9 +51,13 @@ class Hits:
     face: Integers
     barycentric: Array
 
-    def where(self, keep: npt.NDArray[np.bool_] | Integers) -> Hits:
-        """The hits that a mask (k,) or indices choose."""
+    def where(self, keep: npt.NDArray[np.bool_] | Integers | slice) -> Hits:
+        """The hits that a mask (k,), indices or a slice choose."""
         return Hits(self.pixel[keep], self.distance[keep], self.sign[keep], self.face[keep], self.barycentric[keep])
+
+    def before(self, end: Array) -> Hits:
+        """The hits ahead of the origins, as far as the distance `end` (pixels,) where each ray stops."""
+        return self.where((self.distance >= 0) & (self.distance < end[self.pixel]))
 
 
 def camera_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[int, int]) -> Hits:
@@ -108,6 +112,13 @@ class _Grid:
     def pixels(self, points: Array, weight: Array) -> Array:
         """(..., 2): homogeneous column and row of homogeneous points (..., 2) with `weight` (...,)."""
         return points / self.scale + weight[..., None] * self.center
+
+
+def world_normals(body: Object, face: Integers) -> Array:
+    """(k, 3): unit normals of faces in the world, to the side from which the mesh has them counter-clockwise."""
+    normals = body.mesh.face_normals[face] @ np.linalg.inv(body.matrix[:3, :3])
+    length = np.linalg.norm(normals, axis=1)
+    return np.asarray(normals / np.where(length > 0, length, 1.0)[:, None])
 
 
 def _camera_vertices(mesh: Mesh, matrix: Array, camera: Camera) -> Array:

@@ -9,12 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.camera import Camera
-from translucent.reference.hits import Hits, line_hits
+from translucent.reference.hits import Hits
 from translucent.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+
+#: On a share of the scene's diagonal, rounding may wind a body's surface negatively.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +27,14 @@ class Intervals:
     Attributes
     ----------
     pixel : (k,) int64
-        Number of the ray: row * width + column.
+        Number of the ray.
     t_enter, t_exit : (k,) float64
         Distances in metres from the ray's origin, 0 <= t_enter < t_exit.
     body : (k,) int64
         Index into `Scene.objects`.
     winding : (k,) int64
-        How often the body's surface winds around the interval; never 0, and 2 where the mesh overlaps itself.
+        How often the body's surface winds around the interval; never 0, and 2 where the mesh overlaps itself. Below 0
+        faces look the wrong way.
     """
 
     pixel: Integers
@@ -45,25 +49,27 @@ class Intervals:
         return self.winding * (self.t_exit - self.t_enter)
 
 
-def body_intervals(hits: Hits, origin: Integers, body: int = 0) -> Intervals:
+def body_intervals(hits: Hits, origin: Integers, end: Array, body: int = 0) -> Intervals:
     """Intervals of one body.
 
     Parameters
     ----------
     hits : Hits
-        All surfaces of the body ahead of the rays' origins.
+        All surfaces of the body between the origins and the ends of the rays.
     origin : (pixels,) int64
         Winding number of the body at the origin of each ray.
+    end : (pixels,) float64
+        Where an opaque surface stops each ray, in metres; inf where none does.
     body : int
         What the result calls the body.
     """
-    inside = np.flatnonzero(origin)
-    pixel = np.concatenate([inside, hits.pixel])
-    # The origin stands before the hits of its pixel, and these keep their order.
+    inside, stopped = np.flatnonzero(origin), np.flatnonzero(np.isfinite(end))
+    pixel = np.concatenate([inside, hits.pixel, stopped])
+    # The origin stands before the hits of its pixel, the end after them, and these keep their order.
     order = np.argsort(pixel, kind="stable")
     pixel = pixel[order]
-    t = np.concatenate([np.zeros(len(inside)), hits.distance])[order]
-    step = np.concatenate([origin[inside], hits.sign.astype(np.int64)])[order]
+    t = np.concatenate([np.zeros(len(inside)), hits.distance, end[stopped]])[order]
+    step = np.concatenate([origin[inside], hits.sign, np.zeros(len(stopped), dtype=np.int64)])[order]
     begins = np.diff(pixel, prepend=-1) != 0
     total = np.cumsum(step)
     winding = total - (total - step)[begins][np.cumsum(begins) - 1]
@@ -71,15 +77,17 @@ def body_intervals(hits: Hits, origin: Integers, body: int = 0) -> Intervals:
     return Intervals(pixel[keep], t[keep], t[keep + 1], np.full(len(keep), body, dtype=np.int64), winding[keep])
 
 
-def unbalanced(hits: Hits, origin: Integers) -> Mask:
+def unbalanced(hits: Hits, origin: Integers, end: Array) -> Mask:
     """(pixels,): rays that do not end outside: they leave a body more or less often than they are in it or enter it.
+
+    What an opaque surface hides cannot tell, so a ray that it stops is none of them.
 
     Parameters
     ----------
-    hits, origin
+    hits, origin, end
         As for `body_intervals`.
     """
-    return np.not_equal(sum_signs(hits, len(origin)), -origin)
+    return np.asarray(np.isinf(end) & (sum_signs(hits, len(origin)) != -origin))
 
 
 def sum_signs(hits: Hits, pixels: int) -> Integers:
@@ -115,32 +123,34 @@ def merge(parts: Sequence[Intervals]) -> Intervals:
     return Intervals(**{name: array[order] for name, array in arrays.items()})
 
 
-def scene_intervals(scene: Scene, size: tuple[int, int], bodies: Sequence[int]) -> tuple[Intervals, Mask]:
-    """Intervals of bodies on the pixel rays of the scene's camera.
+def scene_intervals(scene: Scene, hits: Sequence[Hits], solids: Sequence[int], end: Array) -> tuple[Intervals, Mask]:
+    """Intervals of bodies on rays of the scene's camera.
 
     Parameters
     ----------
     scene : Scene
-    size : (width, height)
-        In pixels.
-    bodies : sequence of int
+    hits : sequence of Hits
+        Of each of `Scene.objects`, as `line_hits` gives them.
+    solids : sequence of int
         Indices into `Scene.objects`, each the surface of a solid.
+    end : (pixels,) float64
+        Where an opaque surface stops each ray, in metres; inf where none does.
 
     Returns
     -------
     intervals : Intervals
-    unbalanced : (width * height,) bool
-        Pixels where some body's entries and exits do not balance: a hole or a face wound wrongly.
+    defective : (pixels,) bool
+        Rays on which some body shows a hole or faces wound wrongly: its entries and exits do not balance, or its
+        surface winds around a place a negative number of times.
     """
-    pixels = size[0] * size[1]
-    bad = np.zeros(pixels, dtype=bool)
+    defective = np.zeros(len(end), dtype=bool)
     nothing = (np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64))
     parts = [Intervals(*nothing)]
-    for index in bodies:
-        body = scene.objects[index]
-        line = line_hits(body.mesh, body.matrix, scene.camera, size)
-        origin = origin_windings(body, line, scene.camera, pixels)
-        ahead = line.where(line.distance >= 0)
-        parts.append(body_intervals(ahead, origin, index))
-        bad |= unbalanced(ahead, origin)
-    return merge(parts), bad
+    for index in solids:
+        origin = origin_windings(scene.objects[index], hits[index], scene.camera, len(end))
+        ahead = hits[index].before(end)
+        parts.append(body_intervals(ahead, origin, end, index))
+        defective |= unbalanced(ahead, origin, end)
+    intervals = merge(parts)
+    negative = np.bincount(intervals.pixel, np.minimum(intervals.thickness, 0.0), len(end))
+    return intervals, defective | (negative < -ROUNDING * scene.diagonal)

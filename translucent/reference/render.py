@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 import time
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent import optics
 from translucent.camera import check_size
-from translucent.frame import Frame
+from translucent.frame import ARRAYS, Frame
 from translucent.plan import plan
-from translucent.reference.hits import Hits, camera_hits
+from translucent.reference.compositing import composite
+from translucent.reference.hits import Hits, line_hits
 from translucent.reference.intervals import scene_intervals
-from translucent.scene import Object, Scene
+from translucent.reference.opaque import nearest_opaque, reflected_radiance
+from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.segments import scene_segments
+from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
+from translucent.scene import Scene
 from translucent.thickness import Method, ThinLayer
 
-Array = npt.NDArray[np.float64]
-
-#: A body's thickness may be this share of the scene's diagonal below 0 by rounding.
-ROUNDING = 1e-9
-
-
-class _Paths(NamedTuple):
-    """What the rays cross: thickness (objects, pixels) in metres; covered and valid pixels (pixels,)."""
-
-    thickness: Array
-    coverage: npt.NDArray[np.bool_]
-    valid: npt.NDArray[np.bool_]
+#: Surfaces, times objects, that are put in order at a time: the working arrays stay below 500 MB.
+CHUNK = 1 << 24
 
 
 def render(scene: Scene, size: tuple[int, int], method: Method | None = None) -> Frame:
@@ -38,18 +34,16 @@ def render(scene: Scene, size: tuple[int, int], method: Method | None = None) ->
     Parameters
     ----------
     scene : Scene
-        Overlapping bodies add up.
     size : (width, height)
         In pixels.
     method : Method, optional
-        `ThinLayer` makes every surface a sheet; a sheet's own declared thickness goes first. All other methods are
-        ways to the same true thickness.
+        `ThinLayer` makes every surface of a medium a sheet; a sheet's own declared thickness goes first. All other
+        methods are ways to the same true thickness.
 
     Returns
     -------
     Frame
-        Of float64 arrays. Invalid are pixels where entries and exits of a solid do not balance, or where faces wound
-        inwards make a thickness negative.
+        Of float64 arrays; `shade_hits` tells what is valid.
 
     Raises
     ------
@@ -59,86 +53,100 @@ def render(scene: Scene, size: tuple[int, int], method: Method | None = None) ->
     start = time.perf_counter()
     size = check_size(size)
     chosen = plan(scene, method if isinstance(method, ThinLayer) else None)
-    paths = _paths(scene, size, [_sheet_thickness(body, method) for body in scene.objects])
+    hits = _scene_hits(scene, size)
     crossed = time.perf_counter()
-    arrays = {
-        name: np.ascontiguousarray(array.reshape(size[::-1] + array.shape[1:]))
-        for name, array in _shade(scene, size, paths).items()
-    }
+    rays, sheets = pixel_rays(scene.camera, size), sheet_thicknesses(scene, method)
+    parts = [
+        shade_hits(scene, rays.where(part), [_along(line, part) for line in hits], sheets)
+        for part in _parts(hits, len(rays))
+    ]
+    arrays = {name: np.concatenate([part[name] for part in parts]) for name in ARRAYS}
     end = time.perf_counter()
     return Frame(
-        **arrays,
+        **{name: array.reshape(size[::-1] + array.shape[1:]) for name, array in arrays.items()},
         plan=chosen,
         seconds={"intersect": crossed - start, "shade": end - crossed, "total": end - start},
         provenance={"backend": "reference", "numpy": np.__version__},
     )
 
 
-def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
-    """(h, w): how many surfaces of all objects each pixel's ray crosses."""
-    width, height = check_size(size)
-    counts = np.zeros(width * height, dtype=np.int64)
-    for body in scene.objects:
-        counts += np.bincount(camera_hits(body.mesh, body.matrix, scene.camera, size).pixel, minlength=len(counts))
-    return counts.reshape(height, width)
+def shade_hits(
+    scene: Scene, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
+) -> dict[str, npt.NDArray[Any]]:
+    """What rays see, from all surfaces on them, wherever these come from.
 
+    Parameters
+    ----------
+    scene : Scene
+    rays : Rays
+        Of the scene's camera: all of a picture, or any of them.
+    hits : sequence of Hits
+        Of each of `Scene.objects`, as `line_hits` gives them: the surfaces behind the origins, too, and sorted.
+        `Hits.pixel` is a number among `rays`; `Hits.barycentric` is not read.
+    sheets : sequence of float or None
+        Thickness in metres of the sheet that each object is, or None for a solid: see `sheet_thicknesses`.
 
-def _sheet_thickness(body: Object, method: Method | None) -> float | None:
-    """Thickness of the sheet that an object is, in metres; None for a solid."""
-    if body.sheet_thickness is None and isinstance(method, ThinLayer):
-        return method.thickness
-    return body.sheet_thickness
-
-
-def _paths(scene: Scene, size: tuple[int, int], sheets: Sequence[float | None]) -> _Paths:
-    """Thickness of each object along each ray; `sheets` tells what each is, as `_sheet_thickness` does."""
-    pixels = size[0] * size[1]
-    intervals, bad = scene_intervals(scene, size, [i for i, sheet in enumerate(sheets) if sheet is None])
-    cell = intervals.body * pixels + intervals.pixel
-    cells = len(scene.objects) * pixels
-    thickness: Array = np.bincount(cell, intervals.thickness, cells).reshape(-1, pixels).astype(np.float64)
-    coverage = bad.copy()
-    coverage[intervals.pixel] = True
-    bad |= ~(thickness >= -ROUNDING * scene.diagonal).all(axis=0)
-    for i, (body, sheet) in enumerate(zip(scene.objects, sheets, strict=True)):
-        if sheet is not None:
-            hits = camera_hits(body.mesh, body.matrix, scene.camera, size)
-            thickness[i] = np.bincount(hits.pixel, _sheet_paths(scene, size, body, hits, sheet), pixels)
-            coverage[hits.pixel] = True
-    return _Paths(thickness, coverage, ~bad)
-
-
-def _sheet_paths(scene: Scene, size: tuple[int, int], body: Object, hits: Hits, metres: float) -> Array:
-    """(k,): path in metres through the sheet at each hit, by the normal of its face."""
-    _, directions = scene.camera.rays(size)
-    normals = body.mesh.face_normals[hits.face] @ np.linalg.inv(body.matrix[:3, :3])
-    length = np.linalg.norm(normals, axis=1)
-    normals /= np.where(length > 0, length, 1.0)[:, None]
-    # The normals look to the side from which the faces are counter-clockwise: towards the viewer at a front face.
-    outwards = -1 if body.mesh.diagnosis.inverted else 1
-    cosine = -outwards * hits.sign * np.einsum("ki,ki->k", normals, directions.reshape(-1, 3)[hits.pixel])
-    return optics.thin_layer_thickness(metres, cosine, body.medium.ior if body.medium else 1.0)
-
-
-def _shade(scene: Scene, size: tuple[int, int], paths: _Paths) -> dict[str, npt.NDArray[np.generic]]:
-    """The arrays of the frame, pixel by pixel: (pixels,) or (pixels, 3)."""
-    media = [body.medium for body in scene.bodies if body.medium is not None]
-    clamped = np.maximum(paths.thickness, 0.0)
-    depth = np.einsum("bp,bc->pc", clamped, np.stack([medium.extinction for medium in media]))
-    total = clamped.sum(axis=0)
+    Returns
+    -------
+    dict of str to ndarray
+        The arrays of a frame by their names, (n,) or (n, 3), float64 and bool. Covered is a ray that crosses a medium
+        before an opaque surface stops it. Invalid is one that ends inside a solid though nothing stops it, that a
+        solid's faces wind around a negative number of times, or whose optical depth overflows.
+    """
+    wall = nearest_opaque(scene, hits, len(rays))
+    solids = [i for i, body in enumerate(scene.objects) if body.medium is not None and sheets[i] is None]
+    intervals, defective = scene_intervals(scene, hits, solids, wall.distance)
+    crossings = scene_crossings(scene, rays, hits, sheets, wall.distance)
+    segments = scene_segments(scene, intervals, crossings)
+    emitted, depth = composite(segments, len(rays))
     transmittance = optics.transmittance(depth)
-    _, directions = scene.camera.rays(size)
-    row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
-    backdrop = (np.stack([column, row], axis=-1) + 0.5) / size[1]
-    radiance = scene.environment.radiance(directions.reshape(-1, 3), backdrop) * transmittance
-    if media[0].emits:
-        # The planner lets emission pass only where all media are alike, so their order does not matter.
-        radiance += optics.emitted_radiance(media[0].emission, media[0].extinction, total[:, None])
+    behind = np.where(
+        np.isinf(wall.distance)[:, None],
+        scene.environment.radiance(rays.directions, rays.backdrop),
+        reflected_radiance(scene, rays, wall),
+    )
+    coverage = defective.copy()
+    coverage[segments.pixel] = True
+    with np.errstate(under="ignore"):
+        radiance = behind * transmittance + emitted
     return {
         "radiance": radiance,
         "transmittance": transmittance,
         "optical_depth": depth,
-        "thickness": total,
-        "coverage": paths.coverage,
-        "valid": paths.valid & np.isfinite(depth).all(axis=1),
+        "thickness": np.bincount(segments.pixel, segments.count * segments.length, len(rays)).astype(np.float64),
+        "coverage": coverage,
+        "valid": ~defective & np.isfinite(depth).all(axis=1),
     }
+
+
+def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
+    """(h, w): how many surfaces of media each pixel's ray crosses before an opaque one stops it."""
+    width, height = check_size(size)
+    hits = _scene_hits(scene, (width, height))
+    end = nearest_opaque(scene, hits, width * height).distance
+    counts = np.zeros(width * height, dtype=np.int64)
+    for body, line in zip(scene.objects, hits, strict=True):
+        if body.medium is not None:
+            crossed = line.before(end) if body.sheet_thickness is None else sheet_hits(scene, line, end)
+            counts += np.bincount(crossed.pixel, minlength=len(counts))
+    return counts.reshape(height, width)
+
+
+def _scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
+    return [line_hits(body.mesh, body.matrix, scene.camera, size) for body in scene.objects]
+
+
+def _parts(hits: Sequence[Hits], pixels: int) -> Iterator[slice]:
+    """Runs of pixels, each with at most `CHUNK` surfaces times objects, or of one pixel."""
+    crossed = np.cumsum(np.sum([np.bincount(line.pixel, minlength=pixels) for line in hits], axis=0))
+    cuts = np.searchsorted(crossed, np.arange(0, crossed[-1], max(CHUNK // len(hits), 1)), side="right")
+    bounds = np.unique(np.concatenate([[0], cuts[1:], [pixels]]))
+    for begin, end in itertools.pairwise(bounds):
+        yield slice(int(begin), int(end))
+
+
+def _along(line: Hits, part: slice) -> Hits:
+    """The hits on a run of rays, these numbered from 0."""
+    begin, end = np.searchsorted(line.pixel, [part.start, part.stop])
+    own = line.where(slice(begin, end))
+    return Hits(own.pixel - part.start, own.distance, own.sign, own.face, own.barycentric)

@@ -1,0 +1,90 @@
+"""Opaque objects: where they stop the rays, and the light that they send back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.lights import PointLight
+from translucent.reference.hits import Hits, world_normals
+from translucent.reference.rays import Rays
+from translucent.scene import Light, Object, Scene
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class OpaqueHits:
+    """The nearest opaque surface on each ray, seen from either side.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        In metres along the ray, >= 0; inf where there is none.
+    item : (n,) int64
+        Index into `Scene.objects`; -1 where there is none.
+    face : (n,) int64
+        Index into the mesh's faces.
+    """
+
+    distance: Array
+    item: Integers
+    face: Integers
+
+
+def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHits:
+    """The first opaque surface ahead of each origin; of several at one distance, that of the first object.
+
+    Parameters
+    ----------
+    scene : Scene
+    hits : sequence of Hits
+        Of each of `Scene.objects`, as `line_hits` gives them.
+    pixels : int
+        Number of rays.
+    """
+    nearest = OpaqueHits(np.full(pixels, np.inf), np.full(pixels, -1), np.full(pixels, -1))
+    for i, body in enumerate(scene.objects):
+        if body.medium is None:
+            closer = hits[i].before(nearest.distance)
+            pixel, first = np.unique(closer.pixel, return_index=True)
+            nearest.distance[pixel], nearest.item[pixel] = closer.distance[first], i
+            nearest.face[pixel] = closer.face[first]
+    return nearest
+
+
+def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits) -> Array:
+    """Radiance that opaque surfaces reflect diffusely towards the origins, (n, 3); 0 on rays without one.
+
+    Lambert: color / pi times the irradiance on the side that is seen. Nothing shadows, and no medium attenuates the
+    light on its way to the surface.
+    """
+    radiance = np.zeros((len(rays), 3))
+    for i, body in enumerate(scene.objects):
+        seen = np.flatnonzero(nearest.item == i)
+        if seen.size:
+            radiance[seen] = _lambert(scene, body, nearest.face[seen], nearest.distance[seen], rays.where(seen))
+    return radiance
+
+
+def _lambert(scene: Scene, body: Object, face: Integers, distance: Array, rays: Rays) -> Array:
+    """(k, 3): what faces of one object reflect along rays that meet them at `distance`."""
+    normals = world_normals(body, face)
+    away = np.einsum("ki,ki->k", normals, rays.directions) > 0
+    normals[away] *= -1.0
+    # From the eye, as the rays are, so that the way to a light keeps its digits far from the world's origin.
+    points = rays.origins + distance[:, None] * rays.directions
+    irradiance = scene.environment.irradiance_on(normals)
+    for light in scene.lights:
+        irradiance = irradiance + _seen_from(light, scene.camera.eye).irradiance_on(points, normals)
+    with np.errstate(under="ignore"):
+        return np.asarray(np.asarray(body.color) / np.pi * irradiance)
+
+
+def _seen_from(light: Light, eye: Array) -> Light:
+    """The light with its position, where it has one, relative to the eye."""
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light

@@ -1,0 +1,58 @@
+"""The rays of a picture, relative to the eye, so that they keep their digits wherever the scene is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Rays by number; all arrays are flat.
+
+    Attributes
+    ----------
+    origins : (n, 3) float64
+        In metres from the eye, along the axes of the world; zero for a perspective camera.
+    directions : (n, 3) float64
+        Unit vectors.
+    backdrop : (n, 2) float64
+        Position in the picture, right and down from the top left corner, in heights of the picture.
+    """
+
+    origins: Array
+    directions: Array
+    backdrop: Array
+
+    def __len__(self) -> int:
+        return len(self.directions)
+
+    def where(self, chosen: Integers | slice) -> Rays:
+        """The rays that indices or a slice choose, numbered anew."""
+        return Rays(self.origins[chosen], self.directions[chosen], self.backdrop[chosen])
+
+
+def pixel_rays(camera: Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> Rays:
+    """The rays of all pixels; the number of a ray is row * width + column.
+
+    Parameters
+    ----------
+    camera : Camera
+    size : (width, height)
+        In pixels.
+    offset : (right, down)
+        Shift from the pixel centers, in pixels.
+    """
+    at_origin = camera.pose.copy()
+    at_origin[:3, 3] = 0.0
+    origins, directions = Camera(at_origin, camera.fov_y, camera.height).rays(size, offset)
+    row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
+    backdrop = (np.stack([column, row], axis=-1) + 0.5 + offset) / size[1]
+    return Rays(origins.reshape(-1, 3), directions.reshape(-1, 3), backdrop)

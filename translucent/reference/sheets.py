@@ -1,0 +1,93 @@
+"""Thin sheets: surfaces that a ray crosses at one distance, on a path through their thickness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.reference.hits import Hits, world_normals
+from translucent.reference.rays import Rays
+from translucent.scene import Object, Scene
+from translucent.thickness import Method, ThinLayer
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: A sheet that lies on an opaque surface is seen: it may be behind it by this share of the scene's diagonal.
+SHEET_ON_OPAQUE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Where rays cross sheets: flat arrays.
+
+    Attributes
+    ----------
+    pixel : (k,) int64
+        Number of the ray.
+    distance : (k,) float64
+        In metres along the ray, >= 0.
+    path : (k,) float64
+        Metres inside the sheet.
+    body : (k,) int64
+        Index into `Scene.objects`.
+    """
+
+    pixel: Integers
+    distance: Array
+    path: Array
+    body: Integers
+
+
+def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float | None, ...]:
+    """Thickness in metres of the sheet that each of `Scene.objects` is; None for the border of a solid.
+
+    `ThinLayer` makes a sheet of every mesh that declares no thickness of its own. Opaque objects are never sheets.
+    """
+    usual = method.thickness if isinstance(method, ThinLayer) else None
+    return tuple(
+        None if body.medium is None else usual if body.sheet_thickness is None else body.sheet_thickness
+        for body in scene.objects
+    )
+
+
+def sheet_hits(scene: Scene, hits: Hits, end: Array) -> Hits:
+    """The surfaces of a sheet that rays cross before they stop at `end` (pixels,), or at most on what stops them."""
+    return hits.where((hits.distance >= 0) & (hits.distance <= end[hits.pixel] + SHEET_ON_OPAQUE * scene.diagonal))
+
+
+def scene_crossings(
+    scene: Scene, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None], end: Array
+) -> Crossings:
+    """Where rays cross sheets.
+
+    Parameters
+    ----------
+    scene : Scene
+    rays : Rays
+    hits : sequence of Hits
+        Of each of `Scene.objects`, as `line_hits` gives them.
+    sheets : sequence of float or None
+        As `sheet_thicknesses` gives them.
+    end : (n,) float64
+        Where an opaque surface stops each ray, in metres; inf where none does.
+    """
+    parts = [(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64))]
+    for i, (body, metres) in enumerate(zip(scene.objects, sheets, strict=True)):
+        if metres is not None:
+            seen = sheet_hits(scene, hits[i], end)
+            path = _paths(body, metres, seen, rays.directions[seen.pixel])
+            parts.append((seen.pixel, seen.distance, path, np.full(len(path), i)))
+    return Crossings(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _paths(body: Object, metres: float, hits: Hits, directions: Array) -> Array:
+    """(k,): path in metres through the sheet at each hit, by the normal of its face."""
+    # The normals look to the side from which the faces are counter-clockwise: towards the viewer at a front face.
+    outwards = -1 if body.mesh.diagnosis.inverted else 1
+    cosine = -outwards * hits.sign * np.einsum("ki,ki->k", world_normals(body, hits.face), directions)
+    return optics.thin_layer_thickness(metres, cosine, body.medium.ior if body.medium else 1.0)
