@@ -227,7 +227,7 @@ def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
     vertices, faces, uv = _read(path)
     raw = Mesh(vertices * scale, faces, uv, name=path.name)
     raw.require_finite()
-    return _mended(raw)
+    return mended(raw)
 
 
 def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
@@ -256,7 +256,7 @@ def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
     return np.array(geometry.vertices, dtype=np.float64), np.array(geometry.faces, dtype=np.int32), uv
 
 
-def _mended(raw: Mesh) -> Mesh:
+def mended(raw: Mesh) -> Mesh:
     """`raw` welded and consistently wound, with its repairs on record."""
     corners = raw.vertices[raw.faces]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
 from translucent.camera import Camera
 from translucent.lights import Environment
 from translucent.medium import Medium
@@ -11,6 +18,11 @@ from translucent.scene import Object, Scene
 #: Linear color that the default medium keeps of white light after `DEFAULT_REACH` of the mesh's diagonal.
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
+
+#: The default environment: white above and light grey below.
+LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
 def showcase(
@@ -34,10 +46,28 @@ def showcase(
     environment : Environment, optional
         Default: a light table, white above and light grey below.
     """
-    return Scene(
-        objects=[
-            Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
-        ],
-        camera=camera or Camera.framing(mesh.vertices[mesh.faces].reshape(-1, 3), size),
-        environment=environment or Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15)),
-    )
+    shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
+    return Scene([shown], camera or framing([shown], size), environment=environment or LIGHT_TABLE)
+
+
+def framing(
+    objects: Sequence[Object], size: tuple[int, int], fov_y: float = 30.0, up: npt.ArrayLike = (0.0, 1.0, 0.0)
+) -> Camera:
+    """The camera of `Camera.framing` that sees these objects, all of each."""
+    corners = [
+        item.mesh.vertices[np.unique(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3] for item in objects
+    ]
+    return Camera.framing(np.concatenate(corners), size, fov_y=fov_y, up=up)
+
+
+def filled(scene: AnyScene, medium: Medium) -> AnyScene:
+    """The scene with this medium in all its translucent objects, or in all objects if none is translucent.
+
+    Thin sheets become bodies: they had no inside that a medium could fill.
+    """
+    chosen = scene.bodies or scene.objects
+    objects = [
+        dataclasses.replace(item, medium=medium, sheet_thickness=None) if item in chosen else item
+        for item in scene.objects
+    ]
+    return dataclasses.replace(scene, objects=objects)

@@ -18,6 +18,7 @@ import trimesh
 import translucent as tl
 from translucent.cli import main
 from translucent.gpu import context
+from translucent.materials.gltf_file import read_gltf, write_gltf
 
 GREEN = "linear(0.18,0.62,0.35)"
 
@@ -49,6 +50,45 @@ def cube(tmp_path: Path) -> Path:
     path = tmp_path / "cube.ply"
     trimesh.creation.box((1, 1, 1)).export(path)
     return path
+
+
+GLASS = {
+    "KHR_materials_transmission": {"transmissionFactor": 1},
+    "KHR_materials_volume": {"thicknessFactor": 1, "attenuationColor": [0.25, 0.5, 1], "attenuationDistance": 0.5},
+}
+
+
+def write_scene(path: Path, *materials: dict[str, Any], cameras: bool = True) -> Path:
+    """A file of one 1 x 1 x 2 m box per material, 10 m apart along x; and cameras 20 m away along z, and along x."""
+    boxes = trimesh.Scene()
+    for i in range(len(materials)):
+        shift = trimesh.transformations.translation_matrix((10 * i, 0, 0))
+        boxes.add_geometry(trimesh.creation.box((1, 1, 2)), f"Box {i}", f"Box {i}", transform=shift)
+    path.write_bytes(boxes.export(file_type="glb"))
+    file = read_gltf(path)
+    file.tree["materials"] = list(materials)
+    for i, mesh in enumerate(file.tree["meshes"]):
+        mesh["primitives"][0]["material"] = i
+    if cameras:
+        file.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.3, "znear": 1}}] * 2
+        file.tree["nodes"] += [
+            {"camera": 0, "name": "Front", "translation": [0, 0, 20]},
+            {
+                "camera": 1,
+                "name": "Side",
+                "translation": [-20, 0, 0],
+                "rotation": [0, -math.sqrt(0.5), 0, math.sqrt(0.5)],
+            },
+        ]
+        nodes = file.tree["scenes"][0]["nodes"]
+        nodes += range(len(file.tree["nodes"]) - 2, len(file.tree["nodes"]))
+    write_gltf(file, path)
+    return path
+
+
+@pytest.fixture
+def glass_box(tmp_path: Path) -> Path:
+    return write_scene(tmp_path / "scene.glb", {"extensions": GLASS})
 
 
 @pytest.fixture
@@ -121,6 +161,8 @@ BAD_RENDER_OPTIONS = [
     (["--fov", "wide"], "Invalid value for '--fov'"),
     (["--samples", "0"], "samples 0; not a whole number in 1 to 4096"),
     (["--samples", "some"], "Invalid value for '--samples'"),
+    (["--camera", "0"], "cube.ply is no glTF file and has no cameras; use --eye"),
+    (["--camera", "first"], "Invalid value for '--camera'"),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]
 
@@ -146,7 +188,9 @@ def test_render_refuses_a_bad_option_and_writes_nothing(
     ("name", "content", "message"),
     [
         ("missing.obj", None, "no such file"),
-        ("garbage.glb", b"\x00\xff" * 100, "it cannot be read"),
+        ("garbage.glb", b"\x00\xff" * 100, "its JSON is broken"),
+        ("garbage.gltf", b"[1]", "no asset, so it is not glTF 2.0"),
+        ("MISSING.GLB", None, "no such file"),
         ("garbage.ply", b"\x00\xff" * 100, "it cannot be read"),
         ("garbage.obj", b"\x00\xff" * 100, "error: mesh"),
         ("garbage.stl", b"\x00\xff" * 100, "error: mesh"),
@@ -179,6 +223,39 @@ def test_an_unreadable_model_is_refused(run: Run, tmp_path: Path) -> None:
     result = run("explain", tmp_path)
     assert result.code == 2
     assert "no such file" in one_error_line(result)
+
+
+@pytest.mark.parametrize("placed", [("--eye", "0,0,9"), ("--target", "0,0,0"), ("--up", "0,1,0"), ("--fov", "30")])
+def test_a_camera_of_the_file_excludes_one_that_options_place(
+    run: Run, glass_box: Path, tmp_path: Path, placed: tuple[str, str]
+) -> None:
+    result = run("render", glass_box, "-o", tmp_path / "out.png", "--camera", "0", *placed)
+    assert result.code == 2
+    assert f"--camera 0; {placed[0]} given, too; give one or the other" in one_error_line(result)
+
+
+@pytest.mark.parametrize("number", ["2", "-1"])
+def test_a_camera_that_is_not_there_is_refused_with_those_that_are(
+    run: Run, glass_box: Path, tmp_path: Path, number: str
+) -> None:
+    result = run("render", glass_box, "-o", tmp_path / "out.png", "--camera", number)
+    assert result.code == 2
+    assert "it has 0 of node 'Front', 1 of node 'Side'; give one of these numbers" in one_error_line(result)
+
+
+def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_path: Path) -> None:
+    model = write_scene(tmp_path / "rock.glb", {})
+    result = run("render", model, "-o", tmp_path / "out.png")
+    assert result.code == 2
+    line = one_error_line(result)
+    assert "its 1 object is opaque: no material has KHR_materials_transmission; add --preset NAME, or --color C" in line
+    assert not (tmp_path / "out.png").exists()
+    result = run("explain", model)
+    assert (result.code, result.err) == (0, "")
+    assert "'Box 0', opaque: 12 faces, 1 x 1 x 2 m\n" in result.out
+    assert "plan: none, since no object is translucent; see with --preset NAME" in result.out
+    assert strict_json(run("explain", model, "--json").out)["plan"] is None
+    assert "plan: SignedDepth" in run("explain", model, "--preset", "merlot").out
 
 
 @pytest.mark.parametrize(
@@ -303,6 +380,40 @@ def test_explain_as_json(run: Run, cube: Path) -> None:
     assert [step["name"] for step in told["plan"]["passes"]] == ["back_face_depth", "transmittance"]
 
 
+def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
+    wall = {"KHR_materials_transmission": {"transmissionFactor": 1}}
+    tint = {"baseColorFactor": [0.5, 0.5, 0.5, 1]}
+    model = write_scene(
+        tmp_path / "scene.glb", {"extensions": GLASS}, {"extensions": wall, "pbrMetallicRoughness": tint}
+    )
+    result = run("explain", model)
+    assert (result.code, result.err) == (0, "")
+    for words in (
+        "scene.glb: 2 objects, 2 of them translucent, 0 lights, 11 x 1 x 2 m",
+        "'Box 0', body: 12 faces, 1 x 1 x 2 m; closed, convex, 1 component",
+        "'Box 1', thin wall: 12 faces",
+        "medium: 'Box 0': extinction 2.773, 1.386, 0 1/m",
+        "medium: 'Box 1': thin, white light is #bcbcbc behind it",
+        "plan: SignedDepth",
+    ):
+        assert words in result.out
+    told = strict_json(run("explain", model, "--json").out)
+    assert [item["kind"] for item in told["objects"]] == ["body", "thin wall"]
+    assert told["objects"][0]["extinction"] == pytest.approx([4 * math.log(2), 2 * math.log(2), 0.0], rel=1e-14)
+    assert (told["lights"], told["left_out"]) == (0, [])
+    assert told["plan"]["passes"][-1]["name"] == "transmittance"
+
+
+def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:
+    model = write_scene(tmp_path / "scene.glb", {"extensions": GLASS, "alphaMode": "BLEND", "name": "Glass"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")  # pytest turns warnings into errors, which nothing else does
+        result = run("explain", model, "--json")
+    lost = "transparency by alphaMode BLEND ('Glass')"
+    assert result.err.splitlines() == [f"warning: scene 'scene.glb': left out: {lost}"]
+    assert strict_json(result.out)["left_out"] == [lost]
+
+
 def test_explain_needs_no_opengl(run: Run, cube: Path, no_opengl: None) -> None:
     assert run("explain", cube).code == 0
 
@@ -364,6 +475,7 @@ class TestRendering:
             ["--samples", "3"],
             ["--fov", "60"],
             ["--up", "0,0,1"],
+            ["--backend", "cpu"],
         ],
         ids=" ".join,
     )
@@ -378,6 +490,57 @@ class TestRendering:
             assert picture.mode == "RGB"
             # The body in the middle is not the backdrop of a corner.
             assert picture.getpixel((8, 6)) != picture.getpixel((0, 0))
+
+    @pytest.mark.parametrize(("camera", "metres"), [((), 2.0), (("--camera", "0"), 2.0), (("--camera", "1"), 1.0)])
+    def test_render_shows_a_scene_in_its_own_media_through_its_cameras(
+        self, run: Run, glass_box: Path, tmp_path: Path, camera: tuple[str, ...], metres: float
+    ) -> None:
+        output = tmp_path / "scene.npz"
+        result = run("render", glass_box, "-o", output, "--size", "9x5", "--samples", "1", *camera)
+        assert (result.code, result.err) == (0, "")
+        assert "medium: extinction 2.773, 1.386, 0 1/m" in result.out
+        with np.load(output) as arrays:
+            assert arrays["thickness"][2, 4] == pytest.approx(metres, rel=1e-6)
+            color = np.power([0.25, 0.5, 1.0], metres / 0.5)
+            assert arrays["transmittance"][2, 4] == pytest.approx(color, rel=1e-5)
+
+    def test_a_color_replaces_the_media_of_a_scene(self, run: Run, tmp_path: Path) -> None:
+        model, output = write_scene(tmp_path / "scene.glb", {"extensions": GLASS}), tmp_path / "scene.npz"
+        for material in ({"extensions": GLASS}, {}):  # translucent, or opaque and filled all the same
+            write_scene(model, material, cameras=False)
+            medium = ("--color", "linear(1,0.5,0.25)", "--distance", "1m")
+            result = run("render", model, "-o", output, *self.VIEW, *medium, "--unit", "cm")
+            assert (result.code, result.err) == (0, "")
+            assert "medium: extinction 0, 0.6931, 1.386 1/m" in result.out
+            with np.load(output) as arrays:
+                assert arrays["thickness"][2, 4] == pytest.approx(0.02, rel=1e-6)
+
+    def test_render_frames_all_objects_of_a_scene_without_cameras(self, run: Run, tmp_path: Path) -> None:
+        model = write_scene(tmp_path / "two.glb", {"extensions": GLASS}, {"extensions": GLASS}, cameras=False)
+        for options in ((), ("--fov", "60"), ("--camera", "0")):
+            result = run("render", model, "-o", tmp_path / "two.npz", "--size", "40x30", "--samples", "1", *options)
+            assert (result.code, result.err) == (0, "")
+            with np.load(tmp_path / "two.npz") as arrays:
+                covered = arrays["coverage"]
+            assert covered.any()
+            border = np.concatenate([covered[0], covered[-1], covered[:, 0], covered[:, -1]])
+            assert not border.any()
+
+    @pytest.mark.filterwarnings("ignore:scene 'AttenuationTest.glb'")
+    def test_the_attenuation_test_has_equal_columns_before_its_opaque_backdrop(
+        self, run: Run, assets: Path, tmp_path: Path
+    ) -> None:
+        away, half, output = 2000.0, 12.0, tmp_path / "rows.npz"
+        view = ("--eye", f"0,0,{away:g}", "--target", "0,0,0", "--fov", repr(2 * math.degrees(math.atan(half / away))))
+        model = assets / "gltf" / "AttenuationTest.glb"
+        assert run("render", model, "-o", output, "--size", "240x240", "--samples", "1", *view).code == 0
+        with np.load(output) as arrays:
+            transmittance, valid = arrays["transmittance"], arrays["valid"]
+        assert valid.all()
+        for x, metres in {-3.5: 0.25, -2.0: 0.5, 0.0: 1.0, 2.5: 1.5, 6.0: 2.0}.items():
+            column = [transmittance[int((half - y) * 10), int((half + x) * 10)] for y in (6, 3, 0, -3, -6)]
+            # Rays are off the axis by 9 / 2000 at most, and so the longest path by 2 m * 1e-5; or by float32.
+            np.testing.assert_allclose(column, [np.power([0.1, 0.5, 0.9], metres)] * 5, rtol=5e-5)
 
     @pytest.mark.parametrize("eye", [("--eye", "9,0,0"), ()], ids=["given", "framed"])
     def test_up_turns_the_picture(self, run: Run, tmp_path: Path, eye: tuple[str, ...]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -11,12 +10,9 @@ import click
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.camera import Camera
     from translucent.frame import Frame
     from translucent.lights import Environment
     from translucent.medium import Medium
-    from translucent.mesh import Mesh
-    from translucent.scene import Scene
     from translucent.thickness import Method
 
 #: Below this mean share of light a picture shows little but black.
@@ -47,18 +43,6 @@ def unit_option(command: F) -> F:
     return click.option(
         "--unit", default="m", show_default=True, metavar="U", help="Unit of the file's coordinates: mm, cm, in, ..."
     )(command)
-
-
-def read_mesh(model: str, unit: str) -> Mesh:
-    """The mesh of a file, or of the toolkit's own by name."""
-    from translucent.assets import mesh_names, mesh_path
-    from translucent.mesh import load_mesh
-
-    if model in mesh_names() and not Path(model).exists():
-        if unit != "m":
-            raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
-        return load_mesh(mesh_path(model))
-    return load_mesh(model, unit=unit)
 
 
 def read_medium(color: str | None, distance: str | None, preset_name: str | None) -> Medium | None:
@@ -104,37 +88,6 @@ def read_environment(background: str) -> Environment | None:
     return Environment.constant(background)
 
 
-def read_camera(
-    mesh: Mesh, eye: str | None, target: str | None, up: str, fov: float, size: tuple[int, int]
-) -> Camera | None:
-    """The camera that the options choose; None leaves it to the showcase."""
-    from translucent.camera import Camera
-
-    if eye is None:
-        if target is not None:
-            raise InputError("--target", "--eye is missing", "give both, or neither")
-        if fov == 30.0 and up == "0,1,0":
-            return None
-        return Camera.framing(mesh.vertices[mesh.faces].reshape(-1, 3), size, fov_y=fov, up=read_vector("--up", up))
-    return Camera.look_at(
-        read_vector("--eye", eye),
-        mesh.center if target is None else read_vector("--target", target),
-        read_vector("--up", up),
-        fov_y=fov,
-    )
-
-
-def read_vector(option: str, text: str) -> list[float]:
-    """Three numbers of an option."""
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != 3:
-        raise InputError(f"{option} {text!r}", "not three numbers", f"write for example {option} 0,1.5,4")
-    return values
-
-
 def read_size(text: str) -> tuple[int, int]:
     """Width and height of an option."""
     from translucent.camera import check_size
@@ -149,17 +102,6 @@ def read_size(text: str) -> tuple[int, int]:
 def triple_text(values: Any) -> str:
     """Three numbers, aligned."""
     return " ".join(f"{value:10.5g}" for value in values)
-
-
-def medium_text(scene: Scene) -> str:
-    """What the only body of a scene is filled with, and how light fares in it."""
-    from translucent.color import to_hex
-
-    body = scene.bodies[0]
-    reach = 0.1 * body.mesh.diagonal
-    seen = to_hex(body.medium.transmittance(reach)) if body.medium is not None else ""
-    sigma = body.medium.extinction if body.medium is not None else ()
-    return f"extinction {', '.join(f'{value:.4g}' for value in sigma)} 1/m: white light is {seen} after {reach:.3g} m"
 
 
 def warn_if_black(frame: Frame) -> None:

@@ -1,12 +1,19 @@
-"""``translucent explain``: what is known about a mesh, and how it would be rendered."""
+"""``translucent explain``: what is known about a mesh or a scene, and how it would be rendered."""
 
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, medium_options, read_medium, read_mesh, read_method, unit_option
+from translucent.commands.common import common_options, medium_options, read_medium, read_method, unit_option
+from translucent.commands.model import is_scene_file, medium_lines, read_scene
+
+if TYPE_CHECKING:
+    from translucent.mesh import Mesh
+    from translucent.render_plan import RenderPlan
+    from translucent.scene import Object, Scene
 
 
 @click.command(epilog="Example: translucent explain goblet")
@@ -24,16 +31,51 @@ def explain(
     method_name: str | None,
     as_json: bool,
 ) -> None:
-    """Say what is known about MODEL, which passes would render it, and why."""
+    """Say what is known about MODEL, which passes would render it, and why.
+
+    Of a .glb or .gltf file, the scene that it is, with the media of its materials.
+    """
     from translucent.plan import plan
-    from translucent.showcase import showcase
 
     medium = read_medium(color, distance, preset_name)
-    mesh = read_mesh(model, unit)
-    chosen = plan(showcase(mesh, medium), read_method(method_name, None))
+    scene = read_scene(model, unit, medium)
+    method = read_method(method_name, None)
+    chosen = plan(scene, method) if scene.bodies else None
     if as_json:
-        click.echo(json.dumps({"mesh": mesh.summary(), "plan": chosen.summary()}))
-        return
+        click.echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
+    elif is_scene_file(model):
+        _tell_scene(model, scene)
+        _tell_plan(chosen)
+    else:
+        _tell_mesh(scene.objects[0].mesh)
+        _tell_plan(chosen)
+
+
+def _summary(model: str, scene: Scene) -> dict[str, Any]:
+    if not is_scene_file(model):
+        return {"mesh": scene.objects[0].mesh.summary()}
+    return {
+        "objects": [
+            {
+                **item.mesh.summary(),
+                "kind": _kind(item),
+                "transform": item.matrix.tolist(),
+                "extinction": None if item.medium is None else item.medium.extinction.tolist(),
+            }
+            for item in scene.objects
+        ],
+        "lights": len(scene.lights),
+        "left_out": list(getattr(scene, "left_out", ())),
+    }
+
+
+def _kind(item: Object) -> str:
+    if item.medium is None:
+        return "opaque"
+    return "body" if item.sheet_thickness is None else "thin wall"
+
+
+def _tell_mesh(mesh: Mesh) -> None:
     low, high = mesh.bounds
     click.echo(
         f"{mesh.name}: {len(mesh.vertices)} vertices, {len(mesh.faces)} faces, "
@@ -42,4 +84,27 @@ def explain(
     click.echo(f"mesh: {mesh.diagnosis}")
     for repair in mesh.repairs:
         click.echo(f"repaired: {repair}")
-    click.echo(f"plan: {chosen}")
+
+
+def _tell_scene(model: str, scene: Scene) -> None:
+    low, high = scene.bounds
+    click.echo(
+        f"{model}: {len(scene.objects)} objects, {len(scene.bodies)} of them translucent, {len(scene.lights)} lights, "
+        f"{' x '.join(f'{v:.4g}' for v in high - low)} m"
+    )
+    for item in scene.objects:
+        kind, size = _kind(item), " x ".join(f"{v:.4g}" for v in item.bounds[1] - item.bounds[0])
+        # Only what bounds a solid has to be closed.
+        state = f"; {item.mesh.diagnosis}" if kind == "body" else ""
+        click.echo(f"  {item.mesh.name!r}, {kind}: {len(item.mesh.faces)} faces, {size} m{state}")
+        for repair in item.mesh.repairs if kind == "body" else ():
+            click.echo(f"    repaired: {repair}")
+    for line in medium_lines(scene):
+        click.echo(f"medium: {line}")
+
+
+def _tell_plan(chosen: RenderPlan | None) -> None:
+    if chosen is None:
+        click.echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
+    else:
+        click.echo(f"plan: {chosen}")

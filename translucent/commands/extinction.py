@@ -1,4 +1,4 @@
-"""``translucent extinction``: from colors at distances to extinction, one by one, by the table, or fitted."""
+"""``translucent extinction``: from colors at distances, or on a model, to extinction; one, by the table, fitted."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, triple_text
+from translucent.commands.common import common_options, read_medium, triple_text
+from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from translucent.fitting import Fit
+    from translucent.frame import Frame
+    from translucent.medium import Medium
 
 TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", "usd", "css", "json")
 
@@ -22,13 +27,17 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.command(epilog="Example: translucent extinction '#7b1e3a' 1cm")
 @click.argument("color", required=False)
 @click.argument("distance", required=False)
-@click.option("--unit", default="m", show_default=True, help="Unit of distances that name none.")
+@click.option("--unit", default="m", show_default=True, help="Unit of distances that name none, and of MODEL.")
 @click.option("--unit-out", default="m", show_default=True, metavar="U", help="Give the extinction per this unit, too.")
 @click.option("--clamp", is_flag=True, help="Take channels below 1e-4 for 1e-4, instead of refusing 0.")
 @click.option("--as", "target", type=click.Choice(TARGETS), help="Print the material for an engine, to paste.")
 @click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
 @click.option("--fit", type=click.Path(path_type=Path), metavar="FILE", help="Fit to rows of distance,color[,weight].")
+@click.option("--preset", "preset_name", metavar="NAME", help="A named medium instead of a color at a distance.")
+@click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx, .usda or .json material instead.")
+@click.option("--on", "model", metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above.")
+@click.option("--eye", metavar="X,Y,Z", help="Of --on: where it is seen from, in metres. Default: as render shows it.")
 @common_options
 @click.pass_context
 def extinction(
@@ -42,18 +51,34 @@ def extinction(
     batch: Path | None,
     output: Path | None,
     fit: Path | None,
+    preset_name: str | None,
+    source: str | None,
+    model: str | None,
+    eye: str | None,
     as_json: bool,
 ) -> None:
     """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance.
 
     COLOR is '#7b1e3a', teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
+
+    With --on MODEL and no DISTANCE, the medium in which that model shows COLOR on average, over the pixels that it
+    covers before white light; with a DISTANCE, --preset or --from, the average color that this medium shows on it.
     """
     from translucent.units import metres_per_unit
 
     metres_per_unit(unit_out)
-    _check_usage({"--batch": batch, "--fit": fit, "COLOR": color}, {"--json": as_json or None, "--as": target})
+    media: dict[str, object] = {
+        "--batch": batch,
+        "--fit": fit,
+        "COLOR": color,
+        "--preset": preset_name,
+        "--from": source,
+    }
+    _check_usage(media, {"--batch": batch, "--fit": fit, "--on": model}, {"--json": as_json or None, "--as": target})
     if output is not None and batch is None:
         raise InputError(f"-o {output}", "only --batch writes a file", "leave it out")
+    if eye is not None and model is None:
+        raise InputError(f"--eye {eye}", "only --on looks at a model", "leave it out")
     if batch is not None:
         if target is not None:
             raise InputError(f"--as {target}", "it takes one color, not --batch", "leave one of them out")
@@ -62,10 +87,19 @@ def extinction(
         if clamp:
             raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
         return _fit(fit, unit, unit_out, target, as_json)
-    for name, value in zip(("COLOR", "DISTANCE"), (color, distance), strict=True):
-        if value is None:
-            raise click.MissingParameter(ctx=context, param_hint=f"'{name}'", param_type="argument")
-    return _one(str(color), str(distance), unit, unit_out, clamp, target, as_json)
+    medium = _given_medium(source, preset_name, unit)
+    if medium is None and (color is None or (distance is None and model is None)):
+        missing = "'COLOR'" if color is None else "'DISTANCE'"
+        raise click.MissingParameter(ctx=context, param_hint=missing, param_type="argument")
+    frame = None if model is None else thickness_on(model, unit, eye)
+    told, medium = _convert(medium, color, distance, frame, unit, unit_out, clamp)
+    stated = told["distance"]
+    if model is not None and frame is not None:
+        told["on"] = told_on(model, frame, medium)
+        told["warnings"] += doubts_on(told["on"])
+        # Without a distance of the user's own, an engine gets the color at the model's thickness.
+        stated = stated if distance is not None else told["on"]["mean_thickness"]
+    return _tell(told, medium, stated, target, as_json)
 
 
 def _check_usage(*groups: dict[str, object]) -> None:
@@ -75,30 +109,62 @@ def _check_usage(*groups: dict[str, object]) -> None:
             raise InputError(f"{given[1]} with {given[0]}", "each asks for something else", "give one of them")
 
 
-def _one(color: str, distance: str, unit: str, unit_out: str, clamp: bool, target: str | None, as_json: bool) -> None:
+def _given_medium(source: str | None, preset_name: str | None, unit: str) -> Medium | None:
+    from translucent.materials import load_medium
+
+    return read_medium(None, None, preset_name) if source is None else load_medium(source, unit)
+
+
+def _convert(
+    medium: Medium | None,
+    color: str | None,
+    distance: str | None,
+    frame: Frame | None,
+    unit: str,
+    unit_out: str,
+    clamp: bool,
+) -> tuple[dict[str, Any], Medium]:
+    """What there is to say of a medium: a given one, one for a color at a distance, or one for a color on a model."""
+    import numpy as np
+
+    from translucent.appearance import medium_for_average_color, thickness_samples
     from translucent.color import parse_color
-    from translucent.conversion import CLAMP, clamp_colors, summary
+    from translucent.conversion import summary
+    from translucent.materials.color_distance import color_at
     from translucent.medium import Medium
     from translucent.units import parse_length
 
-    metres = parse_length(distance, unit)
-    clamped, changed = clamp_colors(parse_color(color))
-    medium = Medium.from_color(clamped if clamp else color, metres)
-    told = summary(clamped if clamp else parse_color(color), metres, medium.extinction, unit_out)
-    if clamp and changed.any():
-        told["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
-    _tell(told, medium, target, as_json)
+    wanted, changes = _clamped(color) if clamp and color is not None else (color or "", [])
+    if distance is not None:
+        metres = parse_length(distance, unit)
+        medium, triple = Medium.from_color(wanted, metres), parse_color(wanted)
+    else:
+        thickness = np.empty(0) if frame is None else thickness_samples(frame)
+        medium = medium or medium_for_average_color(thickness, wanted)
+        # At the mean thickness of the model; without a model, or where that is black, where 1/e is left.
+        near = None if medium.extinction.any() else 1.0
+        triple, metres = color_at(medium, near if frame is None else float(thickness.mean()))
+    told = summary(triple, metres, medium.extinction, unit_out)
+    told["warnings"][:0] = changes
+    return told, medium
 
 
-def _tell(told: dict[str, Any], medium: Any, target: str | None, as_json: bool) -> None:
-    import numpy as np
+def _clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
+    """The color without channels that are too dark, and a line for the user where there were any."""
+    from translucent.color import parse_color
+    from translucent.conversion import CLAMP, clamp_colors
 
+    triple, changed = clamp_colors(parse_color(color))
+    return triple, [f"color clamped to {CLAMP:g} where it was below"] if changed.any() else []
+
+
+def _tell(told: dict[str, Any], medium: Medium, stated: float, target: str | None, as_json: bool) -> None:
     if target is not None:
         from translucent.materials import text_block
 
         for line in told["warnings"]:
             click.echo(f"warning: {line}", err=True)
-        click.echo(text_block(target, medium, np.array(told["color"]), told["distance"]))
+        click.echo(text_block(target, medium, medium.transmittance(stated), stated))
         return
     click.echo(json.dumps(told) if as_json else _report(told))
 
@@ -108,7 +174,8 @@ def _report(told: dict[str, Any]) -> str:
     from translucent.swatches import terminal_strip
 
     distance, colors = told["distance"], told["transmittance"]
-    lines = [
+    lines = report_on(told["on"]) if "on" in told else []
+    lines += [
         f"color           {triple_text(told['color'])} linear, {to_hex(told['color'])} sRGB, after {distance:g} m",
         f"extinction      {triple_text(told['extinction'])} 1/m",
     ]
@@ -120,6 +187,9 @@ def _report(told: dict[str, Any]) -> str:
         f"                light has the color at {distance:g} m, 1/e (37 %) at a mean free path, half at a half-value",
     ]
     if sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb":
+        if "on" in told:
+            parts = [told["on"]["average_color"], *(part["color"] for part in told["on"]["parts"])]
+            lines.append(f"on the model    {terminal_strip(parts)}")
         lines.append(f"swatches        {terminal_strip(list(colors.values()))}")
     for factor, row in colors.items():
         lines.append(f"after {float(factor) * distance:<9.4g} m {triple_text(row)} linear, {to_hex(row)}")
@@ -161,7 +231,7 @@ def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: boo
     told["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
     error = None if fit.standard_error is None else fit.standard_error.tolist()
     told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
-    _tell(told, fit.medium, target, as_json)
+    _tell(told, fit.medium, distance, target, as_json)
     if not as_json and target is None:
         click.echo(_fit_report(fit))
 

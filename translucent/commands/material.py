@@ -38,10 +38,9 @@ def show(model: str, as_json: bool) -> None:
 
 def _describe(entry: GltfMaterial) -> None:
     medium = entry.medium()
-    kind = "opaque" if not entry.transmits else "thin wall" if medium is None else "volume"
-    click.echo(f"{entry.index} {entry.name!r}: {kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
+    click.echo(f"{entry.index} {entry.name!r}: {entry.kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
     if entry.has_volume:
-        texture = f" times texture {entry.thickness_texture}" if entry.has_thickness_texture else ""
+        texture = _texture_text(entry) if entry.has_thickness_texture else ""
         click.echo(f"  thickness   {entry.thickness:10.5g}{texture} (mesh space)")
         click.echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
     if medium is not None:
@@ -52,6 +51,12 @@ def _describe(entry: GltfMaterial) -> None:
         click.echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
     for warning in entry.warnings:
         click.echo(f"  warning: {warning}")
+
+
+def _texture_text(entry: GltfMaterial) -> str:
+    transform = entry.thickness_transform
+    changed = ", transformed" if (transform.offset, transform.rotation, transform.scale) != ((0, 0), 0, (1, 1)) else ""
+    return f" times texture {entry.thickness_texture} at TEXCOORD_{transform.tex_coord}{changed}"
 
 
 @material.command(

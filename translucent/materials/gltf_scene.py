@@ -19,6 +19,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.materials.gltf import GltfMaterial
 from translucent.materials.gltf_file import GltfFile, Json
+from translucent.materials.gltf_texture import sample
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +42,25 @@ def material_uses(file: GltfFile) -> list[MaterialUse]:
     InputError
         If the nodes form no trees, or an index or a transform is wrong.
     """
+    nodes, transforms = file.items("nodes"), node_transforms(file)
+    uses = []
+    for index, node in enumerate(nodes):
+        if "mesh" in node:
+            mesh = file.item("meshes", node["mesh"])
+            name = str(node.get("name", mesh.get("name", "")))
+            for material in sorted({p["material"] for p in primitives(file, mesh) if "material" in p}):
+                uses.append(MaterialUse(index, name, material, transforms[index]))
+    return uses
+
+
+def node_transforms(file: GltfFile) -> dict[int, Array]:
+    """Node to world (4x4) of every node, by its index.
+
+    Raises
+    ------
+    InputError
+        If the nodes form no trees, or an index or a transform is wrong.
+    """
     nodes = file.items("nodes")
     transforms: dict[int, Array] = {}
     children = {child for node in nodes for child in _indices(file, node)}
@@ -53,14 +73,7 @@ def material_uses(file: GltfFile) -> list[MaterialUse]:
         pending += [(child, transforms[index]) for child in _indices(file, nodes[index])]
     if len(transforms) < len(nodes):
         raise InputError(f"glTF {str(file.path)!r}", "nodes are their own parents", "export the file again")
-    uses = []
-    for index, node in enumerate(nodes):
-        if "mesh" in node:
-            mesh = file.item("meshes", node["mesh"])
-            name = str(node.get("name", mesh.get("name", "")))
-            for material in sorted({p["material"] for p in primitives(file, mesh) if "material" in p}):
-                uses.append(MaterialUse(index, name, material, transforms[index]))
-    return uses
+    return transforms
 
 
 def primitives(file: GltfFile, mesh: Json) -> list[Json]:
@@ -168,3 +181,30 @@ def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
             f"glTF {str(file.path)!r}", f"its thickness texture cannot be read ({error})", "export the file again"
         ) from error
     return material.thickness * (levels / 65535.0 if deep else levels[..., 1] / 255.0)
+
+
+def thickness_at(file: GltfFile, material: GltfMaterial, uv: npt.ArrayLike) -> Array:
+    """(...,): thickness in mesh space at UVs of the mesh, with the texture's transform, wrapping and interpolation.
+
+    Parameters
+    ----------
+    file : GltfFile
+    material : GltfMaterial
+        Of that file. Without a thickness texture, its thickness is the same everywhere.
+    uv : array_like (..., 2)
+        As glTF has them, v = 0 at the top of the image; those of the set `material.thickness_transform.tex_coord`.
+
+    Raises
+    ------
+    InputError
+        If the image is missing or cannot be read, or the UVs are not finite pairs.
+    """
+    coordinates = np.asarray(uv, dtype=np.float64)
+    if coordinates.shape[-1:] != (2,) or not np.isfinite(coordinates).all():
+        raise InputError(f"UVs of shape {coordinates.shape}", "not finite pairs (..., 2)", "give u and v")
+    image = thickness_map(file, material)
+    if image is None:
+        return np.full(coordinates.shape[:-1], material.thickness)
+    texture = file.item("textures", material.thickness_texture)
+    sampler = file.item("samplers", texture["sampler"]) if "sampler" in texture else {}
+    return sample(image, material.thickness_transform.apply(coordinates), sampler)

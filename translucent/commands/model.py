@@ -1,0 +1,142 @@
+"""From MODEL and the options of a verb to a scene."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from translucent.errors import InputError
+
+if TYPE_CHECKING:
+    from translucent.camera import Camera
+    from translucent.lights import Environment
+    from translucent.medium import Medium
+    from translucent.mesh import Mesh
+    from translucent.scene import Object, Scene
+
+#: Of a camera that options place, and that no option says otherwise of.
+DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
+
+
+class View(NamedTuple):
+    """The options that choose a camera, as they were given."""
+
+    camera: int | None = None
+    eye: str | None = None
+    target: str | None = None
+    up: str | None = None
+    fov: float | None = None
+
+    @property
+    def placed(self) -> list[str]:
+        """The options among these that place a camera."""
+        options = {"--eye": self.eye, "--target": self.target, "--up": self.up, "--fov": self.fov}
+        return [option for option, value in options.items() if value is not None]
+
+
+def is_scene_file(model: str) -> bool:
+    """Whether MODEL is a glTF file, which holds a scene; all others hold one mesh."""
+    from translucent.gltf.load import SUFFIXES
+
+    return Path(model).suffix.lower() in SUFFIXES
+
+
+def read_scene(
+    model: str,
+    unit: str,
+    medium: Medium | None,
+    view: View | None = None,
+    size: tuple[int, int] = (1280, 720),
+    environment: Environment | None = None,
+) -> Scene:
+    """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
+    from translucent.gltf.load import load_scene
+    from translucent.showcase import filled, showcase
+
+    view = view or View()
+    if view.camera is not None and view.placed:
+        raise InputError(f"--camera {view.camera}", f"{', '.join(view.placed)} given, too", "give one or the other")
+    if not is_scene_file(model):
+        if view.camera is not None:
+            raise InputError(f"--camera {view.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
+        scene = showcase(read_mesh(model, unit), medium, size, environment=environment)
+    else:
+        scene = load_scene(model, unit, None if view.placed else view.camera or 0, size)
+        if medium is not None:
+            scene = filled(scene, medium)
+        if environment is not None:
+            scene = dataclasses.replace(scene, environment=environment)
+    return dataclasses.replace(scene, camera=_placed_camera(scene, view, size)) if view.placed else scene
+
+
+def require_translucent(model: str, scene: Scene) -> None:
+    """Raise `InputError` if light passes no object of the scene."""
+    if not scene.bodies:
+        count = len(scene.objects)
+        raise InputError(
+            f"rendering {model!r}",
+            f"its {count} object{' is' if count == 1 else 's are'} opaque: no material has KHR_materials_transmission",
+            "add --preset NAME, or --color C and --distance D, to give all of them a medium",
+        )
+
+
+def read_mesh(model: str, unit: str) -> Mesh:
+    """The mesh of a file, or of the toolkit's own by name."""
+    from translucent.assets import mesh_names, mesh_path
+    from translucent.mesh import load_mesh
+
+    if model in mesh_names() and not Path(model).exists():
+        if unit != "m":
+            raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
+        return load_mesh(mesh_path(model))
+    return load_mesh(model, unit=unit)
+
+
+def _placed_camera(scene: Scene, view: View, size: tuple[int, int]) -> Camera:
+    """The camera that the options place, or that frames all objects as they say."""
+    from translucent.camera import Camera
+    from translucent.showcase import framing
+
+    up, fov = read_vector("--up", view.up or DEFAULT_UP), DEFAULT_FOV if view.fov is None else view.fov
+    if view.eye is None:
+        if view.target is not None:
+            raise InputError("--target", "--eye is missing", "give both, or neither")
+        return framing(scene.objects, size, fov_y=fov, up=up)
+    target = scene.bounds.mean(axis=0) if view.target is None else read_vector("--target", view.target)
+    return Camera.look_at(read_vector("--eye", view.eye), target, up, fov_y=fov)
+
+
+def read_vector(option: str, text: str) -> list[float]:
+    """Three numbers of an option."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3:
+        raise InputError(f"{option} {text!r}", "not three numbers", f"write for example {option} 0,1.5,4")
+    return values
+
+
+def medium_lines(scene: Scene) -> list[str]:
+    """What the translucent objects of a scene are filled with, and how light fares in it; a line per medium."""
+    users: dict[Medium, list[Object]] = {}
+    for body in scene.bodies:
+        if body.medium is not None:
+            users.setdefault(body.medium, []).append(body)
+    return [_medium_text(medium, bodies, several=len(users) > 1) for medium, bodies in users.items()]
+
+
+def _medium_text(medium: Medium, bodies: list[Object], *, several: bool) -> str:
+    from translucent.color import to_hex
+
+    names = ", ".join(sorted({repr(body.mesh.name) for body in bodies}))
+    whose = f"{names}: " if several else ""
+    if (sheet := bodies[0].sheet_thickness) is not None:
+        return f"{whose}thin, white light is {to_hex(medium.transmittance(sheet))} behind it"
+    reach = 0.1 * float(np.linalg.norm(bodies[0].bounds[1] - bodies[0].bounds[0]))
+    sigma = ", ".join(f"{value:.4g}" for value in medium.extinction)
+    seen = to_hex(medium.transmittance(reach))
+    return f"{whose}extinction {sigma} 1/m: white light is {seen} after {reach:.3g} m"

@@ -1,0 +1,1 @@
+"""Scenes from glTF 2.0 files: nodes, meshes, cameras and lights. `translucent.materials` reads their materials."""

@@ -1,0 +1,65 @@
+"""Values of a glTF file's JSON, checked, and the one form of a refusal."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.materials.gltf_file import GltfFile, Json
+
+Array = npt.NDArray[np.float64]
+
+
+def refused(file: GltfFile, found: str, do: str = "export the file again") -> InputError:
+    """The error for a file that cannot become a scene."""
+    return InputError(f"glTF {str(file.path)!r}", found, do)
+
+
+def label(items: list[Json], index: int) -> str:
+    """What messages call an item of a list: its name in quotes, or its index."""
+    name = items[index].get("name")
+    return repr(name) if isinstance(name, str) and name else f"number {index}"
+
+
+def section(file: GltfFile, where: str, holder: Json, key: str) -> Json:
+    """The object that `holder` has as `key`; empty if it has none.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    """
+    found = holder.get(key, {})
+    if not isinstance(found, dict):
+        raise refused(file, f"{where}: {key} is {found!r}, not an object")
+    return found
+
+
+def extension(file: GltfFile, where: str, holder: Json, name: str) -> Json:
+    """What an extension says of `holder`; empty if it says nothing."""
+    return section(file, where, section(file, where, holder, "extensions"), name)
+
+
+def number(file: GltfFile, where: str, holder: Json, key: str, default: float | None = None) -> float:
+    """A number of `holder`; raises `InputError` if it is none, or missing without a default."""
+    value = holder.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise refused(file, f"{where}: {key} is {value!r}, not a number")
+    return float(value)
+
+
+def whole(file: GltfFile, where: str, holder: Json, key: str, default: int | None = None) -> int:
+    """A whole number of 0 or more of `holder`; raises `InputError` if it is none."""
+    value = holder.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise refused(file, f"{where}: {key} is {value!r}, not a whole number of 0 or more")
+    return value
+
+
+def numbers(file: GltfFile, where: str, holder: Json, key: str, default: tuple[float, ...]) -> Array:
+    """As many numbers as the default has; raises `InputError` if they are others."""
+    values = holder.get(key, list(default))
+    if not isinstance(values, list) or len(values) != len(default):
+        raise refused(file, f"{where}: {key} is {values!r}, not {len(default)} numbers")
+    return np.array([number(file, where, {key: value}, key) for value in values])

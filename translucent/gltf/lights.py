@@ -1,0 +1,78 @@
+"""Lights of KHR_lights_punctual that nodes place.
+
+A point light's candela is read as W/sr, a directional light's lux as W/m^2: the file's number times its color, per
+channel. `range` has no effect, since light falls off with the inverse square. Spot lights are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.gltf.cameras import require_regular
+from translucent.gltf.fields import extension, label, number, numbers, refused
+from translucent.gltf.left_out import LeftOut
+from translucent.lights import DirectionalLight, PointLight
+from translucent.materials.gltf_file import GltfFile, Json
+from translucent.scene import Light
+
+Array = npt.NDArray[np.float64]
+
+LIGHTS = "KHR_lights_punctual"
+
+
+def scene_lights(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Light]:
+    """The lights of a scene.
+
+    Parameters
+    ----------
+    file : GltfFile
+    transforms : dict
+        Node to world (4x4) of the nodes of the scene.
+    metres : float
+        Per unit of the file. Intensities change with its square, so that the light on the objects is the same.
+    left_out : LeftOut
+        Gets what the lights do not hold.
+
+    Raises
+    ------
+    InputError
+        If a light is wrong, or its node's transform is singular.
+    """
+    nodes = file.items("nodes")
+    listed = extension(file, "the file", file.tree, LIGHTS).get("lights", [])
+    found: list[Light] = []
+    for node, matrix in transforms.items():
+        name = label(nodes, node)
+        where = f"light of node {name}"
+        if not (placed := extension(file, where, nodes[node], LIGHTS)):
+            continue
+        index = placed.get("light")
+        if not isinstance(listed, list) or isinstance(index, bool) or not isinstance(index, int):
+            raise refused(file, f"{where}: light {index!r} is not one of its lights")
+        if not 0 <= index < len(listed) or not isinstance(listed[index], dict):
+            raise refused(file, f"{where}: light {index} is not one of {len(listed)}")
+        require_regular(file, where, matrix[:3, :3])
+        if (light := _light(file, where, name, listed[index], matrix, metres, left_out)) is not None:
+            found.append(light)
+    return found
+
+
+def _light(
+    file: GltfFile, where: str, name: str, entry: Json, matrix: Array, metres: float, left_out: LeftOut
+) -> Light | None:
+    color = numbers(file, where, entry, "color", (1.0, 1.0, 1.0))
+    strength = number(file, where, entry, "intensity", 1.0)
+    if strength < 0 or (color < 0).any():
+        raise refused(file, f"{where}: intensity {strength:g}, color {color.tolist()}: below 0", "mend the file")
+    kind = entry.get("type")
+    if kind == "directional":
+        return DirectionalLight(-matrix[:3, 2], strength * color)
+    if kind == "point":
+        if "range" in entry:
+            left_out.add("ranges of lights", name)
+        return PointLight(matrix[:3, 3] * metres, strength * color * metres**2)
+    if kind == "spot":
+        left_out.add("spot lights", name)
+        return None
+    raise refused(file, f"{where}: type {kind!r} is neither point, directional nor spot")

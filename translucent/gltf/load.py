@@ -1,0 +1,153 @@
+"""From a glTF file to a scene."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError, TranslucentWarning
+from translucent.gltf.cameras import scene_camera
+from translucent.gltf.fields import label, refused
+from translucent.gltf.left_out import LeftOut
+from translucent.gltf.lights import LIGHTS, scene_lights
+from translucent.gltf.objects import scene_objects
+from translucent.materials.gltf import EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
+from translucent.materials.gltf_file import GltfFile, read_gltf
+from translucent.materials.gltf_scene import node_transforms
+from translucent.mesh import MAX_COORDINATE
+from translucent.scene import Scene
+from translucent.showcase import LIGHT_TABLE, framing
+from translucent.units import metres_per_unit
+
+Array = npt.NDArray[np.float64]
+
+SUFFIXES = (".glb", ".gltf")
+
+#: Extensions that are read; what of them a scene cannot hold is told one by one.
+_READ = (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, LIGHTS, "KHR_mesh_quantization")
+#: A file that requires these can be read without them: they change how surfaces and textures look.
+_LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_")
+_COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GltfScene(Scene):
+    """A scene from a glTF file.
+
+    Parameters
+    ----------
+    left_out : tuple of str
+        What the file asks for and the scene does not hold, one line per kind with the names that have it.
+    """
+
+    left_out: tuple[str, ...] = ()
+
+
+def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: tuple[int, int] = (1, 1)) -> GltfScene:
+    """Read a scene from a .gltf or .glb file: its objects with their media, one camera, and its lights.
+
+    Parameters
+    ----------
+    path : path
+        A glTF 2.0 file. Its default scene is read, or else its first.
+    unit : str
+        Unit of the file's lengths. glTF is in metres by definition; another unit rescales the whole, attenuation
+        distances and lights included, so that it looks the same.
+    camera : int or None
+        Which of the cameras that nodes place, counted from 0. None frames all objects, and so does 0 in a file without
+        cameras.
+    size : (width, height)
+        Size of the picture in pixels, which the framing depends on; a wider picture shows all objects, too.
+
+    Returns
+    -------
+    GltfScene
+        One object per node and primitive. Nodes that share a mesh share it here, too; a mesh has its node's name, and a
+        shared one its own. Meshes are welded and wound as by `load_mesh`. What materials make of objects says
+        `translucent.gltf.surfaces`; the environment, which glTF does not have, is that of `showcase`.
+        `left_out` lists what the scene does not hold, and a `TranslucentWarning` tells it.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, broken, no glTF, compressed or without triangles; if a value in it is wrong, or the
+        transform of a light or of the camera is singular; if there is no such camera.
+    """
+    metres = metres_per_unit(unit)
+    file = _read(path)
+    left_out = LeftOut()
+    _check_extensions(file, left_out)
+    with np.errstate(under="ignore"):
+        transforms = _scene_transforms(file, left_out)
+        objects = scene_objects(file, transforms, metres, left_out)
+        view = scene_camera(file, transforms, camera, metres, left_out) or framing(objects, size)
+        lights = scene_lights(file, transforms, metres, left_out)
+    for key in ("animations", "skins"):
+        if file.items(key):
+            left_out.add(key, f"{len(file.items(key))}")
+    if lost := left_out.lines():
+        warnings.warn(f"scene {file.path.name!r}: left out: {'; '.join(lost)}", TranslucentWarning, stacklevel=2)
+    return GltfScene(objects, view, lights, LIGHT_TABLE, left_out=lost)
+
+
+def _read(path: str | Path) -> GltfFile:
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"scene {str(path)!r}",
+            f"suffix {Path(path).suffix!r}, and scenes are glTF files",
+            "give a .glb or .gltf file, or read a mesh with tl.load_mesh",
+        )
+    return read_gltf(path)
+
+
+def _check_extensions(file: GltfFile, left_out: LeftOut) -> None:
+    """Refuse a file that cannot be read without what it requires, and note what it merely uses."""
+    for key in ("extensionsRequired", "extensionsUsed"):
+        names = file.tree.get(key, [])
+        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+            raise refused(file, f"{key} is {names!r}, not a list of names")
+        for name in names:
+            if name in _READ:
+                continue
+            if key == "extensionsRequired" and not name.startswith(_LOOKS):
+                do = "export it without compression" if name in _COMPRESSIONS else "export it without this extension"
+                raise refused(file, f"it requires {name}, which is not supported", do)
+            left_out.add("extensions", name)
+
+
+def _scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
+    """Node to world of the nodes of the scene; raises `InputError` where one is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        world = node_transforms(file)
+    transforms = {node: world[node] for node in _scene_nodes(file, left_out)}
+    for node, matrix in transforms.items():
+        if not (np.abs(matrix) <= MAX_COORDINATE).all():
+            where = f"node {label(file.items('nodes'), node)}"
+            raise refused(file, f"{where}: its transform exceeds {MAX_COORDINATE:g}", "export the file again")
+    return transforms
+
+
+def _scene_nodes(file: GltfFile, left_out: LeftOut) -> Iterator[int]:
+    """The nodes of the default scene, parents first, in the file's order; without scenes, all nodes."""
+    nodes, scenes = file.items("nodes"), file.items("scenes")
+    if not scenes and "scene" not in file.tree:
+        yield from range(len(nodes))
+        return
+    chosen = file.tree.get("scene", 0)
+    roots = file.item("scenes", chosen).get("nodes", [])
+    if not isinstance(roots, list):
+        raise refused(file, f"scene {chosen}: nodes is {roots!r}, not a list")
+    for i in range(len(scenes)):
+        if i != chosen:
+            left_out.add("other scenes", label(scenes, i))
+    pending = roots[::-1]
+    while pending:
+        index = pending.pop()
+        node = file.item("nodes", index)
+        yield index
+        pending += node.get("children", [])[::-1]

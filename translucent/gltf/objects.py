@@ -1,0 +1,107 @@
+"""The objects of a glTF scene: the primitives that its nodes place, each with what its material makes of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.gltf.accessors import Accessors
+from translucent.gltf.fields import label, refused
+from translucent.gltf.geometry import primitive_mesh
+from translucent.gltf.left_out import LeftOut
+from translucent.gltf.surfaces import Surface, surface_reader
+from translucent.materials.gltf_file import GltfFile, Json
+from translucent.materials.gltf_scene import primitives
+from translucent.mesh import MIN_DIAGONAL, Mesh
+from translucent.scene import Object
+
+Array = npt.NDArray[np.float64]
+
+#: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
+WALL_SHARE = 1e-5
+
+
+def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Object]:
+    """One object per node and primitive, with what its material makes of it.
+
+    Parameters
+    ----------
+    file : GltfFile
+    transforms : dict
+        Node to world (4x4) of the nodes of the scene.
+    metres : float
+        Per unit of the file.
+    left_out : LeftOut
+        Gets what the objects do not hold.
+
+    Raises
+    ------
+    InputError
+        If there is no object, or something about one is wrong.
+    """
+    surface_of = surface_reader(file, metres, left_out)
+    scale = np.diag([metres, metres, metres, 1.0])
+    objects: list[Object] = []
+    surfaces: list[Surface] = []
+    for mesh, material, node in _placed_meshes(file, transforms, left_out):
+        surface = surface_of(material)
+        objects.append(Object(mesh, None, scale @ transforms[node], color=surface.color))
+        surfaces.append(surface)
+    if not objects:
+        raise refused(file, "its scene has no triangles", "give a file with a mesh")
+    boxes = np.stack([item.bounds for item in objects])
+    diagonal = float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
+    wall = max(WALL_SHARE * diagonal, MIN_DIAGONAL)
+    return [_with_medium(item, surface, wall) for item, surface in zip(objects, surfaces, strict=True)]
+
+
+def _with_medium(item: Object, surface: Surface, wall: float) -> Object:
+    if surface.wall_ior is not None:
+        return dataclasses.replace(item, medium=surface.wall_medium(wall), sheet_thickness=wall)
+    return dataclasses.replace(item, medium=surface.medium)
+
+
+def _placed_meshes(
+    file: GltfFile, transforms: dict[int, Array], left_out: LeftOut
+) -> Iterator[tuple[Mesh, int | None, int]]:
+    """Mesh, material and node of every primitive that a node places; each mesh is read once."""
+    nodes = file.items("nodes")
+    accessors = Accessors(file)
+    placed = {node: nodes[node]["mesh"] for node in transforms if "mesh" in nodes[node]}
+    known: dict[tuple[int, int], Mesh | None] = {}
+    for node, index in placed.items():
+        entry = file.item("meshes", index)
+        if not transforms[node][:3, :3].any():
+            # "This provides a mechanism to animate visibility" (glTF 2.0, section on transformations).
+            left_out.add("objects hidden by a scale of 0", label(nodes, node))
+            continue
+        for i, primitive in enumerate(listed := primitives(file, entry)):
+            if (index, i) not in known:
+                users = [user for user, used in placed.items() if used == index]
+                name = _mesh_name(file, entry, index, users) + (f"[{i}]" if len(listed) > 1 else "")
+                known[index, i] = primitive_mesh(accessors, primitive, name)
+                _note_losses(primitive, name, known[index, i], left_out)
+            if (mesh := known[index, i]) is not None:
+                yield mesh, primitive.get("material"), node
+
+
+def _mesh_name(file: GltfFile, entry: Json, index: int, users: list[int]) -> str:
+    """The name of the only node that uses a mesh, or of the mesh."""
+    names = [file.items("nodes")[users[0]].get("name"), entry.get("name")]
+    for name in names if len(users) == 1 else names[::-1]:
+        if isinstance(name, str) and name:
+            return name
+    return f"mesh {index}"
+
+
+def _note_losses(primitive: Json, name: str, mesh: Mesh | None, left_out: LeftOut) -> None:
+    if mesh is None:
+        left_out.add("points and lines", repr(name))
+        return
+    if "COLOR_0" in primitive["attributes"]:
+        left_out.add("vertex colors", repr(name))
+    if primitive.get("targets"):
+        left_out.add("morph targets", repr(name))
