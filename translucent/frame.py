@@ -44,7 +44,8 @@ class Frame:
     provenance : dict of str to str
         Backend, driver and versions.
     layers : (h, w) int32, optional
-        Surfaces of media that the pixel's ray crosses; only of methods that find ordered intervals.
+        Surfaces of media that the pixel's ray crosses, those behind an orthographic picture included; only of methods
+        that find ordered intervals.
     truncated : (h, w) int32, optional
         How many of them the method had to leave out.
     """

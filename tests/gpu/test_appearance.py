@@ -20,7 +20,8 @@ def _check(renderer: tl.Renderer, mesh: tl.Mesh, color: str | tuple[float, ...])
     medium = medium_for_average_color(first, color)
     frame = renderer.render(tl.showcase(mesh, medium, SIZE), SIZE)
     seen = frame.transmittance[frame.coverage & frame.valid].mean(axis=0, dtype=np.float64)
-    assert np.abs(seen - target).max() < 1e-3
+    # 1e-3 cannot be seen; what is left is the float32 of the picture, some 1e-7 per unit of optical depth.
+    assert np.abs(seen - target).max() < 1e-5
     # The color at any one distance is another: without the averaging, this would not hold.
     alone = tl.Medium.from_color(color, float(thickness_samples(first).mean()))
     assert np.abs(average_color(first, alone) - target).max() > 1e-2

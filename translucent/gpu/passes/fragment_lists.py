@@ -54,12 +54,13 @@ class FragmentListsPass:
                     f"one row has {needed} surfaces, and this OpenGL holds {job.targets.largest_storage // _NODE}",
                     "use DepthPeeling",
                 )
-        job.gl.scissor = None
+        for framebuffer in (job.targets.nothing(), job.targets.ordered()):
+            framebuffer.scissor = None
 
     def _nodes(self, job: FrameJob) -> moderngl.Buffer:
         width, height = job.targets.size
         first = min(_FIRST_NODES_PER_PIXEL * width * height * _NODE, job.targets.largest_storage // _NODE * _NODE)
-        return job.targets.storage("nodes", first)
+        return job.targets.storage("nodes", max(first, _NODE))
 
     def _draw(self, job: FrameJob, spec: PassSpec, first: int, last: int) -> int:
         """Make the lists of some rows; returns how many nodes they need."""
@@ -70,8 +71,7 @@ class FragmentListsPass:
         heads.clear()
         for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, self._nodes(job))):
             buffer.bind_to_storage_buffer(binding)
-        job.targets.nothing().use()
-        gl.scissor = (0, first, width, last - first)
+        _use_rows(job.targets.nothing(), first, last)
         gl.enable_only(moderngl.NOTHING)
         job.bind_opaque(0)
         program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
@@ -80,8 +80,13 @@ class FragmentListsPass:
         return int(np.frombuffer(count.read(), np.uint32)[0])
 
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
-        framebuffer = job.targets.ordered()
-        framebuffer.use()
-        job.gl.scissor = (0, first, job.targets.size[0], last - first)
+        _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
         self._resolve.draw_fullscreen(self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque))
+        # The next lists must not begin before these have been walked along.
+        job.gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
+
+
+def _use_rows(framebuffer: moderngl.Framebuffer, first: int, last: int) -> None:
+    framebuffer.scissor = (0, first, framebuffer.width, last - first)
+    framebuffer.use()

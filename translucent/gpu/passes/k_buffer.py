@@ -39,3 +39,5 @@ class KBufferPass:
         program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque)
         set_uniform(program, "k", k)
         self._resolve.draw_fullscreen(program)
+        # The next frame must not clear the words before these have been walked along.
+        gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)

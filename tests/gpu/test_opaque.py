@@ -1,0 +1,179 @@
+"""Opaque objects: what lies behind them is not crossed, and they are seen through what lies in front."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.metrics import interior
+from translucent.solids import Box, Sphere
+
+SIZE = (160, 120)
+BODY = Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate()
+WALL = Box.slab((6.0, 6.0), 0.2).tessellate()
+BALL = Sphere().tessellate(48)
+RED = (0.8, 0.2, 0.1)
+WINE = tl.Medium.from_color("#7b1e3a", distance=1.0)
+EMBER = tl.Medium(absorption=(0.5, 1.0, 2.0), emission=(1.0, 0.2, 0.1))
+LIGHTS = [tl.PointLight((2, 3, 4), (8, 8, 6)), tl.DirectionalLight((-1, -1, -0.5), (1, 1, 1))]
+SKY = tl.Environment.gradient((0.2, 0.2, 0.2), (0.6, 0.7, 1.0))
+
+METHODS = {
+    "signed": tl.SignedDepth(),
+    "back-face": tl.BackFaceDepth(),
+    "thin": tl.ThinLayer(0.01),
+    "lists": tl.FragmentLists(),
+    "peeling": tl.DepthPeeling(),
+    "front-to-back": tl.DepthPeeling(order="front-to-back"),
+    "back-to-front": tl.DepthPeeling(order="back-to-front"),
+    "k-buffer": tl.KBuffer(k=8),
+}
+CAMERAS = {
+    "perspective": tl.Camera.look_at((1.5, 1.0, 6), (0, 0, 0)),
+    "orthographic": tl.Camera.orthographic((1.5, 1.0, 6), (0, 0, 0), height=4),
+    "inside": tl.Camera.look_at((0.2, 0.1, 0.9), (0, 0, -1), fov_y=70),
+}
+
+
+@pytest.fixture(params=METHODS)
+def method(request: pytest.FixtureRequest) -> Any:
+    return METHODS[request.param]
+
+
+def opaque(mesh: tl.Mesh, place: Any = (0, 0, 0), scale: float = 1.0) -> tl.Object:
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = place
+    return tl.Object(mesh, None, matrix, color=RED)
+
+
+PLACES = {
+    "in front": opaque(BALL, (0.2, 0.1, 2.0), 0.6),
+    "inside": opaque(BALL, (0.2, 0.1, -0.1), 0.5),
+    "half inside": opaque(BALL, (0.9, 0.1, 0.2), 0.6),
+    "behind": opaque(WALL, (0, 0, -2)),
+    "across": opaque(WALL),
+    "touching": opaque(WALL, (0, 0, -1.1)),
+    "around": opaque(BALL, scale=8.0),
+}
+
+
+def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edges: float = 0.02) -> tl.Frame:
+    """Equal to the reference but at most at the edges of opaque objects, which are not in the counts of layers."""
+    frame, truth = renderer.render(scene, SIZE, method), tl.reference.render(scene, SIZE, method)
+    assert frame.valid.all()
+    # Interior to both: no edge of a body, nor of the opaque object, within a pixel.
+    inside = interior(tl.reference.hit_counts(scene, SIZE))
+    for name in ("thickness", "transmittance", "radiance"):
+        off = np.abs(getattr(frame, name) - getattr(truth, name))[inside]
+        scale = max(1.0, float(np.abs(getattr(truth, name)).max()))
+        assert np.median(off) <= 3e-7 * scale, name
+        assert np.quantile(off, 1 - opaque_edges) <= 1e-5 * scale, name
+    mismatch = (frame.coverage != truth.coverage)[inside].mean()
+    assert mismatch <= opaque_edges
+    return frame
+
+
+@pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.filterwarnings("ignore::translucent.errors.TranslucentWarning")
+def test_where_the_opaque_object_is(renderer: tl.Renderer, method: Any, place: str, camera: tl.Camera) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE), PLACES[place]], camera, lights=LIGHTS, environment=SKY)
+    assert_equal(renderer, scene, method)
+
+
+def test_coincident_with_the_body(renderer: tl.Renderer, method: Any) -> None:
+    """The same mesh, once opaque: no path within it is left; sheets on it are seen."""
+    scene = tl.Scene([tl.Object(BODY, WINE), opaque(BODY)], CAMERAS["perspective"], environment=SKY)
+    frame = renderer.render(scene, SIZE, method)
+    truth = tl.reference.render(scene, SIZE, method)
+    alone = tl.reference.hit_counts(tl.Scene(scene.objects[:1], scene.camera), SIZE)
+    inside = interior(alone)
+    assert frame.valid.all()
+    if isinstance(method, tl.ThinLayer):
+        seen = inside & truth.coverage
+        np.testing.assert_allclose(frame.thickness[seen], truth.thickness[seen], rtol=1e-5)
+        return
+    assert (frame.thickness[inside] <= 2e-6 * scene.diagonal).all()
+    assert frame.coverage[inside].mean() <= 0.02  # rounding, of less than a millionth
+    seen = inside & (alone > 0)
+    off = np.abs(frame.radiance - truth.radiance)[seen]
+    assert np.quantile(off, 0.98) <= 1e-5
+
+
+@pytest.mark.parametrize("method", [None, tl.DepthPeeling(), tl.KBuffer()], ids=["lists", "peeling", "k-buffer"])
+@pytest.mark.parametrize("place", PLACES)
+def test_emission_in_front_of_an_opaque_object(renderer: tl.Renderer, method: Any, place: str) -> None:
+    inner = tl.Object(BALL, tl.Medium(absorption=2.0, emission=(0, 0.5, 1)), np.diag([0.7, 0.7, 0.7, 1]))
+    scene = tl.Scene(
+        [tl.Object(BODY, EMBER), inner, PLACES[place]], CAMERAS["perspective"], lights=LIGHTS, environment=SKY
+    )
+    assert_equal(renderer, scene, method)
+
+
+def test_a_hole_behind_the_wall_does_not_matter_to_lists(renderer: tl.Renderer) -> None:
+    """What lies behind an opaque surface is not looked at: an open body whose hole is there is sound."""
+    cup = tl.Mesh(BODY.vertices, BODY.faces[[i for i in range(12) if not _faces_back(i)]], name="cup")
+    camera = tl.Camera.look_at((0.1, 0.2, 6), (0, 0, 0))
+    for wall, valid in (((0, 0, 0), True), ((0, 0, -4), False)):
+        scene = tl.Scene([tl.Object(cup, WINE), opaque(WALL, wall)], camera)
+        if valid:
+            frame = renderer.render(scene, SIZE, tl.FragmentLists())
+        else:
+            with pytest.warns(tl.TranslucentWarning, match="'cup'"):
+                frame = renderer.render(scene, SIZE, tl.FragmentLists())
+        assert frame.valid.all() == valid
+
+
+def _faces_back(i: int) -> bool:
+    return bool((BODY.vertices[BODY.faces[i]][:, 2] == -1).all())
+
+
+def test_the_nearest_of_many_opaque_objects_is_seen(renderer: tl.Renderer) -> None:
+    """Also with a floor a thousand times as large as the body, and with the eye close to a wall."""
+    floor = tl.Object(Box.slab((2000.0, 2000.0), 1.0).tessellate(), None, _lying((0, -1.5, 0)), color=(0.3, 0.6, 0.3))
+    objects = [tl.Object(BODY, WINE), floor, *PLACES.values()]
+    scene = tl.Scene(objects[:-1], CAMERAS["perspective"], lights=LIGHTS, environment=SKY)
+    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
+    off = np.abs(frame.radiance - truth.radiance).max(axis=-1)
+    # Edges of opaque objects may be drawn a pixel apart.
+    assert np.quantile(off, 0.95) <= 1e-5
+    assert frame.valid.all()
+
+
+def _lying(place: Any) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    matrix[:3, 3] = place
+    return matrix
+
+
+@pytest.mark.parametrize("lights", [[], [LIGHTS[0]], [LIGHTS[1]], LIGHTS * 16], ids=["none", "point", "sun", "32"])
+@pytest.mark.parametrize(
+    "environment",
+    [SKY, tl.Environment.constant((0.5, 0.6, 0.7)), tl.Environment.checkerboard((1, 1, 1), (0, 0, 0))],
+    ids=["gradient", "constant", "checkerboard"],
+)
+def test_opaque_objects_are_lit(renderer: tl.Renderer, lights: list[Any], environment: tl.Environment) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE), PLACES["in front"]], CAMERAS["perspective"], lights, environment)
+    assert_equal(renderer, scene, None)
+
+
+def test_too_many_lights_are_refused(renderer: tl.Renderer) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE), PLACES["in front"]], CAMERAS["perspective"], LIGHTS * 17)
+    with pytest.raises(tl.InputError, match="34 lights; use at most 32"):
+        renderer.render(scene, SIZE)
+
+
+def test_a_scene_of_opaque_objects_only_is_refused(renderer: tl.Renderer) -> None:
+    with pytest.raises(tl.InputError, match="nothing there has a medium; give an object one"):
+        renderer.render(tl.Scene([opaque(BODY)], CAMERAS["perspective"]), SIZE)
+
+
+def test_several_samples_smooth_the_edges_of_opaque_objects(renderer: tl.Renderer) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE), PLACES["in front"]], CAMERAS["perspective"], LIGHTS, SKY)
+    one, many = (renderer.render(scene, SIZE, samples=n) for n in (1, 16))
+    np.testing.assert_array_equal(one.thickness, many.thickness)
+    assert len(np.unique(many.radiance)) > len(np.unique(one.radiance))
