@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,12 @@ from translucent.conversion import CLAMP, clamp_colors, summary
 from translucent.errors import InputError
 from translucent.frame import write_atomically
 from translucent.medium import Medium
+from translucent.swatches import html_strip
 from translucent.tables import Row, check_cells, read_table
 from translucent.units import metres_per_unit
+
+#: Rows of a table of swatches.
+MOST_SHOWN = 30
 
 _TRIPLES = ("color", "extinction", "mean_free_path", "half_value_thickness", "condition_number", "extinction_per_unit")
 
@@ -43,6 +48,16 @@ class Batch:
             temporary.write_text(text, encoding="utf-8", newline="")
 
         write_atomically(path, fill)
+
+    def _repr_html_(self) -> str:
+        """Names, swatches and errors, for notebooks; of long tables the first rows."""
+        shown = [
+            f"<div>{escape(one['name'])}</div>{html_strip(one['extinction'], one['distance'])}"
+            for one in self.records[:MOST_SHOWN]
+        ]
+        if (more := len(self.records) - MOST_SHOWN) > 0:
+            shown.append(f"<div>and {more} more</div>")
+        return "".join([*shown, *(f"<div>error: {escape(line)}</div>" for line in self.errors[:MOST_SHOWN])])
 
     def to_json(self) -> str:
         """The records as a JSON list, one record per line; null stands for infinity."""

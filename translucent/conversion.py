@@ -131,11 +131,22 @@ class DistanceMatch:
         Metres at which each channel has its value; inf if it never darkens so far, None if any distance does.
     residual : tuple of float
         log(color at `distance` / color) per channel, 0 where it is met.
+    color : tuple of float
+        The linear color that was asked for.
     """
 
     distance: float
     per_channel: tuple[float | None, ...]
     residual: tuple[float, ...]
+    color: tuple[float, ...]
+
+    def _repr_html_(self) -> str:
+        """Swatches of the color that was asked for and of the one that is found, for notebooks."""
+        from translucent.swatches import html_swatches
+
+        with np.errstate(under="ignore"):
+            found = np.array(self.color) * np.exp(self.residual)
+        return html_swatches([(self.color, "asked for"), (found, f"after {self.distance:.4g} m")])
 
 
 def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> DistanceMatch:
@@ -165,7 +176,8 @@ def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> Dista
         per_channel = tuple(
             (float(x / s) if s > 0 else np.inf if x > 0 else None) for s, x in zip(sigma, depth, strict=True)
         )
-        return DistanceMatch(distance, per_channel, tuple((depth - sigma * distance).tolist()))
+        residual = tuple((depth - sigma * distance).tolist())
+        return DistanceMatch(distance, per_channel, residual, tuple(_triples(color).tolist()))
 
 
 def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from html import escape
+
 import numpy as np
 import numpy.typing as npt
 
@@ -35,11 +38,18 @@ def html_strip(extinction: npt.ArrayLike, distance: float | None = None) -> str:
     if distance is None:
         mean = float(sigma.mean())
         distance = min(1.0 / mean, 1e300) if mean > 1e-300 else 1.0
+    return html_swatches(
+        (color_at_distance(sigma, factor * distance), f"{factor * distance:.4g} m") for factor in FACTORS
+    )
+
+
+def html_swatches(swatches: Iterable[tuple[npt.ArrayLike, str]]) -> str:
+    """Linear colors (3,) side by side, each with its label and its hex color below."""
     cells = []
-    for factor in FACTORS:
-        color = to_hex(color_at_distance(sigma, factor * distance))
+    for color, label in swatches:
+        text = to_hex(color)
         cells.append(
-            f'<div style="text-align:center;font:11px monospace"><div style="width:7em;height:3em;background:{color}">'
-            f"</div>{factor * distance:.4g} m<br>{color}</div>"
+            f'<div style="text-align:center;font:11px monospace"><div style="width:7em;height:3em;background:{text}">'
+            f"</div>{escape(label)}<br>{text}</div>"
         )
     return f'<div style="display:flex">{"".join(cells)}</div>'

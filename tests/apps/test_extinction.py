@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import sys
-import types
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
+import translucent as tl
+from translucent.assets import mesh_path
+from translucent.batch import MOST_SHOWN, convert_table
 from translucent.cli import main
 from translucent.commands.extinction import TARGETS
+from translucent.commands.on_model import SIZE
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -75,9 +80,7 @@ def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.M
         assert medium.transmittance(distance) == pytest.approx(color, rel=1e-14)
         return f"block for {target}"
 
-    module = types.ModuleType("translucent.materials")
-    module.text_block = text_block  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "translucent.materials", module)
+    monkeypatch.setattr("translucent.materials.text_block", text_block)
     code, out, err = run("linear(0.25,0.5,1)", "2cm", "--as", "unreal")
     assert (code, out) == (0, "block for unreal\n")
     assert err.startswith("warning: blue is 1 (saturated)")
@@ -88,6 +91,39 @@ def test_every_engine_has_a_block(run: Run, target: str) -> None:
     code, out, err = run("#7b1e3a", "1cm", "--as", target)
     assert (code, err) == (0, "")
     assert len(out) > 20
+
+
+@pytest.mark.parametrize("name", ["jade.mtlx", "jade.usda", "jade.json"])
+def test_a_material_of_one_engine_becomes_one_of_another(run: Run, here: Path, name: str) -> None:
+    target = {".mtlx": "openpbr", ".usda": "usd", ".json": "json"}[Path(name).suffix]
+    jade = ("linear(.18,.62,.35)", "2cm")
+    (here / name).write_text(run(*jade, "--as", target)[1])
+    told = json.loads(run("--from", name, "--json")[1])
+    assert told["extinction"] == pytest.approx(-np.log([0.18, 0.62, 0.35]) / 0.02, rel=1e-12)
+    assert told["distance"] == pytest.approx(1 / max(told["extinction"]), rel=1e-12)
+    assert told["color"] == pytest.approx(np.exp(-np.array(told["extinction"]) * told["distance"]), rel=1e-12)
+    code, out, err = run("--from", name, "--as", "unreal")
+    assert (code, err) == (0, "")
+    # The mean free path in centimeters, of Substrate.
+    path = [float(v) for v in re.findall(r"SSS MFP \(cm\) += \((.*)\)", out)[0].split(",")]
+    assert path == pytest.approx(100 / np.array(told["extinction"]), rel=1e-8)
+
+
+@pytest.mark.parametrize("target", ["openpbr", "standard_surface"])
+def test_lengths_of_a_materialx_file_are_in_the_unit_that_is_said(run: Run, here: Path, target: str) -> None:
+    (here / "a.mtlx").write_text(run("gray", "2cm", "--as", target)[1])
+    metres = json.loads(run("--from", "a.mtlx", "--json")[1])["extinction"]
+    centimeters = json.loads(run("--from", "a.mtlx", "--unit", "cm", "--json")[1])["extinction"]
+    assert centimeters == pytest.approx(100 * np.array(metres), rel=1e-12)
+
+
+def test_a_preset_for_an_engine_and_a_clear_one(run: Run, here: Path) -> None:
+    code, out, err = run("--preset", "merlot", "--as", "json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["absorption"] == np.asarray(tl.preset("merlot").medium.absorption).tolist()
+    (here / "clear.json").write_text('{"ior": 1.5}')
+    told = json.loads(run("--from", "clear.json", "--json")[1])
+    assert (told["color"], told["distance"], told["extinction"]) == ([1, 1, 1], 1.0, [0, 0, 0])
 
 
 TABLE = """name,color,distance,unit
@@ -122,6 +158,18 @@ def test_a_table_to_csv_with_clamping(run: Run, here: Path) -> None:
     assert row["warnings"].startswith("color clamped to 0.0001 where it was below | red is 1")
 
 
+def test_a_table_shows_swatches_and_errors(here: Path) -> None:
+    (here / "in.csv").write_text("name,color,distance\n<wine>,#7b1e3a,1cm\nmist,gray,<far>\n")
+    html = convert_table("in.csv")._repr_html_()
+    assert "<div>&lt;wine&gt;</div>" in html
+    assert "0.01 m<br>#7b1e3a" in html
+    assert "error: in.csv line 3: length &#x27;&lt;far&gt;&#x27;" in html
+    rows = "".join(f"row {i},gray,1cm\n" for i in range(MOST_SHOWN + 2))
+    (here / "long.csv").write_text("name,color,distance\n" + rows)
+    html = convert_table("long.csv")._repr_html_()
+    assert (html.count("row "), html.count("and 2 more")) == (MOST_SHOWN, 1)
+
+
 def test_without_an_output_the_table_goes_to_stdout(run: Run, here: Path) -> None:
     (here / "in.csv").write_text("name,color,distance\na,gray,1cm\n")
     code, out, err = run("--batch", "in.csv")
@@ -139,6 +187,124 @@ def test_a_wedge_is_fitted(run: Run, here: Path) -> None:
     assert (code, err) == (0, "")
     assert "standard error" in out
     assert "residuals of 2 samples" in out
+
+
+# On a model
+
+PLATE = ("--on", "plate.stl", "--unit", "mm", "--eye", "0,0,10")
+
+
+@pytest.fixture
+def plate(here: Path, renderer: object) -> Path:
+    """A plate of 2 mm: from 10 m, its thickness is 2 mm times at most 1 + 0.01^2 at every pixel."""
+    trimesh.creation.box((200, 200, 2)).export(here / "plate.stl")
+    return here
+
+
+def test_the_medium_for_an_average_color(run: Run, plate: Path) -> None:
+    code, out, err = run("linear(.5,.25,1)", *PLATE, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["extinction"] == pytest.approx([math.log(2) / 0.002, math.log(4) / 0.002, 0.0], rel=2e-4)
+    assert told["on"]["average_color"] == pytest.approx([0.5, 0.25, 1.0], rel=1e-9)
+    assert told["on"]["mean_thickness"] == pytest.approx(0.002, rel=2e-4)
+    assert told["distance"] == told["on"]["mean_thickness"]
+    assert told["on"]["model"] == "plate.stl"
+    assert told["warnings"][0].startswith("blue is 1 (saturated)")
+
+
+def test_a_model_takes_the_place_of_the_distance(run: Run, renderer: tl.Renderer) -> None:
+    """The medium that is found shows the color; a color at the same distance does not."""
+    found = json.loads(run("#7b1e3a", "--on", "bear", "--json")[1])
+    extinction = np.array(found["extinction"])
+    mesh = tl.load_mesh(mesh_path("bear"))
+    frame = renderer.render(tl.showcase(mesh, tl.Medium(absorption=extinction), SIZE), SIZE)
+    seen = frame.transmittance[frame.coverage & frame.valid].mean(axis=0, dtype=np.float64)
+    # Float32 in the picture: a few roundings of an exponent of at most 20.
+    assert np.abs(seen - tl.color.parse_color("#7b1e3a")).max() < 1e-5
+    asked = json.loads(run("#7b1e3a", f"{found['on']['mean_thickness']}m", "--on", "bear", "--json")[1])
+    assert asked["color"] == pytest.approx(tl.color.parse_color("#7b1e3a"), rel=1e-12)
+    assert np.abs(np.array(asked["on"]["average_color"]) - asked["color"]).max() > 1e-2
+
+
+def test_a_preset_on_a_model(run: Run, plate: Path) -> None:
+    code, out, err = run("--preset", "marble", *PLATE, "--json")
+    told = json.loads(out)
+    assert code == 0
+    assert err.startswith("warning: scattering dominates")
+    extinction = tl.preset("marble").medium.extinction
+    # The thickness is at most 1 + 1e-4 times as much.
+    expected = np.exp(-0.002 * extinction)
+    assert (np.abs(told["on"]["average_color"] / expected - 1) <= 2e-4 * 0.002 * extinction).all()
+    assert told["extinction"] == extinction.tolist()
+
+
+def test_the_words_tell_the_average_and_the_thin_and_thick_parts(run: Run, renderer: object) -> None:
+    code, out, err = run("#7b1e3a", "--on", "bear")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert re.fullmatch(r"on bear: \d+ pixels, 0\.0055\d* m thick on average", lines[0])
+    assert lines[1].endswith(" linear, #7b1e3a sRGB")
+    assert [line.rpartition("; ")[2] for line in lines[2:7]] == [f"{p}% of it is thinner" for p in (5, 25, 50, 75, 95)]
+    assert re.match("warning         the average green is made by the edges: 7.% of it comes from the thin", lines[-1])
+
+
+def test_for_an_engine_the_color_is_stated_at_the_thickness_of_the_model(run: Run, plate: Path) -> None:
+    code, out, _ = run("linear(.5,.25,.7)", *PLATE, "--as", "gltf")
+    assert code == 0
+    volume = json.loads(out)["extensions"]["KHR_materials_volume"]
+    assert volume["thicknessFactor"] == volume["attenuationDistance"] == pytest.approx(0.002, rel=2e-4)
+    assert volume["attenuationColor"] == pytest.approx([0.5, 0.25, 0.7], rel=1e-3)
+
+
+def test_for_an_engine_a_dark_color_is_stated_nearer_and_the_thickness_stays(run: Run, renderer: object) -> None:
+    told = json.loads(run("#7b1e3a", "--on", "bear", "--json")[1])
+    volume = json.loads(run("#7b1e3a", "--on", "bear", "--as", "gltf")[1])["extensions"]["KHR_materials_volume"]
+    assert volume["thicknessFactor"] == told["on"]["mean_thickness"] > 2 * volume["attenuationDistance"]
+    extinction = -np.log(volume["attenuationColor"]) / volume["attenuationDistance"]
+    assert extinction == pytest.approx(told["extinction"], rel=1e-12)
+
+
+def test_a_black_channel_is_clamped_on_request(run: Run, plate: Path) -> None:
+    told = json.loads(run("#ff0000", "--clamp", *PLATE, "--json")[1])
+    assert told["on"]["average_color"] == pytest.approx([1.0, 1e-4, 1e-4], rel=1e-9)
+    assert told["warnings"][0] == "color clamped to 0.0001 where it was below"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["black", *PLATE], "average color with red = 0; not in 0.0001 <= t <= 1; give 0.0001 or more"),
+        (["linear(1.5,1,1)", *PLATE], "red = 1.5; not in 0.0001 <= t <= 1; a medium cannot add light"),
+        (["gray", "--on", "none.obj"], "none.obj"),
+        (["gray", "--on", "bear", "--unit", "cm"], "--unit cm; bear comes with the toolkit, in metres"),
+        (["gray", "--on", "bear", "--eye", "0,0"], "--eye '0,0'; not three numbers"),
+        (["gray", "--on", "bear", "--eye", "9,9,9", "--preset", "jade"], "--preset with COLOR"),
+        (["--on", "bear", "--preset", "jadd"], "preset 'jadd'; not a known preset; did you mean jade"),
+        (["--on", "bear", "--fit", "w.csv"], "--on with --fit; each asks for something else"),
+        (["--on", "bear", "--batch", "t.csv"], "--on with --batch; each asks for something else"),
+        (["--on", "bear"], "Missing argument 'COLOR'"),
+        (["gray", "1cm", "--preset", "jade"], "--preset with COLOR"),
+        (["gray", "1cm", "--eye", "0,0,1"], "--eye 0,0,1; only --on looks at a model"),
+    ],
+    ids=lambda v: " ".join(v) if isinstance(v, list) else None,
+)
+def test_a_question_that_cannot_be_answered_is_one_line(
+    run: Run, plate: Path, arguments: list[str], message: str
+) -> None:
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert err.startswith("error: ")
+    assert message in err
+
+
+@pytest.mark.filterwarnings("ignore:.*open edges")
+def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
+    trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).export(plate / "open.stl")
+    code, out, err = run("gray", "--on", "open.stl")
+    assert (code, out) == (2, "")
+    assert "pixels that the mesh covers are marked invalid; close its holes" in err.splitlines()[-1]
 
 
 @pytest.mark.parametrize(
@@ -161,6 +327,12 @@ def test_a_wedge_is_fitted(run: Run, here: Path) -> None:
         (["gray", "1cm", "-o", "x.json"], "-o x.json; only --batch writes a file"),
         (["gray", "1cm", "--json", "--as", "css"], "--as with --json"),
         (["gray", "1cm", "--as", "word"], "'word' is not one of"),
+        (["gray", "--from", "dict.json"], "--from with COLOR; each asks for something else"),
+        (["--preset", "jade", "--from", "dict.json"], "--from with --preset"),
+        (["--from", "none.mtlx"], "material 'none.mtlx'; cannot be read (No such file or directory)"),
+        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json file"),
+        (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
+        (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),
         (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; not a known unit"),
         (["none.png@1,2", "1cm"], "pixel 1,2 of 'none.png'; No such file or directory"),
         (["linear(-.1,1,1)", "1cm", "--clamp"], "red = -0.1 is not in 0 < t <= 1"),
@@ -176,6 +348,7 @@ def test_bad_input_is_one_line_and_exit_code_2(run: Run, here: Path, arguments: 
     (here / "head.csv").write_text("name,color,distance\n\n")
     (here / "few.csv").write_text("name,color\na,gray\n")
     (here / "good.csv").write_text("name,color,distance\na,gray,1cm\n")
+    (here / "bytes.usda").write_bytes(b"PXR-USDC\xff\xfe")
     (here / "bytes.csv").write_bytes(b"name,color,distance\n\xff\xfe,gray,1\n")
     (here / "bad.json").write_text("[{")
     (here / "dict.json").write_text('{"name": 1}')

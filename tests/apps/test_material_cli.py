@@ -98,6 +98,20 @@ def test_show_as_json(run: Run, model: Path) -> None:
     assert len(entry["warnings"]) == 1
 
 
+def test_show_tells_where_a_thickness_texture_is_read(run: Run, model: Path) -> None:
+    file = read_gltf(model)
+    tree = {**file.tree, "textures": [{}, {}]}
+    texture = {"index": 1, "texCoord": 1}
+    tree["materials"][0]["extensions"]["KHR_materials_volume"]["thicknessTexture"] = texture
+    write_gltf(GltfFile(model, tree, file.chunks), model)
+    assert "thickness            1 times texture 1 at TEXCOORD_1 (mesh space)" in run("material", "show", model)[1]
+    texture["extensions"] = {"KHR_texture_transform": {"rotation": 0.5, "texCoord": 0}}
+    write_gltf(GltfFile(model, tree, file.chunks), model)
+    assert "times texture 1 at TEXCOORD_0, transformed (mesh space)" in run("material", "show", model)[1]
+    (entry,) = strict_json(run("material", "show", model, "--json")[1])["materials"]
+    assert entry["thickness_transform"] == {"offset": [0, 0], "rotation": 0.5, "scale": [1, 1], "tex_coord": 0}
+
+
 def test_an_infinite_distance_is_null(run: Run, model: Path) -> None:
     run("material", "apply", model, "--color", "white", "--distance", "1m", "-o", model)
     (entry, _) = strict_json(run("material", "show", model, "--json")[1])["materials"]

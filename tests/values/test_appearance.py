@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 import translucent as tl
 from translucent.appearance import (
+    QUANTILES,
+    appearance_of,
     average_color,
     extinction_for_average_color,
     medium_for_average_color,
@@ -80,6 +83,38 @@ def test_a_darker_target_needs_more_extinction() -> None:
 def test_what_no_medium_can_do_is_refused(thickness: list[float], color: object, message: str) -> None:
     with pytest.raises(tl.InputError, match=message):
         extinction_for_average_color(thickness, color)  # type: ignore[arg-type]
+
+
+def test_a_mesh_that_is_invalid_everywhere_says_so() -> None:
+    color, flag = np.zeros((1, 2, 3)), np.array([[True, True]])
+    thickness = np.ones((1, 2), dtype=np.float32)
+    plan = tl.plan(tl.showcase(Sphere().tessellate(8)))
+    with pytest.raises(tl.InputError, match="all 2 pixels that the mesh covers are marked invalid; close its holes"):
+        thickness_samples(tl.Frame(color, color, color, thickness, flag, ~flag, plan))
+
+
+def test_an_appearance_goes_from_thin_to_thick() -> None:
+    thickness = (np.arange(1000) + 0.5) / 1000  # its quantiles are the shares themselves, to half a pixel
+    medium = tl.Medium(absorption=(0.0, 1.0, 30.0))
+    looks = appearance_of(thickness[::-1], medium)
+    assert (looks.medium, looks.pixels) == (medium, 1000)
+    assert looks.mean_thickness == pytest.approx(0.5, rel=1e-12)
+    assert looks.thickness == pytest.approx(QUANTILES, abs=5e-4)
+    assert looks.color == pytest.approx(average_color(thickness, medium), rel=1e-14)
+    assert looks.colors == pytest.approx(np.exp(-np.outer(looks.thickness, [0, 1, 30])), rel=1e-13)
+    # Of an even distribution, the share of light up to thickness x is (1 - exp(-sigma x)) / (1 - exp(-sigma)).
+    expected = [0.05, -np.expm1(-0.05) / -np.expm1(-1.0), -np.expm1(-1.5) / -np.expm1(-30.0)]
+    assert looks.thin_share == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("thickness", [[0.1], [0.0, 0.0], [1e3, 2e3]])
+def test_an_appearance_of_little_or_of_black_is_plain_json(thickness: list[float]) -> None:
+    looks = appearance_of(thickness, tl.Medium(absorption=(0.0, 1.0, 1e4)))
+    told = json.loads(json.dumps(looks.summary(), allow_nan=False))
+    assert told["average_color"] == looks.color.tolist()
+    assert [part["thinner"] for part in told["parts"]] == list(QUANTILES)
+    assert (looks.thin_share > 0).all()
+    assert looks._repr_html_().count("background:#") == 6
 
 
 def test_white_needs_nothing_even_without_thickness() -> None:

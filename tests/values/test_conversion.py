@@ -14,7 +14,7 @@ from PIL import Image
 
 import translucent as tl
 from translucent import conversion
-from translucent.color import parse_color, srgb_to_linear
+from translucent.color import parse_color, srgb_to_linear, to_hex
 from translucent.conversion import (
     clamp_colors,
     color_at_distance,
@@ -26,6 +26,7 @@ from translucent.conversion import (
     mean_free_path,
     summary,
 )
+from translucent.swatches import html_swatches
 
 EDGES = np.array([1.0, np.nextafter(1, 0), 1 - 1e-9, 0.5, math.exp(-1), 1e-4, 1e-30, 1e-300, 5e-324])
 
@@ -160,6 +161,21 @@ def test_a_color_that_the_medium_never_has_gets_the_nearest() -> None:
         distance_for_color((0, 0, 0), color)
     with pytest.raises(tl.InputError, match="it overflows"):
         distance_for_color((1e-309, 0, 0), color)
+
+
+def test_a_match_shows_what_was_asked_for_and_what_is_found() -> None:
+    html = distance_for_color((3.0, 1.0, 0.0), (0.5, 0.6, 0.7))._repr_html_()
+    match = distance_for_color((3.0, 1.0, 0.0), (0.5, 0.6, 0.7))
+    assert match.color == (0.5, 0.6, 0.7)
+    found = color_at_distance((3.0, 1.0, 0.0), match.distance)
+    assert f"asked for<br>{to_hex((0.5, 0.6, 0.7))}" in html
+    assert f"after {match.distance:.4g} m<br>{to_hex(found)}" in html
+
+
+def test_labels_of_swatches_are_escaped() -> None:
+    html = html_swatches([((1, 0, 0), "<b>&")])
+    assert "&lt;b&gt;&amp;<br>#ff0000" in html
+    assert "background:#ff0000" in html
 
 
 @pytest.mark.parametrize(

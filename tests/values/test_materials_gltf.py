@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import math
 from pathlib import Path
@@ -10,13 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 import translucent as tl
 from translucent import optics
 from translucent.materials.color_distance import BLACKEST
 from translucent.materials.gltf import GltfMaterial, materials_of, read_materials
 from translucent.materials.gltf_file import GltfFile, read_gltf
-from translucent.materials.gltf_scene import material_uses, thickness_map, world_thickness
+from translucent.materials.gltf_scene import material_uses, thickness_at, thickness_map, world_thickness
+from translucent.materials.gltf_texture import TextureTransform
 
 COLOR = (0.1, 0.5, 0.9)
 
@@ -34,6 +38,12 @@ def volume(transmission: float = 1.0, **fields: Any) -> Json:
             "KHR_materials_volume": fields,
         }
     }
+
+
+def transformed(**transform: Any) -> Json:
+    """A volume whose thickness texture, the file's first, is transformed."""
+    texture = {"index": 0, "texCoord": 1, "extensions": {"KHR_texture_transform": transform}}
+    return volume(thicknessFactor=2.0, thicknessTexture=texture)
 
 
 def parsed(*materials: Json, **more: Any) -> list[GltfMaterial]:
@@ -98,6 +108,17 @@ def test_an_opaque_material_has_no_medium_however_thick() -> None:
     assert clear.medium() is not None
 
 
+def test_a_material_shows_its_name_and_its_colors() -> None:
+    glass = volume(thicknessFactor=1, attenuationColor=[1, 0, 0], attenuationDistance=0.5)
+    found = parsed({**glass, "name": "<i>Wine</i>"}, volume(), {}, volume(thicknessFactor=1))
+    assert [material.kind for material in found] == ["volume", "thin wall", "opaque", "volume"]
+    html = [material._repr_html_() for material in found]
+    assert html[0].startswith("<div>0 &#x27;&lt;i&gt;Wine&lt;/i&gt;&#x27;: volume</div>")
+    assert "0.5 m<br>#ff0000" in html[0]
+    assert [text.count("background:#") for text in html] == [5, 0, 0, 5]
+    assert "1 m<br>#ffffff" in html[3]
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
@@ -110,6 +131,10 @@ def test_an_opaque_material_has_no_medium_however_thick() -> None:
         (volume(attenuationDistance=-1), "attenuationDistance -1 is not above 0"),
         (volume(thicknessTexture={"index": 3}), "thicknessTexture index 3 is not one of 0 textures"),
         (volume(thicknessTexture=3), "thicknessTexture is 3, not an object"),
+        (transformed(offset=[1]), "offset is [1], not two numbers"),
+        (transformed(scale=["a", 1]), "scale[0] is 'a', not a number"),
+        (transformed(rotation="left"), "rotation is 'left', not a number"),
+        (transformed(texCoord=-1), "texCoord is -1, not a whole number of 0 or more"),
         (volume(1.5), "transmissionFactor 1.5 is not in 0..1"),
         ({"extensions": {"KHR_materials_volume": 3}}, "KHR_materials_volume is 3, not an object"),
         ({"extensions": []}, "extensions is [], not an object"),
@@ -120,8 +145,9 @@ def test_an_opaque_material_has_no_medium_however_thick() -> None:
     ids=lambda v: v if isinstance(v, str) else "",
 )
 def test_a_wrong_value_is_refused_in_one_line(entry: Json, message: str) -> None:
+    textures = [{}] if "thicknessTexture" in str(entry) and "'index': 0" in str(entry) else []
     with pytest.raises(tl.InputError) as caught:
-        parsed({}, {**entry, "name": "Bad"})
+        parsed({}, {**entry, "name": "Bad"}, textures=textures)
     assert f"material 1 'Bad': {message}" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -214,6 +240,94 @@ def test_third_party_files_are_read(assets: Path, name: str) -> None:
         assert thickness_map(file, glass).max() <= 0.1
         color = glass.medium().transmittance(0.1)
         np.testing.assert_allclose(color, np.power(glass.attenuation_color, 100.0), rtol=1e-12)
+
+
+# Texture transforms
+
+#: Corners of the mesh's UVs, and the top left, top right, bottom left and bottom right of the image.
+CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], dtype=float)
+
+
+def test_the_example_of_the_extension_shows_the_lower_left_quadrant() -> None:
+    """Turned by 90 degrees: the listing of the extension would show a part of the image that is not there."""
+    transform = TextureTransform(offset=(0, 1), rotation=math.pi / 2, scale=(0.5, 0.5))
+    expected = [[0, 1], [0, 0.5], [0.5, 1], [0.5, 0.5]]  # v = 1 is the bottom
+    np.testing.assert_allclose(transform.apply(CORNERS), expected, atol=1e-15)
+
+
+def test_the_other_example_turns_v_around() -> None:
+    transform = TextureTransform(offset=(0, 1), scale=(1, -1))
+    np.testing.assert_array_equal(transform.apply([[0.25, 0.25]]), [[0.25, 0.75]])
+
+
+def test_scale_comes_before_rotation() -> None:
+    transform = TextureTransform(rotation=math.pi / 2, scale=(4, 2))
+    np.testing.assert_allclose(transform.apply([[1, 0], [0, 1]]), [[0, -4], [2, 0]], atol=1e-15)
+
+
+def textured(transform: Json, pixels: list[list[int]], **sampler: int) -> tuple[GltfFile, GltfMaterial]:
+    """A file whose thickness texture has these 8-bit levels in G."""
+    levels = np.array(pixels, dtype=np.uint8)
+    stream = io.BytesIO()
+    Image.fromarray(np.stack([0 * levels + 7, levels, 0 * levels + 9], axis=-1)).save(stream, format="PNG")
+    uri = "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+    file = GltfFile(
+        Path("a.gltf"),
+        gltf(
+            transformed(**transform),
+            textures=[{"source": 0, **({"sampler": 0} if sampler else {})}],
+            images=[{"uri": uri}],
+            samplers=[sampler],
+        ),
+    )
+    (material,) = materials_of(file)
+    return file, material
+
+
+def test_the_set_of_uvs_is_that_of_the_transform() -> None:
+    assert textured({}, [[0]])[1].thickness_transform.tex_coord == 1
+    assert textured({"texCoord": 2}, [[0]])[1].thickness_transform.tex_coord == 2
+    assert textured({}, [[0]])[1].warnings == ()
+
+
+def test_thickness_at_uvs_follows_the_transform() -> None:
+    # Each texel of 2 x 2, at the middle of its quarter; a quarter turn takes (u, v) to (v, -u).
+    file, material = textured({"rotation": math.pi / 2}, [[0, 51], [102, 255]])
+    middles = 0.25 + 0.5 * CORNERS
+    turned = {(0.25, 0.25): 102, (0.75, 0.25): 0, (0.25, 0.75): 255, (0.75, 0.75): 51}
+    expected = [2.0 * turned[tuple(uv)] / 255 for uv in middles.tolist()]
+    np.testing.assert_allclose(thickness_at(file, material, middles), expected, rtol=1e-12, atol=1e-15)
+    assert thickness_at(file, material, middles.reshape(2, 2, 2)).shape == (2, 2)
+
+
+def test_between_texels_it_is_linear_or_the_nearest() -> None:
+    at = [[0.5, 0.5], [0.35, 0.5]]
+    file, material = textured({}, [[0, 255]])
+    np.testing.assert_allclose(thickness_at(file, material, at), [1.0, 0.4], rtol=1e-12)
+    file, material = textured({}, [[0, 255]], magFilter=9728)
+    np.testing.assert_array_equal(thickness_at(file, material, at)[1], 0.0)
+
+
+@pytest.mark.parametrize(("wrap", "expected"), [(10497, [0, 1, 2]), (33071, [2, 2, 2]), (33648, [2, 1, 0])])
+def test_outside_it_wraps_as_the_sampler_says(wrap: int, expected: list[int]) -> None:
+    file, material = textured({}, [[0, 51, 102]], wrapS=wrap, wrapT=33071)
+    found = thickness_at(file, material, [[(i + 0.5) / 3 + 1, 9.0] for i in range(3)])
+    np.testing.assert_allclose(found, np.array(expected) * 2.0 * 51 / 255, rtol=1e-12, atol=1e-15)
+
+
+def test_without_a_texture_the_thickness_is_the_same_everywhere() -> None:
+    (material,) = parsed(volume(thicknessFactor=2.0))
+    np.testing.assert_array_equal(thickness_at(GltfFile(Path("a.gltf"), gltf()), material, CORNERS), 2.0)
+    for uv in ([[0.0, math.nan]], [0.0, 1.0, 2.0], 3.0):
+        with pytest.raises(tl.InputError, match="not finite pairs"):
+            thickness_at(GltfFile(Path("a.gltf"), gltf()), material, uv)
+
+
+def test_an_extension_of_the_texture_that_is_not_known_is_a_warning() -> None:
+    entry = transformed()
+    entry["extensions"]["KHR_materials_volume"]["thicknessTexture"]["extensions"] = {"VENDOR_blur": {}}
+    (found,) = parsed(entry, textures=[{}])
+    assert found.warnings == ("thicknessTexture has VENDOR_blur, which is not read",)
 
 
 # Transforms

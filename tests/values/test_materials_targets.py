@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import translucent as tl
-from translucent.materials import TARGETS, text_block
+from translucent.materials import TARGETS, load_medium, text_block
 from translucent.materials.blender import (
     absorption_node,
     blender_snippet,
@@ -30,6 +31,7 @@ from translucent.materials.openpbr import read_openpbr, write_openpbr
 from translucent.materials.standard_surface import read_standard_surface, write_standard_surface
 from translucent.materials.unity import from_unity
 from translucent.materials.unreal import LONGEST_CM, from_mean_free_path_cm, mean_free_path_cm
+from translucent.materials.usd import read_usda, usda_text
 
 COLOR = (0.18, 0.62, 0.35)
 JADE = tl.Medium.from_color(COLOR, distance=0.02, ior=1.6)
@@ -202,8 +204,11 @@ def test_blender_values_out_of_range_are_refused() -> None:
         from_absorption_node((0.5, 0, 0), -1.0)
 
 
+@pytest.mark.parametrize("version", [4, 5])
 @pytest.mark.parametrize("medium", [JADE, MILK, GLOW, CLEAR], ids=["jade", "milk", "glow", "clear"])
-def test_the_blender_snippet_runs_and_sets_the_sockets(medium: tl.Medium, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_blender_snippet_runs_and_sets_the_sockets(
+    medium: tl.Medium, version: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     made: dict[str, Any] = {}
 
     class Sockets(dict[str, Any]):
@@ -217,9 +222,17 @@ def test_the_blender_snippet_runs_and_sets_the_sockets(medium: tl.Medium, monkey
         nodes=SimpleNamespace(new=new, clear=made.clear),
         links=SimpleNamespace(new=lambda a, b: made.update(link=(a, b))),
     )
-    bpy = SimpleNamespace(
-        data=SimpleNamespace(materials=SimpleNamespace(new=lambda name: SimpleNamespace(node_tree=tree, name=name)))
-    )
+
+    class Material:
+        """Up to version 4 it has no nodes until it is told to use them; from 5 on, telling it is deprecated."""
+
+        node_tree = tree if version == 5 else None
+
+        def __setattr__(self, key: str, value: Any) -> None:
+            assert (version, key, value) == (4, "use_nodes", True)
+            Material.node_tree = tree
+
+    bpy = SimpleNamespace(data=SimpleNamespace(materials=SimpleNamespace(new=lambda name: Material())))
     monkeypatch.setitem(__import__("sys").modules, "bpy", bpy)
     exec(compile(blender_snippet(medium), "snippet", "exec"), {})
     absorbing = "ShaderNodeVolumeAbsorption" in made
@@ -260,10 +273,26 @@ def test_unreal_without_extinction() -> None:
 
 def test_unity_color_is_srgb() -> None:
     text = text_block("unity", JADE, COLOR, 0.02)
-    color = [float(v) for v in re.findall(r"([\d.e-]+)f", text.splitlines()[0])]
-    distance, ior = (float(re.findall(r", ([\d.e-]+)f", line)[0]) for line in text.splitlines()[1:])
+    comment, *lines = text.splitlines()
+    assert comment.startswith("// HDRP/Lit, with Surface Type: Transparent")
+    color = [float(v) for v in re.findall(r"([\d.e-]+)f", lines[0])]
+    distance, ior = (float(re.findall(r", ([\d.e-]+)f", line)[0]) for line in lines[1:])
     np.testing.assert_allclose(from_unity(color, distance, ior).extinction, JADE.extinction, rtol=1e-7)
     assert (distance, ior) == (0.02, 1.6)
+
+
+def test_unity_names_its_properties_and_its_formula_gives_our_extinction() -> None:
+    """The formula of its shader library adds the smallest step of float32 to the color before the logarithm."""
+    for color in (COLOR, (1.5e-5, 0.5, 1.0)):
+        medium = tl.Medium.from_color(color, 0.02)
+        lines = text_block("unity", medium, color, 0.02).splitlines()[1:]
+        names = ("_TransmittanceColor", "_ATDistance", "_Ior")
+        assert [re.findall(r'Set(Color|Float)\("(\w+)"', line)[0][1] for line in lines] == list(names)
+        encoded = np.array([float(v) for v in re.findall(r"([\d.e-]+)f", lines[0])])
+        linear = tl.color.srgb_to_linear(encoded)
+        theirs = -np.log(linear + 2.0**-24) / 0.02
+        # log(1 + e / t) <= e / t, and nine digits of the encoded color.
+        assert (np.abs(theirs - medium.extinction) * 0.02 <= 2.0**-24 / linear + 1e-8).all()
 
 
 # All blocks
@@ -308,7 +337,7 @@ def test_names_are_forgiving() -> None:
 def test_the_gltf_block_is_a_material(distance: float) -> None:
     entry = json.loads(text_block("gltf", JADE, JADE.transmittance(distance), distance))
     tree = {"asset": {"version": "2.0"}, "materials": [entry]}
-    (found,) = materials_of(GltfFile(__import__("pathlib").Path("a.gltf"), tree))
+    (found,) = materials_of(GltfFile(Path("a.gltf"), tree))
     assert found.warnings == ()
     close(found.medium(), JADE)
     assert found.medium().ior == 1.6
@@ -359,3 +388,134 @@ def test_the_usd_layer_is_parsed_and_has_the_values() -> None:
     )
     np.testing.assert_allclose(-np.log(color) / depth, MILK.extinction, rtol=1e-5)
     np.testing.assert_allclose(scatter / depth, MILK.scattering, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "target"),
+    [("a.mtlx", "openpbr"), ("b.MTLX", "standard_surface"), ("c.usda", "usd"), ("d.json", "json")],
+)
+@pytest.mark.parametrize("medium", [JADE, MILK, CLEAR], ids=["jade", "milk", "clear"])
+def test_files_of_other_systems_are_loaded(tmp_path: Path, name: str, target: str, medium: tl.Medium) -> None:
+    (tmp_path / name).write_text(text_block(target, medium, medium.transmittance(1e-4), 1e-4))
+    found = load_medium(tmp_path / name)
+    close(found, medium)
+    assert (found.ior, found.anisotropy) == (medium.ior, medium.anisotropy)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.glb", "", "suffix '.glb'; give a .mtlx, .usda, .json file; of glTF, translucent material show tells"),
+        ("a.mtlx", "<materialx><open_pbr_surface>", "a.mtlx'; OpenPBR document; its XML is broken"),
+        ("a.mtlx", "<materialx/>", "a.mtlx'; Standard Surface document; it has no <standard_surface>"),
+        ("a.usda", "", "not .usda text"),
+    ],
+)
+def test_files_that_hold_no_material_are_refused(tmp_path: Path, name: str, text: str, message: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        load_medium(tmp_path / name)
+    with pytest.raises(tl.InputError, match=r"cannot be read|suffix"):
+        load_medium(tmp_path / "none" / name)
+
+
+USD = text_block("usd", JADE, COLOR, 0.02)
+
+
+@pytest.mark.parametrize("medium", [JADE, MILK, CLEAR], ids=["jade", "milk", "clear"])
+@pytest.mark.parametrize("distance", [None, 0.02, 10.0])
+def test_usd_there_and_back(medium: tl.Medium, distance: float | None) -> None:
+    found = read_usda(usda_text(medium, distance))
+    close(found, medium)
+    assert (found.ior, found.anisotropy) == (medium.ior, medium.anisotropy)
+
+
+def test_usd_lengths_are_in_the_units_of_the_layer() -> None:
+    np.testing.assert_allclose(
+        read_usda(USD.replace("metersPerUnit = 1", "metersPerUnit = 0.1")).extinction, JADE.extinction * 10
+    )
+    # A layer that states none is in centimeters.
+    np.testing.assert_allclose(read_usda(USD.replace("    metersPerUnit = 1\n", "")).extinction, JADE.extinction * 100)
+
+
+def test_usd_standard_surface_is_read_and_an_srgb_color_is_made_linear() -> None:
+    text = USD.replace("open_pbr_surface", "standard_surface").replace("transmission_weight", "transmission")
+    text = text.replace("specular_ior", "specular_IOR")
+    close(read_usda(text), JADE)
+    for space in ("srgb_texture", "srgb_rec709_scene"):
+        encoded = USD.replace("(0.18, 0.62, 0.35)", f'(0.18, 0.62, 0.35) (\n colorSpace = "{space}"\n)')
+        np.testing.assert_allclose(read_usda(encoded).transmittance(0.02), tl.color.srgb_to_linear(COLOR), rtol=1e-12)
+
+
+def test_usd_signs_in_strings_comments_and_paths_mean_nothing() -> None:
+    odd = """
+        asset inputs:file = @a}b.png@
+        rel to = </x}y>
+        string inputs:single = '}"' # }
+        string inputs:double = "}\\"}"
+        string inputs:long = '''it's }
+ "inputs:transmission_depth = 9"}''' (doc = "metersPerUnit = 9")
+"""
+    before = '"ND_open_pbr_surface_surfaceshader"'
+    text = USD.replace(before, before + odd)
+    assert text.count("}") == USD.count("}") + 8
+    close(read_usda(text), JADE)
+
+
+def test_usd_as_another_writer_has_it_is_read() -> None:
+    pytest.importorskip("pxr", reason="the usd-core package is absent")
+    from pxr import Sdf, Usd, UsdGeom, UsdShade  # type: ignore[import-untyped, unused-ignore]
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 0.001)
+    material = UsdShade.Material.Define(stage, "/looks/jade")
+    shader = UsdShade.Shader.Define(stage, "/looks/jade/shader")
+    shader.CreateIdAttr("ND_open_pbr_surface_surfaceshader")
+    for key, kind, value in (
+        ("transmission_weight", Sdf.ValueTypeNames.Float, 1.0),
+        ("transmission_color", Sdf.ValueTypeNames.Color3f, COLOR),
+        ("transmission_depth", Sdf.ValueTypeNames.Float, 20.0),
+        ("specular_ior", Sdf.ValueTypeNames.Float, 1.6),
+        ("base_metalness", Sdf.ValueTypeNames.Float, 0.0),
+    ):
+        shader.CreateInput(key, kind).Set(value)
+    shader.GetInput("transmission_color").GetAttr().SetDocumentation("a color at a distance")
+    shader.CreateInput("base_color", Sdf.ValueTypeNames.Color3f).ConnectToSource(material.ConnectableAPI(), "tint")
+    found = read_usda(stage.GetRootLayer().ExportToString())
+    np.testing.assert_allclose(found.extinction, JADE.extinction, rtol=1e-6)  # it stores float32
+    assert found.ior == pytest.approx(1.6, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("#usda", "PXR-USDC", "not .usda text; convert it"),
+        ("ND_open_pbr_surface_surfaceshader", "UsdPreviewSurface", "it has no shader ND_open_pbr"),
+        ("inputs:transmission_color =", "inputs:transmission_color.connect =", "comes from a node or changes"),
+        ("inputs:transmission_depth =", "inputs:transmission_depth.timeSamples =", "comes from a node or changes"),
+        ("(0.18, 0.62, 0.35)", "(0.18, 0.62)", "not three numbers"),
+        ("(0.18, 0.62, 0.35)", "(0.18, 0.62, 0.35", "not three numbers"),
+        ("= 0.02", "= None", "transmission_depth is 'None', not a number"),
+        ("= 0.02", "= -1", "negative depth"),
+        ("= 0.02", "= 1e-320", "absorption .* not finite"),
+        ("metersPerUnit = 1", "metersPerUnit = 0", "metersPerUnit is 0"),
+        ("metersPerUnit = 1", "metersPerUnit = one", "metersPerUnit is 'one', not a number"),
+        ("transmission_weight = 1.0", "transmission_weight = 0", "so it is opaque"),
+    ],
+)
+def test_a_bad_usd_layer_is_refused_in_one_line(old: str, new: str, message: str) -> None:
+    assert old in USD
+    with pytest.raises(tl.InputError, match=message) as caught:
+        read_usda(USD.replace(old, new))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_usd_layer_cut_short_anywhere_is_read_or_refused() -> None:
+    messages = []
+    for end in range(len("#usda"), len(USD)):
+        try:
+            close(read_usda(USD[:end]), JADE)
+        except tl.InputError as error:
+            messages.append(str(error))
+    assert len(messages) > 100
+    assert not any("\n" in message for message in messages)

@@ -1,6 +1,7 @@
 """Media in the terms of other systems: one file per target, each with its formula, its source and what it loses.
 
-`TARGETS` names the systems that `text_block` writes for. Reading and writing whole glTF files:
+`TARGETS` names the systems that `text_block` writes for; `load_medium` reads files of those that have files. Numbers of
+the others: `translucent.materials.blender`, `unity` and `unreal`. Reading and writing whole glTF files:
 `translucent.materials.gltf` and `translucent.materials.gltf_write`.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -15,15 +17,15 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.materials.blender import blender_snippet
 from translucent.materials.css import css_text
-from translucent.materials.json_text import write_json
-from translucent.materials.openpbr import write_openpbr
-from translucent.materials.standard_surface import write_standard_surface
+from translucent.materials.json_text import read_json, write_json
+from translucent.materials.openpbr import read_openpbr, write_openpbr
+from translucent.materials.standard_surface import read_standard_surface, write_standard_surface
 from translucent.materials.unity import unity_text
 from translucent.materials.unreal import unreal_text
-from translucent.materials.usd import usda_text
+from translucent.materials.usd import read_usda, usda_text
 from translucent.medium import Medium
 
-__all__ = ["TARGETS", "text_block"]
+__all__ = ["TARGETS", "load_medium", "text_block"]
 
 #: Largest difference between the color that is given and that of the medium: a channel that was raised from black.
 _SAME_COLOR = 1e-3
@@ -89,3 +91,46 @@ def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: floa
             "give medium.transmittance(distance)",
         )
     return writer(medium, distance).rstrip("\n")
+
+
+def _read_materialx(text: str, unit: str) -> Medium:
+    return read_openpbr(text, unit) if "<open_pbr_surface" in text else read_standard_surface(text, unit)
+
+
+_READERS: dict[str, Callable[[str, str], Medium]] = {
+    ".mtlx": _read_materialx,
+    ".usda": lambda text, _: read_usda(text),
+    ".json": lambda text, _: read_json(text),
+}
+
+
+def load_medium(path: str | Path, unit: str = "m") -> Medium:
+    """The medium of a material file of another system.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.mtlx`` (OpenPBR or Standard Surface), ``.usda`` (the same as UsdShade), or ``.json`` as `write_json` has it.
+        glTF files hold several materials: see `translucent.read_materials`.
+    unit : str
+        Of the lengths in a .mtlx file, which states none.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it holds no such material.
+    """
+    what, reader = f"material {str(path)!r}", _READERS.get(Path(path).suffix.lower())
+    if reader is None:
+        do = f"give a {', '.join(_READERS)} file; of glTF, translucent material show tells the colors"
+        raise InputError(what, f"suffix {Path(path).suffix!r}", do)
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(what, f"cannot be read ({error.strerror})", "check the path") from None
+    except ValueError:
+        raise InputError(what, "not UTF-8 text", "save it as text") from None
+    try:
+        return reader(text, unit)
+    except InputError as error:
+        raise InputError(what, str(error)) from None

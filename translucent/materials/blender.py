@@ -10,7 +10,8 @@ Principled Volume: sigma_s = Color Density; sigma_a = (1 - Color) (1 - sqrt(Abso
 Strength times Emission Color; Anisotropy = g.
 Inverted: Density is the largest channel of sigma_a (absorption) or of sigma_t (principled), the smallest for which all
 colors are in 0..1. Colors are linear, as sockets store them.
-Source: Blender manual, Volume Absorption, Principled Volume and "Volume Coefficients".
+Source: Blender manual, Volume Absorption, Principled Volume and "Volume Coefficients". The tests render the snippet in
+Cycles where Blender is installed.
 
 Not carried over: index of refraction, which belongs to a surface shader; heterogeneous density.
 """
@@ -98,7 +99,8 @@ def blender_snippet(medium: Medium, name: str = "translucent") -> str:
         "import bpy",
         "",
         f"material = bpy.data.materials.new({name!r})",
-        "material.use_nodes = True",
+        "if material.node_tree is None:",
+        "    material.use_nodes = True  # before Blender 5",
         "nodes, links = material.node_tree.nodes, material.node_tree.links",
         "nodes.clear()",
         'output = nodes.new("ShaderNodeOutputMaterial")',

@@ -62,5 +62,5 @@ def extinction_at(color: npt.ArrayLike, distance: float) -> Array:
     triple = np.asarray(color, dtype=np.float64)
     if math.isinf(distance):
         return np.zeros(3)
-    with np.errstate(under="ignore"):
+    with np.errstate(under="ignore", over="ignore"):  # a medium refuses infinity
         return optics.extinction_from_color(np.where(triple == 0, BLACKEST, triple), distance)

@@ -8,6 +8,7 @@ KHR_materials_volume          attenuation_color: linear, 0..1 per channel       
 KHR_materials_volume          attenuation_distance: metres of the **world**, > 0       infinity
 KHR_materials_volume          thickness (factor), >= 0, in **mesh** space              0: thin-walled
 KHR_materials_volume          thickness_texture: its G channel multiplies the factor   none
+KHR_texture_transform         thickness_transform: of the UVs of that texture          none
 KHR_materials_ior             ior: 0 or >= 1                                           1.5
 KHR_materials_dispersion      dispersion = 20 / Abbe number, >= 0                      0
 KHR_materials_emissive_...    emissive: factor times strength, linear, of the surface  (0, 0, 0)
@@ -28,14 +29,17 @@ so that what passes straight on is the same; `translucent.materials.gltf_write` 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from translucent.errors import InputError
 from translucent.materials.color_distance import BLACKEST, extinction_at
 from translucent.materials.gltf_file import GltfFile, Json, read_gltf
+from translucent.materials.gltf_texture import TEXTURE_TRANSFORM, TextureTransform
 from translucent.medium import Medium
+from translucent.swatches import html_strip
 
 TRANSMISSION = "KHR_materials_transmission"
 VOLUME = "KHR_materials_volume"
@@ -76,6 +80,8 @@ class GltfMaterial:
         Whether light can enter: by transmission, by diffuse transmission, or by an extension that is not known.
     thickness_texture : int, optional
         Index in the file's list of textures.
+    thickness_transform : TextureTransform
+        Which UVs it is read at; see `translucent.materials.gltf_scene.thickness_at`.
     warnings : tuple of str
         What is allowed, and yet not as it should be.
     """
@@ -90,6 +96,7 @@ class GltfMaterial:
     dispersion: float = 0.0
     emissive: Triple = (0.0, 0.0, 0.0)
     thickness_texture: int | None = None
+    thickness_transform: TextureTransform = field(default_factory=TextureTransform)
     has_volume: bool = False
     transmits: bool = False
     warnings: tuple[str, ...] = ()
@@ -98,6 +105,11 @@ class GltfMaterial:
     def has_thickness_texture(self) -> bool:
         """Whether a texture scales the thickness."""
         return self.thickness_texture is not None
+
+    @property
+    def kind(self) -> Literal["opaque", "thin wall", "volume"]:
+        """What it makes of an object."""
+        return "opaque" if not self.transmits else "thin wall" if self.medium() is None else "volume"
 
     def medium(self) -> Medium | None:
         """The medium inside, or None: the material is opaque, or a thin wall without an inside (thickness 0).
@@ -110,6 +122,14 @@ class GltfMaterial:
         extinction = extinction_at(self.attenuation_color, self.attenuation_distance)
         return Medium(absorption=extinction, ior=self.ior or DEFAULT_IOR)
 
+    def _repr_html_(self) -> str:
+        """Name and swatches of the medium, for notebooks."""
+        medium, distance = self.medium(), self.attenuation_distance
+        head = f"<div>{self.index} {escape(repr(self.name))}: {self.kind}</div>"
+        if medium is None:
+            return head
+        return head + html_strip(medium.extinction, distance if math.isfinite(distance) else None)
+
     def summary(self) -> dict[str, Any]:
         """The fields and the medium in values that JSON can hold; None stands for an infinite distance."""
         medium = self.medium()
@@ -120,6 +140,7 @@ class GltfMaterial:
             "ior": self.ior,
             "thickness": self.thickness,
             "thickness_texture": self.thickness_texture,
+            "thickness_transform": vars(self.thickness_transform) if self.has_thickness_texture else None,
             "attenuation_color": list(self.attenuation_color),
             "attenuation_distance": self.attenuation_distance if math.isfinite(self.attenuation_distance) else None,
             "dispersion": self.dispersion,
@@ -177,16 +198,40 @@ class _Fields:
         red, green, blue = (channels.number(f"{key}[{i}]", default[i], 0.0, 1.0) for i in range(3))
         return red, green, blue
 
-    def texture(self, key: str, count: int) -> int | None:
-        """Index of a texture, if there is one."""
+    def pair(self, key: str, default: tuple[float, float]) -> tuple[float, float]:
+        """Two numbers."""
+        value = self.values.get(key, list(default))
+        if not isinstance(value, list) or len(value) != 2:
+            self.problems.append(f"{key} is {value!r}, not two numbers")
+            return default
+        parts = _Fields({f"{key}[{i}]": part for i, part in enumerate(value)}, key, self.problems)
+        return parts.number(f"{key}[0]", default[0], -math.inf), parts.number(f"{key}[1]", default[1], -math.inf)
+
+    def whole(self, key: str, default: int) -> int:
+        """A whole number of 0 and above."""
+        value = self.values.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            self.problems.append(f"{key} is {value!r}, not a whole number of 0 or more")
+            return default
+        return value
+
+    def texture(self, key: str, count: int) -> tuple[int | None, TextureTransform]:
+        """Index of a texture, if there is one, and its transform."""
         if key not in self.values:
-            return None
-        info = _Fields(self.values[key], key, self.problems).values
-        index = info.get("index")
+            return None, TextureTransform()
+        info = _Fields(self.values[key], key, self.problems)
+        index = info.values.get("index")
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
             self.problems.append(f"{key} index {index!r} is not one of {count} textures")
-            return None
-        return index
+            return None, TextureTransform()
+        extensions = _Fields(info.values.get("extensions", {}), f"{key} extensions", self.problems).values
+        stated = _Fields(extensions.get(TEXTURE_TRANSFORM, {}), TEXTURE_TRANSFORM, self.problems)
+        return index, TextureTransform(
+            stated.pair("offset", (0.0, 0.0)),
+            stated.number("rotation", 0.0, -math.inf),
+            stated.pair("scale", (1.0, 1.0)),
+            stated.whole("texCoord", info.whole("texCoord", 0)),
+        )
 
 
 def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
@@ -206,6 +251,7 @@ def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
     scale = strength.number("emissiveStrength", 1.0, 0.0)
     red, green, blue = _Fields(entry, "material", problems).triple("emissiveFactor", (0.0, 0.0, 0.0))
     index_of_refraction = ior.number("ior", DEFAULT_IOR, 0.0)
+    texture, transform = volume.texture("thicknessTexture", len(file.items("textures")))
     if 0 < index_of_refraction < 1:
         problems.append(f"ior {index_of_refraction:g} is not 0, and not 1 or more")
     found = GltfMaterial(
@@ -218,7 +264,8 @@ def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
         attenuation_distance=volume.number("attenuationDistance", math.inf, 0.0, above=True),
         dispersion=dispersion.number("dispersion", 0.0, 0.0),
         emissive=(scale * red, scale * green, scale * blue),
-        thickness_texture=volume.texture("thicknessTexture", len(file.items("textures"))),
+        thickness_texture=texture,
+        thickness_transform=transform,
         has_volume=VOLUME in extensions,
         transmits=share > 0 or _lets_light_in(extensions),
     )
@@ -255,6 +302,7 @@ def _warnings(found: GltfMaterial, entry: Json, extensions: Json, volume: Json) 
     if found.thickness == 0 and math.isfinite(found.attenuation_distance):
         told.append("thicknessFactor is 0, so it is a thin wall and attenuation has no effect")
     texture = volume.get("thicknessTexture")
-    if isinstance(texture, dict) and texture.get("extensions"):
-        told.append("thicknessTexture is transformed; the transform is not read")
+    for key in texture.get("extensions", {}) if isinstance(texture, dict) else ():
+        if key != TEXTURE_TRANSFORM:
+            told.append(f"thicknessTexture has {key}, which is not read")
     return told

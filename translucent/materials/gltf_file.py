@@ -19,12 +19,14 @@ from urllib.parse import quote, unquote
 
 from translucent.errors import InputError
 from translucent.frame import write_atomically
+from translucent.materials.gltf_pack import gather
 
 Json = dict[str, Any]
 
 _MAGIC, _VERSION = b"glTF", 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
+_LONGEST = 2**32 - 1  # bytes: the header states the length with 32 bits
 _MOST_DIGITS = 300  # of a whole number that is still in the range of float64
 _DATA_URI = "data:application/octet-stream;base64,"
 
@@ -153,13 +155,13 @@ def _whole(text: str) -> int:
 def write_gltf(file: GltfFile, path: str | Path) -> None:
     """Write a file as .glb or .gltf, by its suffix; the file is complete or not there.
 
-    A .glb turned into .gltf holds its binary chunk as a data URI. Links to files beside are made relative to the new
-    folder.
+    A .glb turned into .gltf holds its binary chunk as a data URI; a .gltf turned into .glb has its buffers in one, see
+    `translucent.materials.gltf_pack`. Links to files beside are made relative to the new folder.
 
     Raises
     ------
     InputError
-        If the suffix is another one, or a .gltf cannot become a .glb: it has several buffers or embedded images.
+        If the suffix is another one, or a .gltf has buffers that cannot be read.
     RenderError
         If the file cannot be written.
     """
@@ -214,18 +216,14 @@ def _unpacked(file: GltfFile, tree: Json) -> Json:
 
 def _packed(file: GltfFile, tree: Json) -> bytes:
     chunks = file.chunks
-    buffers = file.items("buffers") and tree["buffers"]
-    if not chunks and buffers:
-        embedded = any(str(image.get("uri", "")).startswith("data:") for image in file.items("images"))
-        if len(buffers) > 1 or embedded:
-            raise InputError(
-                f"output .glb of {str(file.path)!r}", "it has several buffers or embedded images", "write a .gltf"
-            )
-        binary = file.resource(file.tree["buffers"][0])
-        binary += b"\0" * (-len(binary) % 4)
-        chunks = _CHUNK.pack(len(binary), _BINARY_CHUNK) + binary
-        tree = {**tree, "buffers": [{key: value for key, value in buffers[0].items() if key != "uri"}]}
+    if not chunks:
+        tree, binary = gather(file, tree)
+        if binary:
+            binary += b"\0" * (-len(binary) % 4)
+            chunks = _CHUNK.pack(len(binary), _BINARY_CHUNK) + binary
     text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
     length = _HEADER.size + _CHUNK.size + len(text) + len(chunks)
+    if length > _LONGEST:
+        raise InputError(f"output .glb of {str(file.path)!r}", "more than 4 GiB, which no .glb holds", "write a .gltf")
     return _HEADER.pack(_MAGIC, _VERSION, length) + _CHUNK.pack(len(text), _JSON_CHUNK) + text + chunks

@@ -7,15 +7,23 @@ mu_t = -ln(T) / lambda, mu_s = S / lambda, mu_a = mu_t - mu_s; where a channel o
 the same amount (a shift by grey), so that none is. With T = 1 and S = 0 there is no medium, and nothing is divided by
 it. Written the other way round, mu_a is never negative, so what is written is read back as it was. lambda is chosen so
 that no channel of T is darker than 1e-5 and none of S is above 1.
-Source: OpenPBR Surface 1.1, "Translucent base"; Autodesk Standard Surface 1.0.1, "Transmission".
+Source: OpenPBR Surface 1.1, "Translucent base", and its node graph in MaterialX, which computes just this. Autodesk
+Standard Surface 1.0.1, "Specular transmission", says in words that depth and color are as in Beer's law and that the
+scatter color sets the scattering; the formula is that of its origin, Arnold, which OpenPBR took over unchanged, and
+MaterialX translates the two into each other input by input.
 
 Units: depths are in scene units; `unit` says which. Colors are linear Rec.709 (``colorspace="lin_rec709"``).
 Not carried over: emission of the medium. When reading, inputs that are driven by nodes or textures are refused.
+Known losses elsewhere: renderers that draw Standard Surface by MaterialX's own graph see a tint of the surface, as that
+graph has no depth; from version 1.2 on, OpenPBR takes the scatter color for an albedo, mu_s = S mu_t, so that documents
+that scatter must be read as version 1.1 (those that only absorb mean the same).
 """
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
@@ -36,7 +44,17 @@ _SRGB = "srgb_texture"
 
 @dataclass(frozen=True)
 class Shader:
-    """Name of a surface shader and of its inputs for transmission, with the default of its index of refraction."""
+    """Name of a surface shader, of its inputs for transmission, and the last version where they mean what they do here.
+
+    Attributes
+    ----------
+    node, title : str
+        Its name in MaterialX, and for people.
+    weight, color, depth, scatter, anisotropy, ior : str
+        Names of the inputs.
+    last_version : (int, int), optional
+        Scatter colors of later versions are refused; None: no later one is known.
+    """
 
     node: str
     weight: str
@@ -46,7 +64,18 @@ class Shader:
     depth: str = "transmission_depth"
     scatter: str = "transmission_scatter"
     anisotropy: str = "transmission_scatter_anisotropy"
-    default_ior: float = 1.5
+    last_version: tuple[int, int] | None = None
+
+    def defaults(self) -> dict[str, float | Array]:
+        """What inputs have that are not stated; the kinds of the values are those of the inputs."""
+        return {
+            self.weight: 0.0,
+            self.color: np.ones(3),
+            self.depth: 0.0,
+            self.scatter: np.zeros(3),
+            self.anisotropy: 0.0,
+            self.ior: 1.5,
+        }
 
 
 def transmission_inputs(
@@ -94,66 +123,69 @@ def write_shader(shader: Shader, medium: Medium, distance: float | None, name: s
 
 def read_shader(shader: Shader, text: str, unit: str) -> Medium:
     """The medium of the first such shader in a MaterialX document."""
+    what = f"{shader.title} document"
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise InputError(f"{shader.title} document", f"its XML is broken ({error})", "export it again") from error
+        raise InputError(what, f"its XML is broken ({error})", "export it again") from error
     surface = next(root.iter(shader.node), None)
     if surface is None:
-        raise InputError(f"{shader.title} document", f"it has no <{shader.node}>", "export that surface")
+        raise InputError(what, f"it has no <{shader.node}>", "export that surface")
     space = root.get("colorspace", "lin_rec709")
     inputs = {element.get("name", ""): element for element in surface.iter("input")}
-    weight, depth = _number(shader, inputs, shader.weight, 0.0), _number(shader, inputs, shader.depth, 0.0)
-    ior = _number(shader, inputs, shader.ior, shader.default_ior)
-    if weight == 0:
-        raise InputError(f"{shader.title} document", f"{shader.weight} is 0, so it is opaque", "raise the weight")
-    color = _color(shader, inputs, shader.color, 1.0, space)
-    scatter = _color(shader, inputs, shader.scatter, 0.0, space)
-    if not ((color >= 0).all() and (color <= 1).all() and (scatter >= 0).all() and 0 <= depth < math.inf):
-        raise InputError(
-            f"{shader.title} document", "a transmission color outside 0..1, or a negative depth", "correct the values"
-        )
-    metres = depth * metres_per_unit(unit)
-    if metres == 0:  # a tint of the surface: there is no medium
-        return Medium(ior=ior)
-    scattering = scatter / metres
-    absorption = extinction_at(color, metres) - scattering
-    return Medium(
-        absorption=absorption - min(0.0, float(absorption.min())),
-        scattering=scattering,
-        anisotropy=_number(shader, inputs, shader.anisotropy, 0.0),
-        ior=ior,
+    stated = {
+        key: _value(what, key, inputs[key], default, space)
+        for key, default in shader.defaults().items()
+        if key in inputs
+    }
+    version = surface.get("version", "")
+    newer = shader.last_version is not None and tuple(map(int, re.findall(r"\d+", version)[:2])) > shader.last_version
+    if newer and np.any(stated.get(shader.scatter, 0.0)):
+        raise InputError(what, f"version {version}, whose scatter color means another thing", "export version 1.1")
+    return medium_of(shader, stated, metres_per_unit(unit))
+
+
+def medium_of(shader: Shader, stated: Mapping[str, float | Array], metres: float) -> Medium:
+    """The medium of a shader's inputs, colors linear, whose lengths are in units of `metres`; see `Shader.defaults`."""
+    what, values = f"{shader.title} surface", {**shader.defaults(), **stated}
+    weight, depth, ior, anisotropy = (
+        float(values[key]) for key in (shader.weight, shader.depth, shader.ior, shader.anisotropy)
     )
+    color, scatter = np.asarray(values[shader.color]), np.asarray(values[shader.scatter])
+    if weight == 0:
+        raise InputError(what, f"{shader.weight} is 0, so it is opaque", "raise the weight")
+    if not ((color >= 0).all() and (color <= 1).all() and (scatter >= 0).all() and 0 <= depth < math.inf):
+        raise InputError(what, "a transmission color outside 0..1, or a negative depth", "correct the values")
+    depth *= metres
+    if depth == 0:  # a tint of the surface: there is no medium
+        return Medium(ior=ior)
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # a medium refuses what is not finite
+        scattering = scatter / depth
+        absorption = extinction_at(color, depth) - scattering
+        shifted = absorption - min(0.0, float(absorption.min()))
+    return Medium(absorption=shifted, scattering=scattering, anisotropy=anisotropy, ior=ior)
 
 
-def _text(shader: Shader, inputs: dict[str, ElementTree.Element], key: str) -> str | None:
-    if key not in inputs:
-        return None
-    value = inputs[key].get("value")
-    if value is None:
-        raise InputError(f"{shader.title} document", f"{key} comes from a node", "give it a constant value")
-    return value
-
-
-def _number(shader: Shader, inputs: dict[str, ElementTree.Element], key: str, default: float) -> float:
-    text = _text(shader, inputs, key)
-    try:
-        return default if text is None else float(text)
-    except ValueError:
-        raise InputError(f"{shader.title} document", f"{key} is {text!r}, not a number", "correct it") from None
-
-
-def _color(shader: Shader, inputs: dict[str, ElementTree.Element], key: str, default: float, space: str) -> Array:
-    text = _text(shader, inputs, key)
+def _value(what: str, key: str, element: ElementTree.Element, default: float | Array, space: str) -> float | Array:
+    """The constant value of an input, of the kind of its default; colors become linear."""
+    text = element.get("value")
     if text is None:
-        return np.full(3, default)
+        raise InputError(what, f"{key} comes from a node", "give it a constant value")
+    return parse_value(what, key, text.split(","), default, element.get("colorspace", space))
+
+
+def parse_value(what: str, key: str, parts: list[str], default: float | Array, space: str) -> float | Array:
+    """A number, or three in a color space made linear, from the texts of its parts."""
+    scalar = isinstance(default, float)
     try:
-        triple = np.array([float(part) for part in text.split(",")])
+        numbers = np.array([float(part) for part in parts])
     except ValueError:
-        triple = np.zeros(0)
-    if triple.shape != (3,) or not np.isfinite(triple).all():
-        raise InputError(f"{shader.title} document", f"{key} is {text!r}, not three numbers", "correct it")
-    space = inputs[key].get("colorspace", space)
+        numbers = np.zeros(0)
+    if numbers.shape != (1 if scalar else 3,) or not np.isfinite(numbers).all():
+        kind = "a number" if scalar else "three numbers"
+        raise InputError(what, f"{key} is {', '.join(parts)!r}, not {kind}", "correct it")
+    if scalar:
+        return float(numbers[0])
     if space not in (*_LINEAR, _SRGB):
-        raise InputError(f"{shader.title} document", f"color space {space!r}", "use lin_rec709 or srgb_texture")
-    return srgb_to_linear(triple) if space == _SRGB else triple
+        raise InputError(what, f"color space {space!r}", "use lin_rec709 or srgb_texture")
+    return srgb_to_linear(numbers) if space == _SRGB else numbers

@@ -10,7 +10,9 @@ from __future__ import annotations
 from translucent.materials.materialx import Shader, read_shader, write_shader
 from translucent.medium import Medium
 
-SHADER = Shader("open_pbr_surface", weight="transmission_weight", ior="specular_ior", title="OpenPBR")
+SHADER = Shader(
+    "open_pbr_surface", title="OpenPBR", weight="transmission_weight", ior="specular_ior", last_version=(1, 1)
+)
 
 
 def write_openpbr(medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m") -> str:
@@ -36,6 +38,7 @@ def read_openpbr(text: str, unit: str = "m") -> Medium:
     Raises
     ------
     InputError
-        If the document is broken, has no such surface, or inputs are out of range or not constant.
+        If the document is broken, has no such surface, or inputs are out of range or not constant; or if it is of
+        version 1.2 or later and scatters.
     """
     return read_shader(SHADER, text, unit)

@@ -1,10 +1,14 @@
 """Unity's High Definition Render Pipeline: transmittance color at an absorption distance, of the Lit shader.
 
-Formula: sigma_t = -ln(color) / distance, as here; the distance is in metres. Properties of the shader:
-_TransmittanceColor, _ATDistance, _Ior. Unity's color properties are sRGB-encoded; the shader gets them linear.
-Source: Unity HDRP documentation, Lit shader, Transparency Inputs.
+Formula: sigma_t = -ln(color) / distance, as here; the shader adds 2^-24 to the color, so that black is finite. The
+distance is in metres. Properties, by their names in the shader's source: _TransmittanceColor, _ATDistance, _Ior (1 to
+2.5 in the inspector). They have an effect only with the surface type Transparent, an alpha below 1 and a refraction
+model, which are chosen in the inspector. Unity's color properties are sRGB-encoded; the shader gets them linear.
+Source: Unity HDRP, HDRP/Lit shader (properties), VolumeRendering (absorption from a color at a distance); manual, "Lit
+shader", "Create a refractive material".
 
-Not carried over: scattering (its extinction is written), anisotropy, emission; thickness is the shader's own.
+Not carried over: scattering (its extinction is written), anisotropy, emission; thickness is the shader's own, of the
+refraction model.
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ def unity_text(medium: Medium, distance: float | None = None) -> str:
     color, metres = color_at(medium, distance)
     red, green, blue = np.clip(linear_to_srgb(color), 0.0, 1.0)
     return (
+        "// HDRP/Lit, with Surface Type: Transparent, Base Map alpha below 1, Refraction Model: Planar or Sphere.\n"
         f'material.SetColor("_TransmittanceColor", new Color({red:.9g}f, {green:.9g}f, {blue:.9g}f)); // sRGB\n'
         f'material.SetFloat("_ATDistance", {metres if math.isfinite(metres) else 1.0:.9g}f); // metres\n'
         f'material.SetFloat("_Ior", {medium.ior:.9g}f);\n'

@@ -1,17 +1,39 @@
-"""UsdShade: a material with an OpenPBR surface, as .usda text. Written only.
+"""UsdShade: a material with an OpenPBR surface, as .usda text, written and read.
 
 UsdPreviewSurface has neither transmission nor volume, so the material is a MaterialX network of one node,
-``ND_open_pbr_surface_surfaceshader``. The inputs are those of `translucent.materials.openpbr`, with its formulas,
-source and losses; lengths are in the stage's ``metersPerUnit``, here 1.
+``ND_open_pbr_surface_surfaceshader``; ``ND_standard_surface_surfaceshader`` is read, too. The inputs are those of
+`translucent.materials.openpbr`, with its formulas, source and losses; lengths are in the layer's ``metersPerUnit``,
+written as 1, and 0.01 where a layer states none.
+Source: OpenUSD, the .usda file format, UsdShade, UsdGeom (stage metrics).
+
+Read is one layer of text, without what it refers to: no composition, no variants, no binary .usdc.
 """
 
 from __future__ import annotations
 
-import numpy as np
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
-from translucent.materials.materialx import transmission_inputs
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.materials.materialx import Shader, medium_of, parse_value, transmission_inputs
 from translucent.materials.openpbr import SHADER
+from translucent.materials.standard_surface import SHADER as STANDARD_SURFACE
 from translucent.medium import Medium
+
+_SHADERS = {f"ND_{shader.node}_surfaceshader": shader for shader in (SHADER, STANDARD_SURFACE)}
+_SPACES = {"lin_rec709_scene": "lin_rec709", "raw": "none", "srgb_rec709_scene": "srgb_texture"}
+_CENTIMETER = 0.01
+
+# Strings of four kinds, then comments, then paths and assets, whose signs mean nothing, then signs and words.
+_TOKENS = re.compile(
+    r"""('{3}(?:\\.|[^\\])*?'{3}|"{3}(?:\\.|[^\\])*?"{3}|'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*")"""
+    r"""|\#[^\n]*|<[^>]*>|@[^@]*@|([(){}\[\]=,;]|[^\s(){}\[\]=,;"'\#<@]+)""",
+    re.DOTALL,
+)
 
 
 def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent") -> str:
@@ -43,3 +65,77 @@ def Material "{name}"
     }}
 }}
 """
+
+
+@dataclass
+class _Block:
+    """What the reader keeps of the text between two braces."""
+
+    identifier: str = ""
+    #: Texts of the parts of a value, and its color space.
+    inputs: dict[str, tuple[list[str], str]] = field(default_factory=dict)
+    #: Inputs that are no constants.
+    varying: set[str] = field(default_factory=set)
+
+
+def read_usda(text: str) -> Medium:
+    """The medium of the first OpenPBR or Standard Surface shader in a .usda layer.
+
+    Raises
+    ------
+    InputError
+        If the text is no such layer, has no such shader, or its inputs are out of range or not constant.
+    """
+    if not text.startswith("#usda"):
+        raise InputError("USD layer", "not .usda text", "convert it, for example with usdcat -o out.usda FILE")
+    tokens = [match[1] or match[2] for match in _TOKENS.finditer(text) if match[1] or match[2]]
+    metres = _CENTIMETER
+    if "metersPerUnit" in tokens[:-2]:
+        metres = float(parse_value("USD layer", "metersPerUnit", [tokens[tokens.index("metersPerUnit") + 2]], 1.0, ""))
+        if not metres > 0:
+            raise InputError("USD layer", f"metersPerUnit is {metres:g}", "correct it, for example to 0.01")
+    for block in _blocks(tokens):
+        if shader := _SHADERS.get(block.identifier):
+            return medium_of(shader, dict(_stated(shader, block)), metres)
+    raise InputError("USD layer", f"it has no shader {' or '.join(_SHADERS)}", "export such a MaterialX surface")
+
+
+def _blocks(tokens: list[str]) -> Iterator[_Block]:
+    """The blocks of a layer, in the order in which they end."""
+    stack, index = [_Block()], 0
+    while index < len(tokens):
+        token, following = tokens[index], tokens[index + 1 : index + 3]
+        index += 1
+        if token == "{":
+            stack.append(_Block())
+        elif token == "}" and len(stack) > 1:
+            yield stack.pop()
+        elif token == "info:id" and following[:1] == ["="]:
+            stack[-1].identifier = following[-1].strip("\"'")
+        elif token.startswith("inputs:") and following[:1] == ["="]:
+            name, _, aspect = token.removeprefix("inputs:").partition(".")
+            if aspect:  # a connection, or values over time
+                stack[-1].varying.add(name)
+                continue
+            parts, index = _list(tokens, index + 1)
+            metadata, index = _list(tokens, index) if tokens[index : index + 1] == ["("] else ([], index)
+            space = metadata[metadata.index("colorSpace") + 2] if "colorSpace" in metadata[:-2] else "lin_rec709"
+            stack[-1].inputs[name] = parts, space.strip("\"'")
+
+
+def _list(tokens: list[str], index: int) -> tuple[list[str], int]:
+    """The tokens of a value from here on, without parentheses and commas, and where they end."""
+    if tokens[index : index + 1] != ["("]:
+        return tokens[index : index + 1], index + 1
+    end = tokens.index(")", index) if ")" in tokens[index:] else len(tokens)
+    return [token for token in tokens[index + 1 : end] if token != ","], end + 1
+
+
+def _stated(shader: Shader, block: _Block) -> Iterator[tuple[str, float | npt.NDArray[np.float64]]]:
+    what = f"{shader.title} shader of a USD layer"
+    for key, default in shader.defaults().items():
+        if key in block.varying:
+            raise InputError(what, f"{key} comes from a node or changes with time", "give it a constant value")
+        if key in block.inputs:
+            parts, space = block.inputs[key]
+            yield key, parse_value(what, key, parts, default, _SPACES.get(space, space))

@@ -1,0 +1,137 @@
+"""The Blender snippet in Blender itself: a slab of the material, rendered by Cycles, lets through what ours does."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.materials.blender import absorption_node, blender_snippet
+
+JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
+MILK = tl.Medium(absorption=(14, 25, 142), scattering=(70, 122, 19), anisotropy=0.25)
+GLOW = tl.Medium(absorption=(100, 200, 300), emission=(50, 200, 0))
+
+SIDE, EYE = 8, 1.0  # pixels; distance of the camera from the slab's middle in metres
+
+#: Arguments: snippet, thickness, samples, result. The world is white, and only the camera sees it, so that what is
+#: scattered into the view adds nothing.
+SLAB = f"""
+import json, sys
+import bpy
+snippet, thickness, samples, result = sys.argv[sys.argv.index("--") + 1 :]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+with open(snippet) as stream:
+    exec(compile(stream.read(), "snippet", "exec"), {{}})
+bpy.ops.mesh.primitive_cube_add(size=1)
+slab = bpy.context.object
+slab.scale = (4, 4, float(thickness))
+slab.data.materials.append(bpy.data.materials["translucent"])
+scene = bpy.context.scene
+view = bpy.data.cameras.new("camera")
+view.type, view.ortho_scale, view.clip_start = "ORTHO", 1, 0.01
+scene.camera = bpy.data.objects.new("camera", view)
+scene.camera.location = (0, 0, {EYE})
+scene.collection.objects.link(scene.camera)
+scene.world = bpy.data.worlds.new("world")
+if scene.world.node_tree is None:
+    scene.world.use_nodes = True
+(background,) = (node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+background.inputs["Color"].default_value = (1, 1, 1, 1)
+for ray in ("diffuse", "glossy", "transmission", "scatter"):
+    setattr(scene.world.cycles_visibility, ray, False)
+scene.render.engine = "CYCLES"
+cycles = scene.cycles
+cycles.device, cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = "CPU", int(samples), False, False
+cycles.volume_bounces, cycles.sample_clamp_direct, cycles.sample_clamp_indirect = 0, 0, 0
+cycles.pixel_filter_type = "BOX"
+scene.render.resolution_x = scene.render.resolution_y = {SIDE}
+scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+scene.render.filepath = result + ".exr"
+bpy.ops.render.render(write_still=True)
+image = bpy.data.images.load(scene.render.filepath)
+image.colorspace_settings.name = "Non-Color"
+with open(result, "w") as stream:
+    json.dump(list(image.pixels), stream)
+"""
+
+Render = Callable[[str, float, int], np.ndarray]
+
+
+@pytest.fixture(scope="session")
+def blender() -> list[str]:
+    """How a script is started in Blender: by a Python that has its module, or by the program."""
+    for python, found in (
+        (os.environ.get("BLENDER_PYTHON", ""), bool(os.environ.get("BLENDER_PYTHON"))),
+        (sys.executable, importlib.util.find_spec("bpy") is not None),
+    ):
+        if found:
+            return [python, "-W", "error"]
+    if program := shutil.which("blender"):
+        return [program, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
+    pytest.skip(
+        "Blender is absent: no program of that name, and no module bpy (it may be in a Python of its own: "
+        "pip install bpy, and set BLENDER_PYTHON to that Python)"
+    )
+
+
+@pytest.fixture
+def slab(blender: list[str], tmp_path: Path) -> Render:
+    """(64, 3): what a camera sees of a white world through a slab with a snippet's material."""
+
+    def _slab(snippet: str, thickness: float, samples: int) -> np.ndarray:
+        (tmp_path / "slab.py").write_text(SLAB)
+        (tmp_path / "snippet.py").write_text(snippet)
+        result = tmp_path / "result.json"
+        arguments = ["--", tmp_path / "snippet.py", thickness, samples, result]
+        done = subprocess.run(
+            [*blender, str(tmp_path / "slab.py"), *map(str, arguments)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return np.array(json.loads(result.read_text())).reshape(SIDE * SIDE, 4)[:, :3]
+
+    return _slab
+
+
+def length_error(medium: tl.Medium) -> np.ndarray:
+    """Relative error of a transmittance: each end of the path is rounded to float32, at the distance of the eye."""
+    return 8 * np.finfo(np.float32).eps * (EYE * medium.extinction + 1)
+
+
+@pytest.mark.parametrize("thickness", [0.005, 0.02, 0.05])
+def test_absorption_in_cycles_is_ours(slab: Render, thickness: float) -> None:
+    seen = slab(blender_snippet(JADE), thickness, 1)
+    expected = JADE.transmittance(thickness)
+    assert (np.abs(seen - expected) <= length_error(JADE) * expected).all()
+
+
+def test_a_color_picked_for_the_node_is_no_color_at_a_distance(slab: Render) -> None:
+    # What an artist gets who types the color and 1 / distance into the node: exp(-(1 - c)) instead of c.
+    color, density = absorption_node(JADE)
+    right = blender_snippet(JADE)
+    wrong = right.replace(f"({', '.join(map(repr, [*color.tolist(), 1.0]))})", "(0.18, 0.62, 0.35, 1.0)")
+    wrong = wrong.replace(repr(density), repr(1 / 0.02))
+    assert wrong != right
+    np.testing.assert_allclose(slab(wrong, 0.02, 1)[0], np.exp([-0.82, -0.38, -0.65]), rtol=1e-4)
+
+
+def test_emission_in_cycles_is_ours(slab: Render) -> None:
+    seen, passed = slab(blender_snippet(GLOW), 0.01, 1), GLOW.transmittance(0.01)
+    expected = passed + np.asarray(GLOW.emission) / GLOW.extinction * (1 - passed)
+    assert (np.abs(seen - expected) <= length_error(GLOW) * (expected + 1)).all()
+
+
+def test_a_scattering_volume_in_cycles_lets_through_what_ours_does(slab: Render) -> None:
+    seen, expected = slab(blender_snippet(MILK), 0.01, 16384), MILK.transmittance(0.01)
+    noise = seen.std(axis=0) / SIDE  # of the mean over the pixels, which have their own random numbers
+    assert (noise < 1e-3).all()  # the naive values would be off by 0.1
+    assert (np.abs(seen.mean(axis=0) - expected) <= 5 * noise).all()
