@@ -80,28 +80,30 @@ def line_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[int
     """As `camera_hits`, with the surfaces behind the origins too, at negative distances."""
     size = check_size(size)
     body = Object(mesh, transform=matrix)
-    corners = _camera_vertices(mesh, body.matrix, camera)[mesh.faces]
+    corners = camera_vertices(mesh, body.matrix, camera)[mesh.faces]
     # Homogeneous: perspective divides by the depth, an orthographic camera by 1.
     weight = corners[..., 2] if camera.fov_y is not None else np.ones(corners.shape[:2])
-    grid = _Grid.of(camera, size)
+    grid = PictureGrid.of(camera, size)
     parts: list[_Arrays] = []
     # What is behind the eye appears in the picture as well, turned around: the same box around the negated points.
     for side in (1, -1):
         for face, row, column in _candidates(grid, side * corners, side * weight, size):
-            keep, *found = _intersect(corners[face], weight[face], grid.points(row, column), camera.fov_y is not None)
+            keep, *found = cross_triangles(
+                corners[face], weight[face], grid.points(row, column), camera.fov_y is not None
+            )
             parts.append(((row * size[0] + column)[keep], face[keep], *found))
-    return _sorted(parts, -1 if body.faces_inwards else 1)
+    return sorted_hits(parts, -1 if body.faces_inwards else 1)
 
 
 @dataclass(frozen=True)
-class _Grid:
+class PictureGrid:
     """Pixel centers in the picture's plane: at distance 1 for a perspective camera, in metres for the other."""
 
     center: Array
     scale: Array
 
     @classmethod
-    def of(cls, camera: Camera, size: tuple[int, int]) -> _Grid:
+    def of(cls, camera: Camera, size: tuple[int, int]) -> PictureGrid:
         extent = np.array(camera.half_extent(size)) * (2.0, -2.0)
         return cls((np.array(size) - 1) / 2, extent / size)
 
@@ -121,14 +123,17 @@ def world_normals(body: Object, face: Integers) -> Array:
     return np.asarray(normals / np.where(length > 0, length, 1.0)[:, None])
 
 
-def _camera_vertices(mesh: Mesh, matrix: Array, camera: Camera) -> Array:
+def camera_vertices(mesh: Mesh, matrix: Array, camera: Camera) -> Array:
     """(n, 3): vertices right of, above and in front of the eye, in metres."""
-    anchor = mesh.center
-    terms = np.column_stack([matrix[:3, :3] * anchor, matrix[:3, 3], -camera.eye])
     # The mesh keeps its shape to the last digit wherever it is: only the one offset to the eye is large.
-    offset = np.array([math.fsum(row) for row in terms])
-    world = _rotate(matrix[:3, :3], mesh.vertices - anchor) + offset
+    world = _rotate(matrix[:3, :3], mesh.vertices - mesh.center) + from_eye(mesh.center, matrix, camera)
     return _rotate(np.stack([camera.right, camera.up, camera.forward]), world)
+
+
+def from_eye(point: Array, matrix: Array, camera: Camera) -> Array:
+    """(3,): a point of an object from the eye along world axes, in metres, rounded once."""
+    terms = np.column_stack([matrix[:3, :3] * point, matrix[:3, 3], -camera.eye])
+    return np.array([math.fsum(row) for row in terms])
 
 
 def _rotate(matrix: Array, vectors: Array) -> Array:
@@ -138,12 +143,12 @@ def _rotate(matrix: Array, vectors: Array) -> Array:
 
 
 def _candidates(
-    grid: _Grid, corners: Array, weight: Array, size: tuple[int, int]
+    grid: PictureGrid, corners: Array, weight: Array, size: tuple[int, int]
 ) -> Iterator[tuple[Integers, Integers, Integers]]:
     """Chunks of face, row and column: all pixels in the box around what of each face has a positive weight."""
     pixels = grid.pixels(corners[..., :2], weight)
-    first_column, columns = _span(pixels[..., 0], weight, size[0])
-    first_row, rows = _span(pixels[..., 1], weight, size[1])
+    first_column, columns = pixel_span(pixels[..., 0], weight, size[0])
+    first_row, rows = pixel_span(pixels[..., 1], weight, size[1])
     ends = np.cumsum(columns * rows)
     for begin in range(0, int(ends[-1]), CHUNK):
         pair = np.arange(begin, min(begin + CHUNK, int(ends[-1])))
@@ -152,7 +157,7 @@ def _candidates(
         yield face, first_row[face] + inside // columns[face], first_column[face] + inside % columns[face]
 
 
-def _span(coordinate: Array, weight: Array, count: int) -> tuple[Integers, Integers]:
+def pixel_span(coordinate: Array, weight: Array, count: int) -> tuple[Integers, Integers]:
     """(m,), (m,): the first pixel and the number of pixels along one axis that faces (m, 3) may cover."""
     front = weight > 0
     with np.errstate(over="ignore"):
@@ -175,7 +180,7 @@ def _span(coordinate: Array, weight: Array, count: int) -> tuple[Integers, Integ
     return first, np.maximum(last - first + 1, 0)
 
 
-def _intersect(corners: Array, weight: Array, points: Array, perspective: bool) -> tuple[Integers, *_Arrays]:
+def cross_triangles(corners: Array, weight: Array, points: Array, perspective: bool) -> tuple[Integers, *_Arrays]:
     """Cross triangles (k, 3, 3) with the lines through picture points (k, 2), pair by pair.
 
     Returns the indices of the pairs that do, and for each its distance, sign and barycentric weights.
@@ -225,7 +230,7 @@ def _halves(value: Array) -> tuple[Array, Array]:
     return high, value - high
 
 
-def _sorted(parts: list[_Arrays], outwards: int) -> Hits:
+def sorted_hits(parts: list[_Arrays], outwards: int) -> Hits:
     """The parts as one, each hit once; `outwards` is -1 where the faces look into the body."""
     nothing = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int8), np.empty((0, 3)))
     pixel, face, distance, sign, barycentric = (np.concatenate(arrays) for arrays in zip(nothing, *parts, strict=True))

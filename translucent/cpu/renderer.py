@@ -1,0 +1,161 @@
+"""Frames without OpenGL: rays on all processors, and the shading of the reference."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.cpu.embree import embree_versions
+from translucent.cpu.hits import TracedMesh, Tracer
+from translucent.cpu.picture import Band, Picture
+from translucent.cpu.shading import Arrays, Shader
+from translucent.cpu.threads import in_threads, processors
+from translucent.errors import RenderError
+from translucent.frame import Frame
+from translucent.mesh import Mesh
+from translucent.render_plan import Capabilities, RenderPlan
+from translucent.sampling import sample_shifts
+from translucent.scene import Scene
+
+Seconds = dict[str, float]
+
+_COLORS = ("radiance", "transmittance", "optical_depth")
+_FLAGS = ("coverage", "valid")
+
+#: Largest number of a frame.
+_LARGEST = float(np.finfo(np.float32).max)
+
+
+class CpuRenderer:
+    """Renders scenes on the processors: the shading of the reference, on its exact hits, which Embree finds quickly.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Default: as many as there are processors. Frames do not depend on it.
+
+    Raises
+    ------
+    RenderError
+        If embreex cannot be imported.
+    """
+
+    def __init__(self, threads: int | None = None) -> None:
+        self._threads = threads or processors()
+        self._embree = embree_versions()
+        self._meshes: WeakKeyDictionary[Mesh, TracedMesh] = WeakKeyDictionary()
+        self._closed = False
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Backend, versions of Embree and number of threads, as every frame records them."""
+        return {"backend": "cpu", **self._embree, "threads": str(self._threads)}
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the planner may count on."""
+        return Capabilities()
+
+    def render(self, scene: Scene, size: tuple[int, int], plan: RenderPlan, samples: int) -> Frame:
+        """Render a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+        size : (width, height)
+            In pixels.
+        plan : RenderPlan
+            Of this scene. Whatever its method, solids show their true thickness.
+        samples : int
+            Sub-pixel samples over which radiance and transmittance are averaged. The other arrays belong to the ray
+            through the pixel center, as all do with 1.
+
+        Returns
+        -------
+        Frame
+            With float32 arrays. `seconds` splits the time of all threads, divided by their number.
+
+        Raises
+        ------
+        InputError
+            If the size is not one.
+        RenderError
+            If the renderer is closed.
+        """
+        if self._closed:
+            raise RenderError("rendering", "the renderer is closed", "make a new one")
+        started = time.perf_counter()
+        shader = Shader.of(scene, plan)
+        picture = Picture.of(scene.camera, size)
+        arrays = _empty(picture.size)
+        seconds = self._draw(shader, picture, partial(_store, arrays))
+        if samples > 1:
+            for number, shift in enumerate(sample_shifts(samples).tolist(), 1):
+                picture = Picture.of(scene.camera, size, tuple(shift))
+                spent = self._draw(shader, picture, partial(_average, arrays, number))
+                seconds = {name: seconds[name] + spent[name] for name in seconds}
+        seconds["total"] = time.perf_counter() - started
+        return Frame(**arrays, plan=plan, seconds=seconds, provenance=self.provenance)
+
+    def close(self) -> None:
+        """Free what is kept of the meshes. Closing twice is fine."""
+        self._closed = True
+        self._meshes.clear()
+
+    def _draw(self, shader: Shader, picture: Picture, keep: Callable[[Band, Arrays], None]) -> Seconds:
+        """Shade a picture, and let `keep` have each band of it; what that takes."""
+        started = time.perf_counter()
+        objects = shader.scene.objects
+        for body in objects:
+            if body.mesh not in self._meshes:
+                self._meshes[body.mesh] = TracedMesh.of(body.mesh)
+        tracers = in_threads(lambda body: Tracer(self._meshes[body.mesh], body, picture), objects, self._threads)
+        prepared = time.perf_counter()
+
+        def draw(band: Band) -> tuple[float, float]:
+            began = time.perf_counter()
+            hits = [tracer.hits(band) for tracer in tracers]
+            crossed = time.perf_counter()
+            keep(band, shader.shade(picture.rays(band), hits))
+            return crossed - began, time.perf_counter() - crossed
+
+        intersect, shade = np.sum(in_threads(draw, picture.bands(), self._threads), axis=0) / self._threads
+        return {"prepare": prepared - started, "intersect": float(intersect), "shade": float(shade)}
+
+
+def _empty(size: tuple[int, int]) -> Arrays:
+    """The arrays of a frame, not filled yet."""
+    shape = size[::-1]
+    arrays: Arrays = {name: np.empty((*shape, 3), dtype=np.float32) for name in _COLORS}
+    arrays["thickness"] = np.empty(shape, dtype=np.float32)
+    arrays.update({name: np.empty(shape, dtype=bool) for name in _FLAGS})
+    return arrays
+
+
+def _store(arrays: Arrays, band: Band, shaded: Arrays) -> None:
+    """Put a band where it belongs."""
+    for name, array in arrays.items():
+        part = _part(array, band)
+        values = shaded[name].reshape(part.shape)
+        with np.errstate(under="ignore"):
+            part[:] = values if array.dtype == bool else np.clip(values, -_LARGEST, _LARGEST)
+
+
+def _average(arrays: Arrays, number: int, band: Band, shaded: Arrays) -> None:
+    """Let the sample of this number, from 1, count in the means of those that are averaged."""
+    for name in ("radiance", "transmittance"):
+        mean = _part(arrays[name], band)
+        # The first one takes the place of the pixel center.
+        before = mean.astype(np.float64) if number > 1 else 0.0
+        with np.errstate(under="ignore"):
+            mean[:] = before + (np.clip(shaded[name].reshape(mean.shape), -_LARGEST, _LARGEST) - before) / number
+
+
+def _part(array: npt.NDArray[Any], band: Band) -> npt.NDArray[Any]:
+    return array[band.first_row : band.first_row + band.rows]

@@ -1,0 +1,90 @@
+"""What a band of a picture shows: the shading of the reference, in pieces that fit into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.cpu.view import slices
+from translucent.plan import FALLBACK_SHEET
+from translucent.reference import Hits, Rays, shade_hits, sheet_thicknesses
+from translucent.render_plan import RenderPlan
+from translucent.scene import Scene
+
+Arrays = dict[str, npt.NDArray[Any]]
+Integers = npt.NDArray[np.int64]
+Sheets = tuple[float | None, ...]
+
+#: Surfaces, times objects, that are shaded at a time: the working arrays stay below 100 MB.
+SURFACES = 1 << 21
+
+#: What the fallback tells of a pixel that is not valid; that it is not, and what covers it, is known already.
+SHOWN = ("radiance", "transmittance", "optical_depth", "thickness")
+
+
+@dataclass(frozen=True, eq=False)
+class Shader:
+    """Turns hits into the arrays of a frame.
+
+    Attributes
+    ----------
+    scene : Scene
+    sheets : tuple of float or None
+        Thickness in metres of the sheet that each object is; None for a solid.
+    fallback : tuple of float or None, or None
+        The same where a pixel is not valid, for scenes with bodies that are not closed.
+    """
+
+    scene: Scene
+    sheets: Sheets
+    fallback: Sheets | None
+
+    @classmethod
+    def of(cls, scene: Scene, plan: RenderPlan) -> Shader:
+        """As a plan of the scene wants it."""
+        sheets = sheet_thicknesses(scene, plan.method)
+        drawn = {i for step in plan.passes if step.name == "thin_layer_fallback" for i in step.objects}
+        diagonals = [float(np.linalg.norm(body.bounds[1] - body.bounds[0])) for body in scene.objects]
+        fallback = tuple(
+            FALLBACK_SHEET * diagonals[i] if i in drawn and metres is None else metres
+            for i, metres in enumerate(sheets)
+        )
+        return cls(scene, sheets, fallback if drawn else None)
+
+    def shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
+        """The arrays of a frame for some rays, (n,) or (n, 3), float64 and bool.
+
+        Parameters
+        ----------
+        rays : Rays
+        hits : sequence of Hits
+            Of each object of the scene, as `shade_hits` takes them.
+        """
+        surfaces = np.sum([np.bincount(line.pixel, minlength=len(rays)) for line in hits], axis=0)
+        parts = []
+        for some in slices(surfaces * len(hits), SURFACES):
+            chosen = np.arange(some.start, some.stop)
+            parts.append(self._shade(rays.where(some), [_on_rays(line, chosen, len(rays)) for line in hits]))
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def _shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
+        shaded = shade_hits(self.scene, rays, hits, self.sheets)
+        invalid = np.flatnonzero(~shaded["valid"])
+        if self.fallback is not None and invalid.size:
+            lines = [_on_rays(line, invalid, len(rays)) for line in hits]
+            again = shade_hits(self.scene, rays.where(invalid), lines, self.fallback)
+            for name in SHOWN:
+                shaded[name][invalid] = again[name]
+        return shaded
+
+
+def _on_rays(hits: Hits, chosen: Integers, rays: int) -> Hits:
+    """The hits on `chosen` of so many rays, these numbered anew."""
+    number = np.full(rays, -1)
+    number[chosen] = np.arange(len(chosen))
+    kept = hits.where(number[hits.pixel] >= 0)
+    return replace(kept, pixel=number[kept.pixel])
