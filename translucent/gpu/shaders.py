@@ -143,6 +143,7 @@ def build_program(
     fragment: str,
     defines: Mapping[str, int] | None = None,
     version: int = 330,
+    /,
     **samplers: int,
 ) -> moderngl.Program:
     """Compile and link two files.

@@ -102,9 +102,8 @@ class Targets:
         """Bytes that the color targets and buffers in use take for each pixel."""
         textures = [t for f in self._framebuffers.values() for t in f.color_attachments]
         buffers = sum(buffer.size for buffer in self._buffers.values())
-        return sum(t.components * (1 if t.dtype == "f1" else 4) for t in textures) + buffers // (
-            self.size[0] * self.size[1]
-        )
+        per_pixel = sum(t.components * (1 if t.dtype == "f1" else 4) for t in textures)
+        return int(per_pixel + buffers // (self.size[0] * self.size[1]))
 
     def _get(
         self, name: str, components: tuple[int, ...], *, with_depth: bool = False, windings: int = 0

@@ -104,6 +104,7 @@ class PictureGrid:
 
     @classmethod
     def of(cls, camera: Camera, size: tuple[int, int]) -> PictureGrid:
+        """The grid of a picture of this size."""
         extent = np.array(camera.half_extent(size)) * (2.0, -2.0)
         return cls((np.array(size) - 1) / 2, extent / size)
 
