@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Iterable
 
 from translucent.errors import InputError
 from translucent.render_plan import Capabilities, PassSpec, RenderPlan
 from translucent.scene import Object, Scene
-from translucent.slots import MAX_SLOTS, may_touch, medium_slots, require_clear_priorities, same_medium
+from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, require_clear_priorities, same_medium
 from translucent.thickness import (
     BackFaceDepth,
     DepthPeeling,
@@ -25,15 +26,15 @@ FALLBACK_SHEET = 0.01
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasteriser
 #: (`python -m translucent.bench`). Peeling: for each pass, of which one finds two layers.
 COSTS = {
-    "opaque": 1.5,
+    "opaque": 2.8,
     "signed_depth": 1.1,
-    "signed_depth_spectral": 1.6,
+    "signed_depth_spectral": 1.5,
     "thin_layer": 1.7,
-    "back_face_depth": 2.2,
-    "depth_peeling": 2.0,
-    "fragment_lists": 3.5,
-    "k_buffer": 7.0,
-    "resolve": 0.7,
+    "back_face_depth": 1.7,
+    "depth_peeling": 2.4,
+    "fragment_lists": 3.4,
+    "k_buffer": 8.5,
+    "resolve": 0.8,
 }
 
 #: Layers of a body that is not convex, for want of a better guess: cost estimates are made before anything is drawn.
@@ -60,42 +61,59 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     capabilities = capabilities or Capabilities()
     if not scene.bodies:
-        names = ", ".join(repr(item.mesh.name) for item in scene.objects)
         raise InputError(
-            f"rendering {names}", "nothing there has a medium", "give an object one: medium=tl.Medium(...)"
+            f"rendering {_names(scene.objects)}",
+            "nothing there has a medium",
+            "give an object one: medium=tl.Medium(...)",
         )
     if scene.overlap == "priority":
         require_clear_priorities(scene)
-    why_ordered = _why_order_matters(scene)
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
-    if why_ordered is not None and method is not None:
-        raise InputError(
-            type(method).__name__, why_ordered, "use FragmentLists or DepthPeeling, or leave the choice to the planner"
-        )
+    if (why := _why_order_matters(scene, method)) is not None:
+        return _plan_for_order(scene, method, capabilities, why)
     if isinstance(method, BackFaceDepth):
         return _plan_back_face_depth(scene, method)
     if isinstance(method, ThinLayer):
         return _plan_thin_layer(scene, method)
-    solids, sheets = _solids(scene), _sheets(scene)
-    if method is None and why_ordered is not None and solids:
-        return _plan_ordered(scene, _cheapest_ordered(scene, capabilities), capabilities, why_ordered)
-    if method is None and not solids:
+    if method is None and not _solids(scene):
         return _plan_thin_layer(scene, ThinLayer())
-    return _plan_signed_depth(scene, method or SignedDepth(), solids, sheets)
+    return _plan_signed_depth(scene, method or SignedDepth())
 
 
-def _why_order_matters(scene: Scene) -> str | None:
-    """Why a sum over each ray does not tell the picture of this scene; None if it does."""
+def plan_over_backdrop(
+    scene: Scene, method: Method | None = None, capabilities: Capabilities | None = None
+) -> RenderPlan:
+    """The plan for a scene before a `Backdrop`, which somebody else has drawn.
+
+    Raises
+    ------
+    InputError
+        As `plan`, and if the scene has opaque objects of its own.
+    """
+    if scene.opaque:
+        raise InputError(
+            "a backdrop",
+            f"the scene has opaque objects of its own: {_names(scene.opaque)}",
+            "leave them out, or to whoever draws the backdrop",
+        )
+    chosen = plan(scene, method, capabilities)
+    reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
+    return dataclasses.replace(chosen, passes=(PassSpec("backdrop", reason, cost=COSTS["resolve"]), *chosen.passes))
+
+
+def _why_order_matters(scene: Scene, method: Method | None) -> str | None:
+    """Why a sum over each ray, found by the method, does not tell the picture of this scene; None if it does."""
     bodies = scene.bodies
     if _media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
         return "emission among several media: what is in front dims what is behind"
-    solids = [body for body in bodies if body.sheet_thickness is None]
-    if scene.overlap == "add":
+    # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
+    if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
         return None
+    solids = [body for body in bodies if body.sheet_thickness is None]
     for j, later in enumerate(solids):
         for earlier in solids[:j]:
-            if may_touch(earlier, later):
+            if may_overlap(earlier, later):
                 return (
                     f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
                     "would count both"
@@ -106,140 +124,165 @@ def _why_order_matters(scene: Scene) -> str | None:
     return None
 
 
+def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilities, why: str) -> RenderPlan:
+    """The plan of a scene that only ordered intervals can tell; refuses any other method that was asked for."""
+    if not _solids(scene):
+        raise InputError(
+            f"rendering {_names(scene.bodies)}",
+            f"{why}, and sheets have no place in the order",
+            "give all sheets one medium, or none that emits",
+        )
+    cheapest = _cheapest_ordered(scene, capabilities)
+    if method is not None:
+        do = f"use {type(cheapest).__name__}, or leave the choice to the planner"
+        raise InputError(type(method).__name__, why, do)
+    return _plan_ordered(scene, cheapest, capabilities, why)
+
+
 def _cheapest_ordered(scene: Scene, capabilities: Capabilities) -> OrderedMethod:
     """Of the methods that find all intervals, the one that is expected to be fastest."""
     candidates: list[OrderedMethod] = [DepthPeeling()]
     if capabilities.shader_storage:
         candidates.append(FragmentLists())
-    return min(candidates, key=lambda method: _ordered_cost(scene, method))
+    return min(candidates, key=lambda method: _ordered_pass(scene, method, "").cost)
 
 
-def _ordered_cost(scene: Scene, method: OrderedMethod) -> float:
-    if isinstance(method, DepthPeeling):
-        return _peeling_passes(scene, method) * COSTS["depth_peeling"]
-    return COSTS["k_buffer" if isinstance(method, KBuffer) else "fragment_lists"]
+def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
+    """The pass that finds all intervals; peeling draws as often as it is expected to have to."""
+    solids = _solids(scene)
+    if isinstance(method, FragmentLists):
+        reason = f"{why}; one draw into a list for each pixel, sorted afterwards"
+        return PassSpec("fragment_lists", reason, solids, 1, cost=COSTS["fragment_lists"])
+    if isinstance(method, KBuffer):
+        reason = f"{why}; one draw, of which each pixel keeps the {method.k} nearest surfaces"
+        return PassSpec("k_buffer", reason, solids, 1, cost=COSTS["k_buffer"])
+    bodies = [scene.objects[i] for i in solids]
+    layers = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
+    layers = min(layers, method.max_layers)
+    both_ends = method.order == "both-ends"
+    reason = f"{why}; {'two layers' if both_ends else 'a layer'} with each draw, until one finds no more"
+    draws = 1 + (-(-layers // 2) if both_ends else layers)
+    return PassSpec("depth_peeling", reason, solids, draws, cost=draws * COSTS["depth_peeling"])
 
 
-def _peeling_passes(scene: Scene, method: DepthPeeling) -> int:
-    layers = min(_expected_layers(scene), method.max_layers)
-    return 1 + (-(-layers // 2) if method.order == "both-ends" else layers)
-
-
-def _expected_layers(scene: Scene) -> int:
+def _layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
+    """What is left out where a ray can cross more surfaces than the method keeps."""
+    if isinstance(method, FragmentLists):
+        return []
+    most = method.max_layers if isinstance(method, DepthPeeling) else method.k
     bodies = [scene.objects[i] for i in _solids(scene)]
-    return sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
+    # A ray crosses a convex body's surface twice, and no face more than once.
+    possible = sum(2 if body.mesh.diagnosis.convex else len(body.mesh.faces) for body in bodies)
+    return [f"pixels with more than {most} surfaces are marked invalid"] if possible > most else []
 
 
 def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilities, why: str) -> RenderPlan:
-    solids, sheets = _solids(scene), _sheets(scene)
+    sheets = _sheets(scene)
     name = type(method).__name__
-    if not solids:
+    if not _solids(scene):
         raise InputError(name, "all bodies are declared sheets, which have no inside", "use ThinLayer")
     if not isinstance(method, DepthPeeling) and not capabilities.shader_storage:
         raise InputError(name, "this OpenGL has no shader storage buffers, which came with 4.3", "use DepthPeeling")
     if (count := len(medium_slots(scene))) > MAX_SLOTS:
         raise InputError(
-            name, f"{count} different media or open bodies, more than {MAX_SLOTS}", "let bodies share media"
+            name,
+            f"{count} winding numbers for each ray, one for each medium, priority and open body: more than {MAX_SLOTS}",
+            "let bodies share media and priorities, or close them",
         )
     passes = []
-    what = {
-        DepthPeeling: "two layers with each draw" if method == DepthPeeling() else "a layer with each draw",
-        FragmentLists: "one draw into a list for each pixel, sorted afterwards",
-        KBuffer: f"one draw, of which each pixel keeps the {getattr(method, 'k', 0)} nearest surfaces",
-    }[type(method)]
-    geometry_passes = _peeling_passes(scene, method) if isinstance(method, DepthPeeling) else 1
-    key = {DepthPeeling: "depth_peeling", FragmentLists: "fragment_lists", KBuffer: "k_buffer"}[type(method)]
     # Sheets go first: their sums are read where the intervals are resolved.
     if sheets:
-        passes.append(_sheet_pass(sheets, f"{_count(sheets, 'mesh', 'meshes')} declared thin: paths add up"))
-    fallback = _fallback_passes(scene, solids, sheets)
-    passes += fallback
-    passes.append(PassSpec(key, f"{why}; {what}", solids, geometry_passes, cost=_ordered_cost(scene, method)))
-    limits = [_open_limit(body) for body in _open_bodies(scene)]
-    most = method.max_layers if isinstance(method, DepthPeeling) else method.k if isinstance(method, KBuffer) else None
-    bodies = [scene.objects[i] for i in solids]
-    if most is not None and not (all(b.mesh.diagnosis.convex for b in bodies) and 2 * len(bodies) <= most):
-        limits.append(f"pixels with more than {most} surfaces are marked invalid")
+        passes.append(_declared_sheets(sheets))
+    passes += _fallback_passes(scene, spectral=True)
+    passes.append(_ordered_pass(scene, method, why))
+    limits = _open_limits(scene) + _layer_limits(scene, method)
     if sheets and any(body.medium is not None and body.medium.emits for body in scene.bodies):
         limits.append(
-            "declared sheets among emitting media: their place in the order is not kept: they dim all light, and what they emit is left out"
+            "declared sheets among emitting media have no place in the order: they dim all light, and what they emit "
+            "is left out"
         )
     return _finished(scene, method, passes, limits, spectral=True)
 
 
-def _plan_signed_depth(
-    scene: Scene, method: SignedDepth, solids: tuple[int, ...], sheets: tuple[int, ...]
-) -> RenderPlan:
+def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
+    solids, sheets = _solids(scene), _sheets(scene)
     spectral = _media_differ(scene)
     what = (
         "optical depth per channel, since media differ" if spectral else "thickness, since all bodies share one medium"
     )
     passes = []
-    limits = []
     if solids:
         reason = f"{_count(solids, 'body', 'bodies')} in one unsorted draw each: exits minus entries add up to {what}"
-        cost = COSTS["signed_depth_spectral" if spectral else "signed_depth"]
-        passes.append(PassSpec("signed_depth", reason, solids, 1, cost=cost))
+        passes.append(PassSpec("signed_depth", reason, solids, 1, cost=_signed_depth_cost(spectral)))
     if sheets:
-        passes.append(
-            _sheet_pass(sheets, f"{_count(sheets, 'mesh', 'meshes')} declared thin: paths through faces add up")
-        )
-    passes += _fallback_passes(scene, solids, sheets)
-    limits += [_open_limit(body) for body in _open_bodies(scene)]
+        passes.append(_declared_sheets(sheets))
+    passes += _fallback_passes(scene, spectral)
+    limits = _open_limits(scene)
     if not method.anchored:
         limits.append("distances count from the camera: float32 loses digits with distance")
     return _finished(scene, method, passes, limits, spectral)
 
 
-def _fallback_passes(scene: Scene, solids: tuple[int, ...], sheets: tuple[int, ...]) -> list[PassSpec]:
+def _fallback_passes(scene: Scene, spectral: bool) -> list[PassSpec]:
     """What a pixel shows that enters and leaves unequally often: open bodies as sheets, all others as ever."""
-    open_bodies = tuple(i for i in solids if not scene.objects[i].mesh.diagnosis.solid)
+    open_bodies = _open_bodies(scene)
     if not open_bodies:
         return []
-    names = ", ".join(repr(scene.objects[i].mesh.name) for i in open_bodies)
     reason = (
-        f"{names} not closed: pixels that enter and leave unequally often get sheets of {FALLBACK_SHEET:.0%} of the "
-        "diagonal, and are marked invalid"
+        f"{_names([scene.objects[i] for i in open_bodies])} not closed: pixels that enter and leave unequally often "
+        f"get sheets of {FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid"
     )
-    sheet_cost, solid_cost = COSTS["thin_layer"], COSTS["signed_depth"]
-    passes = [PassSpec("thin_layer_fallback", reason, open_bodies + sheets, 1, "fallback", sheet_cost)]
-    if closed := tuple(i for i in solids if i not in open_bodies):
+    sheets = open_bodies + _sheets(scene)
+    passes = [PassSpec("thin_layer_fallback", reason, sheets, 1, "fallback", COSTS["thin_layer"])]
+    if closed := tuple(i for i in _solids(scene) if i not in open_bodies):
         reason = "closed bodies, in those pixels, too"
-        passes.append(PassSpec("signed_depth_fallback", reason, closed, 1, "fallback", solid_cost))
+        cost = _signed_depth_cost(spectral)
+        passes.append(PassSpec("signed_depth_fallback", reason, closed, 1, "fallback", cost))
     return passes
 
 
-def _open_limit(body: Object) -> str:
-    return (
-        f"{body.mesh.name!r}: {'; '.join(body.mesh.diagnosis.problems)}: close it, or declare it a sheet "
-        "(sheet_thickness=..., --method thin-layer)"
-    )
+def _signed_depth_cost(spectral: bool) -> float:
+    return COSTS["signed_depth_spectral" if spectral else "signed_depth"]
+
+
+def _open_limits(scene: Scene) -> list[str]:
+    limits = []
+    for i in _open_bodies(scene):
+        mesh = scene.objects[i].mesh
+        limits.append(
+            f"{mesh.name!r}: {'; '.join(mesh.diagnosis.problems)}: close it, or declare it a sheet "
+            "(sheet_thickness=..., --method thin-layer)"
+        )
+    return limits
 
 
 def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
     if _media_differ(scene):
         raise InputError("BackFaceDepth", "bodies with different media", "use SignedDepth, which tells them apart")
-    if sheets := [scene.objects[i].mesh.name for i in _sheets(scene)]:
-        raise InputError(
-            "BackFaceDepth", f"{', '.join(map(repr, sheets))} declared a sheet", "use SignedDepth or ThinLayer"
-        )
-    bodies = _indices(scene, lambda body: body.medium is not None)
+    if sheets := [scene.objects[i] for i in _sheets(scene)]:
+        raise InputError("BackFaceDepth", f"{_names(sheets)} declared a sheet", "use SignedDepth or ThinLayer")
+    bodies = _solids(scene)
     reason = "asked for: nearest front face, then farthest back face"
     passes = [PassSpec("back_face_depth", reason, bodies, 2, cost=COSTS["back_face_depth"])]
-    limits = []
+    passes += _fallback_passes(scene, spectral=False)
+    limits = _open_limits(scene)
     if len(bodies) > 1:
         limits.append("several bodies: pixels that cross more than one are marked invalid")
-    if concave := [body.mesh.name for body in scene.bodies if not body.mesh.diagnosis.convex]:
-        limits.append(f"{', '.join(concave)} not convex: pixels with more than one entry are marked invalid")
+    if concave := [body for body in scene.bodies if not body.mesh.diagnosis.convex]:
+        limits.append(f"{_names(concave)} not convex: pixels with more than one entry are marked invalid")
     return _finished(scene, method, passes, limits, spectral=False)
 
 
 def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
     bodies = _indices(scene, lambda body: body.medium is not None)
-    solid = [body.mesh.name for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
-    limits = [f"{', '.join(map(repr, solid))} closed, but drawn as sheets: what is inside is left out"] if solid else []
+    solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
+    limits = [f"{_names(solid)} closed, but drawn as sheets: what is inside is left out"] if solid else []
     reason = f"every face of {_count(bodies, 'mesh', 'meshes')} is a sheet: their paths add up"
     return _finished(scene, method, [_sheet_pass(bodies, reason)], limits, _media_differ(scene))
+
+
+def _declared_sheets(sheets: tuple[int, ...]) -> PassSpec:
+    return _sheet_pass(sheets, f"{_count(sheets, 'mesh', 'meshes')} declared thin: paths through faces add up")
 
 
 def _sheet_pass(objects: tuple[int, ...], reason: str) -> PassSpec:
@@ -255,9 +298,10 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
         )
         passes = [PassSpec("opaque", reason, opaque, 1, cost=COSTS["opaque"]), *passes]
     media = [body.medium for body in scene.bodies if body.medium is not None]
-    if isinstance(method, OrderedMethod):
+    emits = any(medium.emits for medium in media)
+    if emits and isinstance(method, OrderedMethod):
         reason = "Beer-Lambert: what is behind, through exp(-optical depth), and what the intervals emit"
-    elif any(medium.emits for medium in media):
+    elif emits:
         reason = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
     else:
         reason = "Beer-Lambert: what is behind, through exp(-optical depth)"
@@ -265,20 +309,21 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     for body in scene.bodies:
         if found := body.mesh.diagnosis.duplicate_faces:
             limits.append(f"{body.mesh.name!r}: {found.count} duplicated faces, which count twice or cancel")
-        if parts := body.mesh.diagnosis.inside_out_parts:
+        drawn_as_sheet = isinstance(method, ThinLayer) or body.sheet_thickness is not None
+        if (parts := body.mesh.diagnosis.inside_out_parts) and not drawn_as_sheet:
             limits.append(f"{body.mesh.name!r}: {parts} closed parts inside out: their pixels are marked invalid")
     unmodelled = []
     if any(medium.scatters for medium in media):
         unmodelled.append("in-scattered light: scattering only removes light")
     if any(medium.ior > 1 for medium in media):
         unmodelled.append("refraction and reflection: rays go straight, though ior is above 1")
-    if scene.opaque and scene.lights:
-        unmodelled.append("shadows: lights reach opaque objects through everything")
+    if scene.opaque:
+        unmodelled.append("shadows: light reaches opaque objects through everything")
     return RenderPlan(method, tuple(passes), spectral, tuple(limits), tuple(unmodelled))
 
 
-def _open_bodies(scene: Scene) -> list[Object]:
-    return [scene.objects[i] for i in _solids(scene) if not scene.objects[i].mesh.diagnosis.solid]
+def _open_bodies(scene: Scene) -> tuple[int, ...]:
+    return tuple(i for i in _solids(scene) if not scene.objects[i].mesh.diagnosis.solid)
 
 
 def _media_differ(scene: Scene) -> bool:
@@ -295,6 +340,10 @@ def _sheets(scene: Scene) -> tuple[int, ...]:
 
 def _indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
     return tuple(i for i, body in enumerate(scene.objects) if keep(body))
+
+
+def _names(items: Iterable[Object]) -> str:
+    return ", ".join(repr(item.mesh.name) for item in items)
 
 
 def _count(items: tuple[int, ...], one: str, many: str) -> str:

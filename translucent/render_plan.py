@@ -62,7 +62,7 @@ class RenderPlan:
     spectral : bool
         The passes add up optical depth per channel, since media differ, and not only thickness.
     limits : tuple of str
-        Where thickness and transmittance are not exact, and why; empty for an exact plan.
+        Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
     unmodelled : tuple of str
         What the scene asks for and no pass renders.
     """
@@ -75,7 +75,7 @@ class RenderPlan:
 
     @property
     def exact(self) -> bool:
-        """Whether thickness and transmittance are exact for the meshes as given and straight rays, up to float32."""
+        """Whether all but what is `unmodelled` is exact for the meshes as given, up to float32."""
         return not self.limits
 
     @property
@@ -90,7 +90,7 @@ class RenderPlan:
 
     @property
     def cost(self) -> float:
-        """Expected time, in multiples of drawing the objects into a depth buffer."""
+        """Expected time, in depth-only draws: the sum over the passes, each in draws of its own objects."""
         return sum(step.cost for step in self.passes)
 
     def summary(self) -> dict[str, object]:
@@ -115,7 +115,7 @@ class RenderPlan:
     def __str__(self) -> str:
         lines = [
             f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}, "
-            f"about {self.cost:.1f} times the cost of a depth-only draw"
+            f"at about the cost of {self.cost:.1f} depth-only draws"
         ]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
         lines += [f"  limit: {limit}" for limit in self.limits]

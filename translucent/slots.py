@@ -61,7 +61,7 @@ def require_clear_priorities(scene: Scene) -> None:
     bodies = [body for body in scene.bodies if body.sheet_thickness is None]
     for j, later in enumerate(bodies):
         for earlier in bodies[:j]:
-            if later.priority == earlier.priority and not same_medium(later, earlier) and may_touch(later, earlier):
+            if later.priority == earlier.priority and not same_medium(later, earlier) and may_overlap(later, earlier):
                 raise InputError(
                     'overlap="priority"',
                     f"{earlier.mesh.name!r} and {later.mesh.name!r} may overlap with different media, and both have "
@@ -79,9 +79,9 @@ def same_medium(a: Object, b: Object) -> bool:
     )
 
 
-def may_touch(a: Object, b: Object) -> bool:
-    """Whether the bounds of two bodies share a point."""
-    return bool((a.bounds[0] <= b.bounds[1]).all() and (a.bounds[1] >= b.bounds[0]).all())
+def may_overlap(a: Object, b: Object) -> bool:
+    """Whether the bounds of two bodies share more than their border; bodies that touch there share no volume."""
+    return bool((a.bounds[0] < b.bounds[1]).all() and (a.bounds[1] > b.bounds[0]).all())
 
 
 def _share(scene: Scene, a: Object, b: Object) -> bool:
