@@ -6,6 +6,13 @@ import dataclasses
 from collections.abc import Callable, Iterable
 
 from translucent.errors import InputError
+from translucent.plan_limits import (
+    closed_sheet_limits,
+    mesh_limits,
+    open_bodies,
+    open_limits,
+    unmodelled_effects,
+)
 from translucent.render_plan import Capabilities, PassSpec, RenderPlan
 from translucent.scene import Object, Scene
 from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, require_clear_priorities, same_medium
@@ -68,6 +75,8 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         )
     if scene.overlap == "priority":
         require_clear_priorities(scene)
+    if not capabilities.opengl:
+        return _plan_traced(scene, method)
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
     if (why := _why_order_matters(scene, method)) is not None:
@@ -76,6 +85,9 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         return _plan_back_face_depth(scene, method)
     if isinstance(method, ThinLayer):
         return _plan_thin_layer(scene, method)
+    if method is None and _scatters(scene) and capabilities.shader_storage:
+        why = "light scattered into the rays: each interval looks at the lights"
+        return _plan_ordered(scene, FragmentLists(), capabilities, why)
     if method is None and not _solids(scene):
         return _plan_thin_layer(scene, ThinLayer())
     return _plan_signed_depth(scene, method or SignedDepth())
@@ -122,6 +134,35 @@ def _why_order_matters(scene: Scene, method: Method | None) -> str | None:
         if not body.mesh.diagnosis.convex:
             return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
     return None
+
+
+def _scatters(scene: Scene) -> bool:
+    """Whether a solid scatters, and there are lights whose light it can."""
+    return bool(scene.lights) and any(
+        body.medium is not None and body.medium.scatters for body in (scene.objects[i] for i in _solids(scene))
+    )
+
+
+def _light_views(scene: Scene) -> PassSpec:
+    solids, lights = _solids(scene), len(scene.lights)
+    reason = (
+        f"{lights} {'light' if lights == 1 else 'lights'} on a medium that scatters: the surfaces on the way from each "
+        "light, in order, tell how much of it reaches any point"
+    )
+    return PassSpec("light_views", reason, solids, lights, cost=lights * COSTS["fragment_lists"])
+
+
+def _plan_traced(scene: Scene, method: Method | None) -> RenderPlan:
+    """The plan of a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
+    chosen = method or FragmentLists()
+    sheets = isinstance(method, ThinLayer)
+    limits = [*(closed_sheet_limits(scene, method) if isinstance(method, ThinLayer) else open_limits(scene))]
+    passes = (
+        PassSpec("intersect", "no OpenGL: all surfaces on each ray, in float64", tuple(range(len(scene.objects))), 1),
+        PassSpec("shade", "sheets in order" if sheets else "the intervals between them in order, exactly"),
+    )
+    limits += mesh_limits(scene, chosen)
+    return RenderPlan(chosen, passes, True, tuple(limits), unmodelled_effects(scene, scatters=False))
 
 
 def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilities, why: str) -> RenderPlan:
@@ -194,8 +235,10 @@ def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilitie
     if sheets:
         passes.append(_declared_sheets(sheets))
     passes += _fallback_passes(scene, spectral=True)
+    if _scatters(scene) and not isinstance(method, DepthPeeling):
+        passes.append(_light_views(scene))
     passes.append(_ordered_pass(scene, method, why))
-    limits = _open_limits(scene) + _layer_limits(scene, method)
+    limits = open_limits(scene) + _layer_limits(scene, method)
     if sheets and any(body.medium is not None and body.medium.emits for body in scene.bodies):
         limits.append(
             "declared sheets among emitting media have no place in the order: they dim all light, and what they emit "
@@ -217,7 +260,7 @@ def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
     if sheets:
         passes.append(_declared_sheets(sheets))
     passes += _fallback_passes(scene, spectral)
-    limits = _open_limits(scene)
+    limits = open_limits(scene)
     if not method.anchored:
         limits.append("distances count from the camera: float32 loses digits with distance")
     return _finished(scene, method, passes, limits, spectral)
@@ -225,16 +268,16 @@ def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
 
 def _fallback_passes(scene: Scene, spectral: bool) -> list[PassSpec]:
     """What a pixel shows that enters and leaves unequally often: open bodies as sheets, all others as ever."""
-    open_bodies = _open_bodies(scene)
-    if not open_bodies:
+    leaky = open_bodies(scene)
+    if not leaky:
         return []
     reason = (
-        f"{_names([scene.objects[i] for i in open_bodies])} not closed: pixels that enter and leave unequally often "
+        f"{_names([scene.objects[i] for i in leaky])} not closed: pixels that enter and leave unequally often "
         f"get sheets of {FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid"
     )
-    sheets = open_bodies + _sheets(scene)
+    sheets = leaky + _sheets(scene)
     passes = [PassSpec("thin_layer_fallback", reason, sheets, 1, "fallback", COSTS["thin_layer"])]
-    if closed := tuple(i for i in _solids(scene) if i not in open_bodies):
+    if closed := tuple(i for i in _solids(scene) if i not in leaky):
         reason = "closed bodies, in those pixels, too"
         cost = _signed_depth_cost(spectral)
         passes.append(PassSpec("signed_depth_fallback", reason, closed, 1, "fallback", cost))
@@ -243,17 +286,6 @@ def _fallback_passes(scene: Scene, spectral: bool) -> list[PassSpec]:
 
 def _signed_depth_cost(spectral: bool) -> float:
     return COSTS["signed_depth_spectral" if spectral else "signed_depth"]
-
-
-def _open_limits(scene: Scene) -> list[str]:
-    limits = []
-    for i in _open_bodies(scene):
-        mesh = scene.objects[i].mesh
-        limits.append(
-            f"{mesh.name!r}: {'; '.join(mesh.diagnosis.problems)}: close it, or declare it a sheet "
-            "(sheet_thickness=..., --method thin-layer)"
-        )
-    return limits
 
 
 def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
@@ -265,7 +297,7 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
     reason = "asked for: nearest front face, then farthest back face"
     passes = [PassSpec("back_face_depth", reason, bodies, 2, cost=COSTS["back_face_depth"])]
     passes += _fallback_passes(scene, spectral=False)
-    limits = _open_limits(scene)
+    limits = open_limits(scene)
     if len(bodies) > 1:
         limits.append("several bodies: pixels that cross more than one are marked invalid")
     if concave := [body for body in scene.bodies if not body.mesh.diagnosis.convex]:
@@ -275,8 +307,7 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
 
 def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
     bodies = _indices(scene, lambda body: body.medium is not None)
-    solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
-    limits = [f"{_names(solid)} closed, but drawn as sheets: what is inside is left out"] if solid else []
+    limits = closed_sheet_limits(scene, method)
     reason = f"every face of {_count(bodies, 'mesh', 'meshes')} is a sheet: their paths add up"
     return _finished(scene, method, [_sheet_pass(bodies, reason)], limits, _media_differ(scene))
 
@@ -306,24 +337,9 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     else:
         reason = "Beer-Lambert: what is behind, through exp(-optical depth)"
     passes = [*passes, PassSpec("transmittance", reason, cost=COSTS["resolve"])]
-    for body in scene.bodies:
-        if found := body.mesh.diagnosis.duplicate_faces:
-            limits.append(f"{body.mesh.name!r}: {found.count} duplicated faces, which count twice or cancel")
-        drawn_as_sheet = isinstance(method, ThinLayer) or body.sheet_thickness is not None
-        if (parts := body.mesh.diagnosis.inside_out_parts) and not drawn_as_sheet:
-            limits.append(f"{body.mesh.name!r}: {parts} closed parts inside out: their pixels are marked invalid")
-    unmodelled = []
-    if any(medium.scatters for medium in media):
-        unmodelled.append("in-scattered light: scattering only removes light")
-    if any(medium.ior > 1 for medium in media):
-        unmodelled.append("refraction and reflection: rays go straight, though ior is above 1")
-    if scene.opaque:
-        unmodelled.append("shadows: light reaches opaque objects through everything")
-    return RenderPlan(method, tuple(passes), spectral, tuple(limits), tuple(unmodelled))
-
-
-def _open_bodies(scene: Scene) -> tuple[int, ...]:
-    return tuple(i for i in _solids(scene) if not scene.objects[i].mesh.diagnosis.solid)
+    scatters = any(step.name == "light_views" for step in passes)
+    limits = [*limits, *mesh_limits(scene, method)]
+    return RenderPlan(method, tuple(passes), spectral, tuple(limits), unmodelled_effects(scene, scatters=scatters))
 
 
 def _media_differ(scene: Scene) -> bool:

@@ -16,9 +16,12 @@ class Capabilities:
     ----------
     shader_storage : bool
         Shaders can write to buffers: OpenGL 4.3.
+    opengl : bool
+        There is OpenGL at all; else rays are traced on the CPU, which finds all intervals whatever the method.
     """
 
     shader_storage: bool = True
+    opengl: bool = True
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from translucent.backdrop import Backdrop
 from translucent.camera import check_size
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.frame import Frame
+from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
-from translucent.plan import plan
+from translucent.plan import plan, plan_over_backdrop
 from translucent.render_plan import RenderPlan
 from translucent.scene import Scene
 from translucent.thickness import Method
@@ -57,7 +59,7 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[Scene, dict[Method | None, RenderPlan]] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool], RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._engine: GpuRenderer | CpuRenderer = _engine(backend, context)
 
@@ -78,9 +80,7 @@ class Renderer:
         RenderError
             If this renderer has none.
         """
-        if not isinstance(self._engine, GpuRenderer):
-            raise RenderError("drawing with OpenGL", "this renderer works on the CPU", 'use another backend than "cpu"')
-        return self._engine
+        return self._gpu("drawing with OpenGL")
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -92,16 +92,24 @@ class Renderer:
             "translucent": version("translucent-shading"),
         }
 
-    def plan(self, scene: Scene, method: Method | None = None) -> RenderPlan:
-        """The plan that `render` would run here."""
+    def plan(self, scene: Scene, method: Method | None = None, *, over_backdrop: bool = False) -> RenderPlan:
+        """The plan that `render` would run here, without a backdrop or with one."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         plans = self._plans.setdefault(scene, {})
-        if method not in plans:
-            plans[method] = plan(scene, method, self._engine.capabilities)
-        return plans[method]
+        if (key := (method, over_backdrop)) not in plans:
+            make = plan_over_backdrop if over_backdrop else plan
+            plans[key] = make(scene, method, self._engine.capabilities)
+        return plans[key]
 
-    def render(self, scene: Scene, size: tuple[int, int], method: Method | None = None, samples: int = 1) -> Frame:
+    def render(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        method: Method | None = None,
+        samples: int = 1,
+        backdrop: Backdrop | TextureBackdrop | None = None,
+    ) -> Frame:
         """Render a scene.
 
         Parameters
@@ -114,6 +122,8 @@ class Renderer:
         samples : int
             Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
             belong to the ray through the pixel center, as all do with 1.
+        backdrop : Backdrop or TextureBackdrop, optional
+            A picture of everything opaque, drawn elsewhere. The same for all samples of a pixel.
 
         Returns
         -------
@@ -124,15 +134,22 @@ class Renderer:
         Raises
         ------
         InputError
-            If the size is not positive, or no method can render the scene.
+            If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
+            scene has opaque objects besides it.
         RenderError
-            If the frame is larger than this OpenGL allows.
+            If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
         if not isinstance(samples, int) or not 1 <= samples <= MAX_SAMPLES:
             raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
         self._require_open()
         size = check_size(size)
-        frame = self._engine.render(scene, size, self.plan(scene, method), samples)
+        if backdrop is None:
+            frame = self._engine.render(scene, size, self.plan(scene, method), samples)
+        else:
+            _check_backdrop(backdrop, size)
+            frame = self._gpu("a backdrop").render(
+                scene, size, self.plan(scene, method, over_backdrop=True), samples, backdrop
+            )
         frame.provenance.update(self.provenance)
         _warn(frame)
         return frame
@@ -166,6 +183,11 @@ class Renderer:
             self._closed = True
             self._engine.close()
 
+    def _gpu(self, what: str) -> GpuRenderer:
+        if not isinstance(self._engine, GpuRenderer):
+            raise RenderError(what, "this renderer works on the CPU", 'use another backend than "cpu"')
+        return self._engine
+
     def _require_open(self) -> None:
         if self._closed:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
@@ -192,6 +214,17 @@ def _cpu_renderer() -> CpuRenderer:
     from translucent.cpu.renderer import CpuRenderer
 
     return CpuRenderer()
+
+
+def _check_backdrop(backdrop: Backdrop | TextureBackdrop, size: tuple[int, int]) -> None:
+    if not isinstance(backdrop, Backdrop | TextureBackdrop):
+        raise InputError(f"backdrop {backdrop!r}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
+    if backdrop.size != size:
+        raise InputError(
+            f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}",
+            f"the frame is {size[0]}x{size[1]}",
+            "draw both in the same size",
+        )
 
 
 def _warn(frame: Frame) -> None:

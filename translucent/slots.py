@@ -87,8 +87,17 @@ def may_overlap(a: Object, b: Object) -> bool:
 def _share(scene: Scene, a: Object, b: Object) -> bool:
     if not (_never_negative(a) and _never_negative(b) and same_medium(a, b)):
         return False
+    if scene.lights and not _scatter_alike(a, b):
+        return False
     return scene.overlap != "priority" or a.priority == b.priority
 
 
 def _never_negative(body: Object) -> bool:
     return body.mesh.diagnosis.solid and not body.mesh.diagnosis.inside_out_parts
+
+
+def _scatter_alike(a: Object, b: Object) -> bool:
+    assert a.medium is not None
+    assert b.medium is not None
+    same = np.array_equal(a.medium.scattering, b.medium.scattering)
+    return same and a.medium.anisotropy == b.medium.anisotropy

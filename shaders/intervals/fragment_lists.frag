@@ -5,12 +5,22 @@
 #include "intervals/place.glsl"
 #include "intervals/lists.glsl"
 
+uniform int cell_offset;  // of the first pixel's head
+
 void main() {
     float place = fragment_place();
+#if GRADIENT
+    vec2 slope = vec2(dFdx(place), dFdy(place));
+#endif
     if (place > last_place()) { return; }
     uint node = atomicAdd(node_count, 1u);
     if (node < uint(nodes.length())) {
-        uint pixel = pixel_index(gl_FragCoord.xy, frame_size.x);
-        nodes[node] = uvec2(fragment_word(place), atomicExchange(heads[pixel], node + 1u));
+        uint pixel = uint(cell_offset) + pixel_index(gl_FragCoord.xy, frame_size.x);
+        uvec2 entry = uvec2(fragment_word(place), atomicExchange(heads[pixel], node + 1u));
+#if GRADIENT
+        nodes[node] = uvec4(entry, floatBitsToUint(slope));
+#else
+        nodes[node] = entry;
+#endif
     }
 }

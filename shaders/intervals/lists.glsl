@@ -3,7 +3,12 @@
 
 layout(std430, binding = 0) buffer Count { uint node_count; };
 layout(std430, binding = 1) buffer Heads { uint heads[]; };  // links
-layout(std430, binding = 2) buffer Nodes { uvec2 nodes[]; };  // word, link to the next
+#if GRADIENT
+#define NODE uvec4
+#else
+#define NODE uvec2
+#endif
+layout(std430, binding = 2) buffer Nodes { NODE nodes[]; };  // word, link to the next; how the place changes across pixels
 
 const uint END_OF_LIST = 0u;
 

@@ -4,6 +4,9 @@
 
 #include "lib/optics.glsl"
 #include "intervals/crossing.glsl"
+#if SCATTER
+#include "volume/in_scatter.glsl"
+#endif
 
 #if SLOTS < 1
 #error a walk needs a slot
@@ -32,6 +35,15 @@ Contents contents(int winding[SLOTS]) {
         mix.inside_out = mix.inside_out || turns < 0;
         // Left before it is entered: next to a silhouette, where rounding has the two change places.
         if (turns <= 0) { continue; }
+#if UNION
+        // Open bodies have slots of their own: a medium that an earlier slot has brought does not count again.
+        bool again = false;
+        for (int other = 0; other < slot; ++other) {
+            again = again || (winding[other] > 0 && slot_extinction[other].rgb == slot_extinction[slot].rgb
+                              && slot_emission[other].rgb == slot_emission[slot].rgb);
+        }
+        if (again) { continue; }
+#endif
 #if UNION || PRIORITY
         turns = 1;
 #endif
@@ -52,8 +64,13 @@ Contents contents(int winding[SLOTS]) {
 void add_segment(inout Walk walk, float metres, bool backwards) {
     Contents mix = contents(walk.winding);
     vec3 depth = mix.extinction * metres;
-#if EMISSION
+#if EMISSION || SCATTER
     vec3 added = emitted_radiance(mix.emission, mix.extinction, metres);
+#if SCATTER
+    if (mix.count > 0.0) {
+        added += in_scattered(walk.winding, ray_from(float(walk.place) / float(place_steps())), metres, mix.extinction);
+    }
+#endif
     if (backwards) {
         walk.emitted = walk.emitted * transmittance(depth) + added;
     } else {

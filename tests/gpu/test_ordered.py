@@ -291,6 +291,19 @@ def test_an_open_body_is_marked_where_its_hole_shows(renderer: tl.Renderer, meth
     assert (frame.thickness[~frame.valid & inside] > 0).all()
 
 
+def test_union_counts_the_medium_of_an_open_body_once(renderer: tl.Renderer, method: Any) -> None:
+    cube = Box().tessellate()
+    open_box = tl.Mesh(cube.vertices, cube.faces[2:], name="open box")
+    objects = [moved(cube, AMBER), moved(open_box, AMBER, (0.3, 0.1, 0.2)), moved(cube, AZURE, (0, 0.4, 0))]
+    scene = tl.Scene(objects, tl.Camera.look_at((1, 2, 5), (0, 0, 0)), overlap="union")
+    with pytest.warns(tl.TranslucentWarning, match="'open box'"):
+        frame = renderer.render(scene, SIZE, method)
+    truth = tl.reference.render(scene, SIZE)
+    sound = interior(tl.reference.hit_counts(scene, SIZE)) & truth.valid & frame.valid
+    assert sound.sum() > 5000
+    np.testing.assert_allclose(frame.optical_depth[sound], truth.optical_depth[sound], atol=5e-5)
+
+
 def test_sheets_keep_thickness_and_transmittance_exact(renderer: tl.Renderer, method: Any) -> None:
     ball, pane = Sphere().tessellate(64), Box.slab((3.0, 3.0), 0.1).tessellate()
     objects = [

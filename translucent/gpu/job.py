@@ -7,17 +7,21 @@ import time
 import moderngl
 import numpy as np
 
+from translucent.backdrop import Backdrop
+from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
-from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SHADE, VIEW
+from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, VIEW
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
     BodyRole,
+    LightViews,
     View,
     body_uniforms,
     environment_uniforms,
     light_uniforms,
     media_uniforms,
+    scatter_uniforms,
     shade_uniforms,
     view_uniforms,
 )
@@ -47,21 +51,31 @@ class FrameJob:
     Parameters
     ----------
     gl, scene, plan, targets, meshes
+    backdrop : Backdrop or TextureBackdrop, optional
+        What a plan with the pass of that name needs.
     """
 
     def __init__(
-        self, gl: moderngl.Context, scene: Scene, plan: RenderPlan, targets: Targets, meshes: MeshCache
+        self,
+        gl: moderngl.Context,
+        scene: Scene,
+        plan: RenderPlan,
+        targets: Targets,
+        meshes: MeshCache,
+        backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> None:
         self.gl = gl
         self.scene = scene
         self.plan = plan
         self.targets = targets
         self.meshes = meshes
+        self.backdrop = backdrop
         self.averaging = False
+        self.light_views: LightViews | None = None
         self.started = time.perf_counter()
         self.slots = medium_slots(scene)
         self._placements = [Placement.of(body, scene.camera) for body in scene.objects]
-        self._media_range = AxialRange.of(scene.bodies, scene.camera)
+        self.media_range = AxialRange.of(scene.bodies, scene.camera)
         self._opaque_range = AxialRange.of(scene.opaque, scene.camera) if scene.opaque else None
         self._roles = self._body_roles()
         self._stride = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
@@ -73,7 +87,7 @@ class FrameJob:
                     scene, self._expected_counts(), self._negative_tolerance(), _COVERAGE_FLOOR * scene.diagonal
                 )
             ),
-            MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self._media_range)),
+            MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self.media_range)),
             LIGHTS: gl.buffer(light_uniforms(scene)),
             ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
         }
@@ -86,18 +100,37 @@ class FrameJob:
         depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
         view = View(scene.camera, self.targets.size, shift, depths)
         for i, (placement, role) in enumerate(zip(self._placements, self._roles, strict=True)):
-            record = body_uniforms(placement, view, role, self._media_range, scene.diagonal)
+            record = body_uniforms(placement, view, role, self.media_range, scene.diagonal)
             self._bodies.write(record, offset=i * self._stride)
-        self._view.write(view_uniforms(view, self._media_range, self._opaque_range))
+        self._view.write(view_uniforms(view, self.media_range, self._opaque_range))
+        self._cleared.clear()
+        self.bind()
+
+    def bind(self) -> None:
+        """Bind this frame's uniforms, where another's have been bound since it was placed."""
+        if self.light_views is not None and SCATTER not in self._constant:
+            view = View(self.scene.camera, self.targets.size)
+            points = getattr(self.plan.method, "light_points", 1)
+            content = scatter_uniforms(self.scene, self.media_range, view, self.light_views, points)
+            self._constant[SCATTER] = self.gl.buffer(content)
         self._view.bind_to_uniform_block(VIEW.binding)
         for block, buffer in self._constant.items():
             buffer.bind_to_uniform_block(block.binding)
-        self._cleared.clear()
 
     @property
     def has_opaque(self) -> bool:
         """Whether rays may end on an opaque surface."""
-        return any(step.name == "opaque" for step in self.plan.passes)
+        return any(step.name in ("opaque", "backdrop") for step in self.plan.passes)
+
+    @property
+    def scatters(self) -> bool:
+        """Whether light from the lights is scattered into the rays."""
+        return any(step.name == "light_views" for step in self.plan.passes)
+
+    @property
+    def starts_inside(self) -> bool:
+        """Whether rays may start inside a body."""
+        return any(placement.expected_count[1] > 0 for placement in self._placements)
 
     @property
     def emits(self) -> bool:

@@ -23,6 +23,13 @@ _TYPES: dict[tuple[str, tuple[int, ...]], tuple[str, int, int]] = {
 #: Lights that shine on opaque objects.
 MAX_LIGHTS = 32
 
+#: Lights that media scatter, and views from them: one each, or the six of a cube.
+MAX_SCATTER_LIGHTS = 8
+MAX_LIGHT_VIEWS = 6 * MAX_SCATTER_LIGHTS
+
+#: Gauss-Legendre points for each interval.
+MAX_SCATTER_POINTS = 16
+
 
 @dataclass(frozen=True)
 class UniformBlock:
@@ -143,6 +150,7 @@ MEDIA = UniformBlock(
     (
         ("slot_extinction", "f4", (MAX_SLOTS, 4)),  # w: least winding number at the start of a ray
         ("slot_emission", "f4", (MAX_SLOTS, 4)),  # w: greatest
+        ("slot_scattering", "f4", (MAX_SLOTS, 4)),  # w: anisotropy
         ("place_metres", "f4", ()),  # metres along the forward axis from place 0 to place 1
         ("slot_bits", "i4", ()),  # bits that tell slots apart
     ),
@@ -171,4 +179,27 @@ LIGHTS = UniformBlock(
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT)}
+#: Per frame: light that is scattered into the view rays. Positions count from the center of the media.
+SCATTER = UniformBlock(
+    "Scatter",
+    6,
+    (
+        ("scatter_right", "f4", (4,)),  # camera's axes, times half the extent of the view (at distance 1)
+        ("scatter_up", "f4", (4,)),
+        ("scatter_off_axis", "f4", (4,)),  # from the camera's axis to the center
+        ("scatter_near", "f4", (4,)),  # metres ahead of the eye of place 0; the same from the center; 1 in perspective
+        ("scatter_light_place", "f4", (MAX_SCATTER_LIGHTS, 4)),  # position, w = 1; or direction to the light, w = 0
+        ("scatter_light_power", "f4", (MAX_SCATTER_LIGHTS, 4)),  # intensity or irradiance; w: 1 if inside a body
+        (
+            "scatter_light_views",
+            "f4",
+            (MAX_SCATTER_LIGHTS, 4),
+        ),  # first view, how many, texels along a side, first texel
+        ("scatter_views", "f4", (4 * MAX_LIGHT_VIEWS, 4)),  # rows of x, y, w and place, from a position
+        ("gauss", "f4", (MAX_SCATTER_POINTS, 4)),  # points in 0..1 and their weights
+        ("gauss_count", "i4", ()),
+        ("scatter_light_count", "i4", ()),
+    ),
+)
+
+BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER)}

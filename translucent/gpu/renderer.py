@@ -9,8 +9,10 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.backdrop import Backdrop
 from translucent.errors import RenderError
 from translucent.frame import Frame
+from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.context import GpuContext, adopt_context, open_context
 from translucent.gpu.job import FrameJob
@@ -72,10 +74,20 @@ class GpuRenderer:
         """What the planner may count on."""
         return Capabilities(shader_storage=self.context.gl.version_code >= _SHADER_STORAGE)
 
-    def render(self, scene: Scene, size: tuple[int, int], plan: RenderPlan, samples: int) -> Frame:
-        """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples."""
+    def render(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        plan: RenderPlan,
+        samples: int,
+        backdrop: Backdrop | TextureBackdrop | None = None,
+    ) -> Frame:
+        """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples.
+
+        A plan over a backdrop needs it, in the size of the frame.
+        """
         with self.context.current():
-            job = self.prepare(scene, size, plan)
+            job = self.prepare(scene, size, plan, backdrop)
             try:
                 if samples > 1:
                     self._average(job, samples)
@@ -98,7 +110,13 @@ class GpuRenderer:
                 job.release()
                 self.context.drain()
 
-    def prepare(self, scene: Scene, size: tuple[int, int], plan: RenderPlan) -> FrameJob:
+    def prepare(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        plan: RenderPlan,
+        backdrop: Backdrop | TextureBackdrop | None = None,
+    ) -> FrameJob:
         """Everything that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
         if self._closed:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
@@ -107,7 +125,7 @@ class GpuRenderer:
                 self._targets.release()
                 self._targets = None
             self._targets = Targets(self.context.gl, size)
-        return FrameJob(self.context.gl, scene, plan, self._targets, self._meshes)
+        return FrameJob(self.context.gl, scene, plan, self._targets, self._meshes, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""

@@ -32,6 +32,8 @@ CONSTANTS: dict[str, str] = {
     "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
     "PEEL_BATCH": str(PEEL_BATCH),
+    "STEEP_IN_LIGHT_VIEW": "5e-3",  # places per texel, from which on a face may well curve within a texel
+    "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this share of it are near
     "FLAG_COVERED": "1.0",
     "FLAG_VALID": "2.0",
     "ENVIRONMENT_CONSTANT": "0",

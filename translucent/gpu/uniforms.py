@@ -9,7 +9,19 @@ import numpy.typing as npt
 
 from translucent.camera import Camera
 from translucent.errors import InputError
-from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MAX_LIGHTS, MEDIA, SHADE, VIEW
+from translucent.gpu.layout import (
+    BODY,
+    ENVIRONMENT,
+    LIGHTS,
+    MAX_LIGHT_VIEWS,
+    MAX_LIGHTS,
+    MAX_SCATTER_LIGHTS,
+    MAX_SCATTER_POINTS,
+    MEDIA,
+    SCATTER,
+    SHADE,
+    VIEW,
+)
 from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
 from translucent.gpu.shaders import CONSTANTS
 from translucent.lights import Environment, PointLight
@@ -163,17 +175,88 @@ def view_uniforms(view: View, media: AxialRange, opaque: AxialRange | None) -> b
 
 def media_uniforms(scene: Scene, slots: tuple[Slot, ...], placements: list[Placement], media: AxialRange) -> bytes:
     """Contents of the Media block."""
-    extinction, emission = np.zeros((MAX_SLOTS, 4)), np.zeros((MAX_SLOTS, 4))
+    extinction, emission, scattering = (np.zeros((MAX_SLOTS, 4)) for _ in range(3))
     for i, slot in enumerate(slots[:MAX_SLOTS]):
         extinction[i, :3] = bounded_extinction(slot.medium, scene.diagonal)
         emission[i, :3] = slot.medium.emission
+        scattering[i] = *np.asarray(slot.medium.scattering), slot.medium.anisotropy
         extinction[i, 3] = sum(placements[k].expected_count[0] for k in slot.objects)
         emission[i, 3] = sum(placements[k].expected_count[1] for k in slot.objects)
     return MEDIA.pack(
         slot_extinction=extinction,
         slot_emission=emission,
+        slot_scattering=scattering,
         place_metres=media.length,
         slot_bits=slot_bits(len(slots)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class LightViews:
+    """Views from the lights that media scatter.
+
+    Attributes
+    ----------
+    center : (3,) float64
+        Of the media, in metres.
+    inside : tuple of bool
+        Whether each light is inside a body.
+    spans : (lights, 4) float64
+        Number of each light's first view, how many it has, texels along a side of each, and number of the first texel.
+    rows : (4 views, 4) float64
+        For each view the rows of x, y and w of the picture, and of place, from a point given from the center.
+    """
+
+    center: Array
+    inside: tuple[bool, ...]
+    spans: Array
+    rows: Array
+
+
+def require_few_lights(scene: Scene) -> None:
+    """Raise where there are more lights than the Scatter block holds."""
+    if len(scene.lights) > MAX_SCATTER_LIGHTS:
+        raise InputError("scattering", f"{len(scene.lights)} lights", f"use at most {MAX_SCATTER_LIGHTS}")
+
+
+def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightViews, points: int) -> bytes:
+    """Contents of the Scatter block.
+
+    Parameters
+    ----------
+    scene, media, view, lights
+    points : int
+        Gauss-Legendre points for each interval and light.
+    """
+    camera = view.camera
+    half_width, half_height = camera.half_extent(view.size)
+    place, power, spans = (np.zeros((MAX_SCATTER_LIGHTS, 4)) for _ in range(3))
+    for i, light in enumerate(scene.lights):
+        if isinstance(light, PointLight):
+            place[i], power[i, :3] = [*(np.asarray(light.position) - lights.center), 1.0], light.intensity
+        else:
+            place[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
+        power[i, 3] = lights.inside[i]
+        spans[i] = lights.spans[i]
+    rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
+    rows[: len(lights.rows)] = lights.rows
+    gauss = np.zeros((MAX_SCATTER_POINTS, 4))
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    gauss[:points, 0], gauss[:points, 1] = (nodes + 1) / 2, weights / 2
+    center = lights.center - camera.eye
+    off_axis = center - (center @ camera.forward) * camera.forward
+    return SCATTER.pack(
+        scatter_right=[*(camera.right * half_width), 0.0],
+        scatter_up=[*(camera.up * half_height), 0.0],
+        scatter_off_axis=[*off_axis, 0.0],
+        scatter_near=[media.near, media.near - center @ camera.forward, float(camera.fov_y is not None), 0.0],
+        scatter_light_place=place,
+        scatter_light_power=power,
+        scatter_light_views=spans,
+        scatter_views=rows,
+        gauss=gauss,
+        gauss_count=points,
+        scatter_light_count=len(scene.lights),
     )
 
 

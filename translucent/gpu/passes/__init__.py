@@ -8,9 +8,11 @@ import moderngl
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
+from translucent.gpu.passes.backdrop import BackdropPass
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.k_buffer import KBufferPass
+from translucent.gpu.passes.light_views import LightViewsPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
@@ -34,6 +36,8 @@ PASSES: dict[str, type[Pass]] = {
     "thin_layer_fallback": ThinLayerPass,
     "back_face_depth": BackFaceDepthPass,
     "opaque": OpaquePass,
+    "backdrop": BackdropPass,
+    "light_views": LightViewsPass,
     "depth_peeling": DepthPeelingPass,
     "fragment_lists": FragmentListsPass,
     "k_buffer": KBufferPass,

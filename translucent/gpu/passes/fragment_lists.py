@@ -8,6 +8,7 @@ import numpy as np
 from translucent.errors import RenderError
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
+from translucent.gpu.shaders import set_uniform
 from translucent.render_plan import PassSpec
 
 #: Bytes of a node: a word and the number of the next node.
@@ -74,7 +75,8 @@ class FragmentListsPass:
         _use_rows(job.targets.nothing(), first, last)
         gl.enable_only(moderngl.NOTHING)
         job.bind_opaque(0)
-        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
+        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, GRADIENT=0, OPAQUE=job.has_opaque)
+        set_uniform(program, "cell_offset", 0)
         job.draw(program, spec.objects)
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
         return int(np.frombuffer(count.read(), np.uint32)[0])
@@ -82,7 +84,7 @@ class FragmentListsPass:
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
         _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
-        self._resolve.draw_fullscreen(self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque))
+        self._resolve.draw_fullscreen(self._resolve.program(**walk_switches(job), GRADIENT=0, OPAQUE=job.has_opaque))
         # The next lists must not begin before these have been walked along.
         job.gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 

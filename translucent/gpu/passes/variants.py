@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import moderngl
+import numpy as np
+import numpy.typing as npt
 
 from translucent.gpu.shaders import build_program
 
@@ -53,4 +55,12 @@ def walk_switches(job: Any) -> dict[str, bool | int]:
         "UNION": job.scene.overlap == "union",
         "PRIORITY": job.scene.overlap == "priority",
         "EMISSION": job.emits,
+        "SCATTER": job.scatters,
+        # One set of points serves all channels where light fares alike in them.
+        "GRAY": all(_is_gray(slot.medium.extinction) for slot in job.slots),
+        "SHADOWS": bool(job.scene.opaque),
     }
+
+
+def _is_gray(values: npt.NDArray[np.float64]) -> bool:
+    return bool((values == values[0]).all())

@@ -1,0 +1,124 @@
+// Light that a segment of a view ray scatters once into it: from each light, Gauss-Legendre points of
+// integral T_view(s) sigma_s p(cos) E(s) T_light(s) ds over the segment.
+//
+// The points are those of a variable in which the exponential is constant, were its exponent linear from end to end (the
+// secant): with E(s) = sigma_t s + tau_light(s) and x = E(L) - E(0), s(u) = -(L / x) log(1 - (1 - e^-x) u). Where a
+// point light is near, the angle seen from it takes the place of s (equiangular sampling, Kulla & Fajardo 2012), which
+// cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone.
+
+#include "volume/light_views.glsl"
+
+struct ViewRay {
+    vec3 start;      // from the center of the media
+    vec3 direction;  // of unit length
+};
+
+// Right and down of the pixel at hand, from -1 to 1 over the picture.
+vec2 pixel_in_picture;
+
+// The view ray from a place of the walk on. Nothing here is larger than the scene, however far away the eye is.
+ViewRay ray_from(float place) {
+    float axial = scatter_near.x + place * place_metres;
+    float spread = scatter_near.z == 1.0 ? axial : 1.0;
+    vec3 across = pixel_in_picture.x * scatter_right.xyz - pixel_in_picture.y * scatter_up.xyz;
+    vec3 along = ray_forward.xyz * (place * place_metres + scatter_near.y);
+    return ViewRay(across * spread - scatter_off_axis.xyz + along, normalize(ray_forward.xyz + across * scatter_near.z));
+}
+
+// Scattering times phase function of what fills a segment, for a cosine between the directions of travel.
+vec3 scattering_phase(int winding[SLOTS], float cos_scatter) {
+    vec3 sum = vec3(0.0);
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        int turns = winding[slot];
+        if (turns <= 0) { continue; }
+#if UNION || PRIORITY
+        turns = 1;
+#endif
+        sum += float(turns) * slot_scattering[slot].rgb * henyey_greenstein(cos_scatter, slot_scattering[slot].a);
+#if PRIORITY
+        break;
+#endif
+    }
+    return sum;
+}
+
+// One light's radiance at distance s along the segment, per metre, without the transmittances; w: its visibility.
+vec4 scattered_here(int winding[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
+    vec3 point = ray.start + s * ray.direction;
+    vec4 depth = light_depth(light, point);
+    tau = depth.rgb;
+    vec4 place = scatter_light_place[light];
+    vec3 towards = place.w == 0.0 ? place.xyz : place.xyz - point;
+    float r2 = max(dot(towards, towards), 1e-30);
+    float cos_scatter = dot(towards * inversesqrt(r2), ray.direction);
+    vec3 power = scatter_light_power[light].rgb * (place.w == 0.0 ? 1.0 : 1.0 / r2);
+    return vec4(power * scattering_phase(winding, cos_scatter), depth.a);
+}
+
+// (1 - e^-x) / x for any x, and its inverse warp.
+float secant_point(float u, float x) {
+    return abs(x) < 1e-3 ? u * (1.0 - 0.5 * x * (1.0 - u)) : -log(1.0 - (1.0 - exp(-x)) * u) / x;
+}
+
+float secant_jacobian(float u, float x) {
+    float q = 1.0 - exp(-x);
+    return abs(x) < 1e-3 ? 1.0 - 0.5 * x * (1.0 - 2.0 * u) : q / x / (1.0 - q * u);
+}
+
+vec3 scatter_from_light(int winding[SLOTS], int light, ViewRay ray, float metres, vec3 sigma) {
+    vec3 tau_start, tau_end, tau;
+    scattered_here(winding, light, ray, 0.0, tau_start);
+    scattered_here(winding, light, ray, metres, tau_end);
+    vec3 rise = sigma * metres + tau_end - tau_start;
+
+    // Where the light is nearest: at distance closest along the ray, height metres off it.
+    vec4 place = scatter_light_place[light];
+    float closest = dot(place.xyz - ray.start, ray.direction);
+    float height = max(length(place.xyz - ray.start - closest * ray.direction), 1e-4 * metres);
+    bool angular = place.w == 1.0 && height < NEAR_LIGHT * metres && closest > -metres && closest < 2.0 * metres;
+    if (scatter_light_power[light].a == 1.0) {
+        angular = true;
+        rise = vec3(0.0);
+    }
+    float first = atan(-closest, height);
+    float angle = atan(metres - closest, height) - first;
+
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < gauss_count; ++i) {
+        float u = gauss[i].x;
+#if GRAY
+        const int channels = 1;
+#else
+        const int channels = 3;
+#endif
+        for (int channel = 0; channel < channels; ++channel) {
+            float x = clamp(rise[channel], -60.0, 60.0);
+            float v = secant_point(u, x);
+            float weight = gauss[i].y * secant_jacobian(u, x);
+            float s = metres * v;
+            if (angular) {
+                float tangent = tan(first + angle * v);
+                s = clamp(closest + height * tangent, 0.0, metres);
+                weight *= angle * height * (1.0 + tangent * tangent);
+            } else {
+                weight *= metres;
+            }
+            vec4 light_here = scattered_here(winding, light, ray, s, tau);
+            vec3 here = weight * light_here.a * light_here.rgb * transmittance(sigma * s + tau);
+#if GRAY
+            sum += here;
+#else
+            sum[channel] += here[channel];
+#endif
+        }
+    }
+    return sum;
+}
+
+vec3 in_scattered(int winding[SLOTS], ViewRay ray, float metres, vec3 sigma) {
+    vec3 sum = vec3(0.0);
+    for (int light = 0; light < scatter_light_count; ++light) {
+        sum += scatter_from_light(winding, light, ray, metres, sigma);
+    }
+    return sum;
+}

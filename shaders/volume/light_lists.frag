@@ -1,0 +1,46 @@
+// Sorts the crossings on the ray of each texel of a view from a light, and notes what is behind each.
+
+#include <View>
+#include "intervals/lists.glsl"
+#include "intervals/sort_list.glsl"
+#include "intervals/walk.glsl"
+#include "lib/ray.glsl"
+
+layout(std430, binding = 5) buffer LightMedia { vec4 light_media[]; };
+layout(std430, binding = 6) buffer LightEnds { float light_ends[]; };
+
+#if OPAQUE
+uniform sampler2D opaque_place;
+#endif
+
+uniform int cell_offset;
+
+// Extinction behind a node, and metres for each place.
+vec4 behind(Walk walk, float metres_per_place) {
+    return vec4(contents(walk.winding).extinction, metres_per_place);
+}
+
+void main() {
+    uint cell = uint(cell_offset) + pixel_index(gl_FragCoord.xy, frame_size.x);
+    int excess[SLOTS];
+    uint list = sort_list(heads[cell], excess);
+    vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
+    float advance = length(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
+    float metres_per_place = place_metres * advance;
+    Walk walk = walk_from_start(excess);
+    heads[cell] = list;
+    if (contents(walk.winding).count > 0.0) {
+        // The light is inside: a crossing at the start tells so.
+        uint node = atomicAdd(node_count, 1u);
+        nodes[node] = uvec4(0u, list, 0u, 0u);
+        light_media[node] = behind(walk, metres_per_place);
+        heads[cell] = node + 1u;
+    }
+    for (uint link = list; link != END_OF_LIST; link = next_link(link)) {
+        cross_surface(walk, word_at(link), 1, false, metres_per_place / float(place_steps()));
+        light_media[link - 1u] = behind(walk, metres_per_place);
+    }
+#if OPAQUE
+    light_ends[cell] = texelFetch(opaque_place, ivec2(gl_FragCoord.xy), 0).r;
+#endif
+}

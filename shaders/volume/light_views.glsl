@@ -1,0 +1,93 @@
+// What lights see: for each texel of each view from a light, the crossings of its ray in order, how their places change
+// across the texel, and what is behind each. So the optical depth from the light to any point is a sum over the crossings
+// before it, moved along their faces to the very ray of the point.
+
+#include <Scatter>
+#include "intervals/crossing.glsl"
+
+layout(std430, binding = 3) buffer LightHeads { uint light_heads[]; };    // links, view after view
+layout(std430, binding = 4) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the place
+layout(std430, binding = 5) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres for each place
+layout(std430, binding = 6) buffer LightEnds { float light_ends[]; };     // place where an opaque surface ends each ray
+
+// Where the views of a light are: their texels begin at first, and each has size x size of them.
+struct LightCells {
+    uint first;
+    int size;
+};
+
+uint light_cell(LightCells cells, ivec2 texel) {
+    ivec2 held = clamp(texel, ivec2(0), ivec2(cells.size - 1));
+    return cells.first + uint(held.y * cells.size + held.x);
+}
+
+// Optical depth to a place, by the crossings of a texel, moved along their faces to the point's own ray; w: the steepest of
+// these, in places per texel. offset: of the point from the texel's center.
+vec4 texel_light_depth(uint cell, vec2 offset, float place) {
+    vec3 depth = vec3(0.0);
+    vec3 extinction = vec3(0.0);
+    float metres = 0.0;
+    float last = 0.0;
+    float steepest = 0.0;
+    for (uint link = light_heads[cell]; link != 0u;) {
+        uvec4 node = light_nodes[link - 1u];
+        vec2 slope = uintBitsToFloat(node.zw);
+        float moved = float(crossing_step(node.x)) / float(place_steps()) + dot(slope, offset);
+        steepest = max(steepest, max(abs(slope.x), abs(slope.y)));
+        if (moved > place) { break; }
+        moved = max(moved, last);
+        depth += extinction * ((moved - last) * metres);
+        last = moved;
+        vec4 behind = light_media[link - 1u];
+        extinction = behind.rgb;
+        metres = behind.a;
+        link = node.y;
+    }
+    return vec4(depth + extinction * ((place - last) * metres), steepest);
+}
+
+// Which of the six views of a cube looks at a point, given from the light.
+int cube_face(vec3 from_light) {
+    vec3 size = abs(from_light);
+    int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    return 2 * axis + (from_light[axis] < 0.0 ? 1 : 0);
+}
+
+// Optical depth from a light to a point within a body, given from the center of the media; w: 0 where an opaque surface
+// is in between. The texel around the point tells it. Only next to a silhouette, where faces curve away within a texel,
+// the four texels around the point do, the more so the less steep their faces are.
+vec4 light_depth(int light, vec3 point) {
+    vec4 place_of_light = scatter_light_place[light];
+    vec4 views = scatter_light_views[light];  // number of the first, how many, texels along a side, first texel
+    int face = int(views.y) == 1 ? 0 : cube_face(point - place_of_light.xyz);
+    int view = int(views.x) + face;
+    LightCells cells = LightCells(uint(views.w) + uint(face * int(views.z) * int(views.z)), int(views.z));
+    vec4 here = vec4(point, 1.0);
+    float w = dot(scatter_views[4 * view + 2], here);
+    vec2 ndc = vec2(dot(scatter_views[4 * view], here), dot(scatter_views[4 * view + 1], here)) / w;
+    float place = dot(scatter_views[4 * view + 3], here);
+    vec2 position = (0.5 * ndc + 0.5) * views.z;
+    ivec2 texel = ivec2(floor(position));
+    vec2 offset = position - floor(position) - 0.5;
+    uint cell = light_cell(cells, texel);
+#if SHADOWS
+    if (place > light_ends[cell] + 1.5 / views.z) { return vec4(0.0); }
+#endif
+    vec4 depth = texel_light_depth(cell, offset, place);
+    if (light_heads[cell] != 0u && depth.w < STEEP_IN_LIGHT_VIEW) { return vec4(depth.rgb, 1.0); }
+    vec3 sum = vec3(0.0);
+    float total = 0.0;
+    ivec2 corner = texel - ivec2(lessThan(offset, vec2(0.0)));
+    vec2 share = offset + vec2(texel - corner);
+    for (int i = 0; i < 4; ++i) {
+        ivec2 aside = ivec2(i & 1, i >> 1);
+        uint other = light_cell(cells, corner + aside);
+        if (light_heads[other] == 0u) { continue; }
+        depth = texel_light_depth(other, share - vec2(aside), place);
+        vec2 weights = mix(1.0 - share, share, vec2(aside));
+        float weight = (weights.x * weights.y + 1e-4) / (depth.w * depth.w + 1e-9);
+        sum += weight * depth.rgb;
+        total += weight;
+    }
+    return vec4(sum / max(total, 1e-30), 1.0);
+}

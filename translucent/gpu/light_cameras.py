@@ -1,0 +1,66 @@
+"""Cameras that look from the lights of a scene at its media."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera
+from translucent.lights import DirectionalLight, PointLight
+from translucent.scene import Light, Scene
+
+Array = npt.NDArray[np.float64]
+
+#: The frame of a view is larger than what must be in it by this factor: interpolation needs neighbors.
+_MARGIN = 1.02
+
+#: A point light whose view would have to be wider than this angle, in degrees, looks in six directions instead.
+_WIDEST = 110.0
+
+#: Smallest angle of a view, in degrees: media that are but a point.
+_NARROWEST = 1e-6
+
+#: Directions of the six views, as `light_view_towards` in ``shaders/volume/light_views.glsl`` numbers them.
+_CUBE = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+
+
+def media_sphere(scene: Scene) -> tuple[Array, float]:
+    """Center (3,) and radius of a sphere around all media, in metres."""
+    boxes = np.stack([body.bounds for body in scene.bodies])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
+
+
+def light_cameras(light: Light, scene: Scene) -> list[Camera]:
+    """One camera that sees all media from a light, or six where the light is among them or close by."""
+    center, radius = media_sphere(scene)
+    points = np.concatenate([body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] for body in scene.bodies])
+    if isinstance(light, DirectionalLight):
+        direction = np.asarray(light.direction)
+        eye = center - 2.0 * radius * direction
+        pose = Camera.orthographic(eye, center, up=_any_up(direction)).pose
+        across = (points - center) @ pose[:3, :2]
+        middle = 0.5 * (across.min(axis=0) + across.max(axis=0))
+        extent = float(np.ptp(across, axis=0).max()) or radius
+        eye = eye + pose[:3, :2] @ middle
+        return [Camera.orthographic(eye, eye + direction, up=_any_up(direction), height=extent * _MARGIN)]
+    assert isinstance(light, PointLight)
+    position = np.asarray(light.position)
+    towards = center - position
+    if (distance := float(np.linalg.norm(towards))) > 0:
+        pose = Camera.look_at(position, center, up=_any_up(towards)).pose
+        seen = (points - position) @ pose[:3, :3]  # right, up, backward
+        if (seen[:, 2] < 0).all():
+            tangent = float((np.abs(seen[:, :2]) / -seen[:, 2:]).max()) * _MARGIN
+            if (angle := 2.0 * float(np.degrees(np.arctan(tangent)))) < _WIDEST:
+                return [Camera.look_at(position, center, up=_any_up(towards), fov_y=max(angle, _NARROWEST))]
+    reach = max(distance, radius)
+    return [
+        Camera.look_at(position, position + reach * np.array(axis), up=_any_up(np.array(axis)), fov_y=91.0)
+        for axis in _CUBE
+    ]
+
+
+def _any_up(direction: Array) -> Array:
+    """A unit axis that is far from a direction."""
+    return np.eye(3)[int(np.abs(direction).argmin())]

@@ -1,0 +1,65 @@
+"""The backdrop: what is opaque comes as a picture that another renderer has drawn."""
+
+from __future__ import annotations
+
+import math
+
+import moderngl
+import numpy as np
+
+from translucent.backdrop import Backdrop
+from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.render_plan import PassSpec
+
+#: Place of what is infinitely far: behind everything, and yet seen.
+_BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
+
+_COLOR, _DEPTH = range(2)
+
+
+class BackdropPass:
+    """Puts the job's backdrop where opaque objects would be drawn; see ``shaders/shade/backdrop.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._variants = Variants(
+            gl, "geometry/fullscreen.vert", "shade/backdrop.frag", backdrop_color=_COLOR, backdrop_depth=_DEPTH
+        )
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Fill the target; it is the same for all samples of a pixel."""
+        if isinstance(job.backdrop, Backdrop):
+            _upload(job, job.backdrop)
+        elif job.backdrop is not None:
+            self._draw(job, job.backdrop)
+
+    def _draw(self, job: FrameJob, backdrop: TextureBackdrop) -> None:
+        job.targets.opaque().use()
+        job.gl.enable_only(moderngl.NOTHING)
+        backdrop.color.use(_COLOR)
+        backdrop.depth.use(_DEPTH)
+        program = self._variants.program(ORTHOGRAPHIC=backdrop.orthographic, INFINITE=math.isinf(backdrop.far))
+        media = job.media_range
+        set_uniform(program, "near", backdrop.near)
+        if not math.isinf(backdrop.far):
+            set_uniform(program, "far", backdrop.far)
+        set_uniform(program, "media_near", media.near)
+        set_uniform(program, "media_length", media.length)
+        set_uniform(program, "gamma", backdrop.gamma)
+        set_uniform(program, "behind_all", _BEHIND_ALL)
+        self._variants.draw_fullscreen(program)
+
+
+def _upload(job: FrameJob, backdrop: Backdrop) -> None:
+    """Write the arrays; metres become places in float64, or those of far scenes would lose digits."""
+    with np.errstate(under="ignore"):
+        place = np.minimum((backdrop.depth - job.media_range.near) / job.media_range.length, _BEHIND_ALL)
+        place = place.astype(np.float32)
+    if backdrop.coverage is not None:
+        place = np.where(backdrop.coverage, place, np.float32(CONSTANTS["NOTHING"]))
+    radiance = np.ones((*place.shape, 4), dtype=np.float32)
+    radiance[..., :3] = backdrop.radiance
+    for texture, rows in zip(job.targets.opaque().color_attachments, (place, radiance), strict=True):
+        texture.write(np.ascontiguousarray(rows[::-1]))

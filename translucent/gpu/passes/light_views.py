@@ -1,0 +1,176 @@
+"""Views from the lights: how deep in the media each point is, seen from each light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.light_cameras import light_cameras, media_sphere
+from translucent.gpu.passes.opaque import OpaquePass
+from translucent.gpu.passes.variants import Variants, walk_switches
+from translucent.gpu.shaders import set_uniform
+from translucent.gpu.targets import Targets
+from translucent.gpu.uniforms import LightViews, require_few_lights
+from translucent.render_plan import PassSpec
+from translucent.scene import Light
+
+#: Bytes of a node, and of what is recorded at each.
+_NODE, _MEDIUM = 16, 16
+
+Array = npt.NDArray[np.float64]
+
+#: Texels along a side of a light's only view, and of the six of a cube.
+_SIDE, _CUBE_SIDE = 1024, 512
+
+#: Binding points of the buffers while they are made, and while they are read.
+_COUNT, _HEADS, _NODES, _MEDIA, _ENDS = 0, 1, 2, 5, 6
+_READ = {"light_heads": 3, "light_nodes": 4, "light_media": _MEDIA, "light_ends": _ENDS}
+
+#: Nodes in the first buffers, for each texel; frames that need more get larger ones, and keep them.
+_FIRST_SHARE = 0.5
+
+#: Room beyond what a frame needed, so that the next one does not have to grow again.
+_SLACK = 1.25
+
+
+class LightViewsPass:
+    """Lists of crossings from each light, with optical depths; see ``shaders/volume/light_views.glsl``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
+        self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_place=0)
+        self._opaque = OpaquePass(gl)
+        self._targets = {side: Targets(gl, (side, side)) for side in (_SIDE, _CUBE_SIDE)}
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Make the lists of all views, and tell the shaders where the lights are."""
+        require_few_lights(job.scene)
+        if job.light_views is None:  # else this is one more sample of a frame, and lights do not move
+            groups = [self._light_jobs(job, light) for light in job.scene.lights]
+            jobs = [light_job for group in groups for light_job in group]
+            try:
+                self._fill(job, spec, jobs)
+                job.light_views = light_views(groups)
+            finally:
+                for light_job in jobs:
+                    light_job.release()
+        job.bind()
+        for name, binding in _READ.items():
+            if name != "light_ends" or job.scene.opaque:
+                job.targets.storage(name, 1).bind_to_storage_buffer(binding)
+
+    def release(self) -> None:
+        """Free the targets of the views."""
+        for targets in self._targets.values():
+            targets.release()
+
+    def _light_jobs(self, job: FrameJob, light: Light) -> list[FrameJob]:
+        cameras = light_cameras(light, job.scene)
+        targets = self._targets[_SIDE if len(cameras) == 1 else _CUBE_SIDE]
+        return [
+            FrameJob(job.gl, replace(job.scene, camera=camera), job.plan, targets, job.meshes) for camera in cameras
+        ]
+
+    def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> None:
+        """Make all lists; once more, with larger buffers, if they did not fit."""
+        storage, cells = job.targets.storage, sum(_cells(light_job) for light_job in jobs)
+        # Where a light is inside, each of its lists begins with a crossing of its own.
+        spare = sum(_cells(light_job) for light_job in jobs if light_job.starts_inside)
+        heads, count = storage("light_heads", 4 * cells), storage("light_count", 4)
+        if job.scene.opaque:
+            storage("light_ends", 4 * cells).bind_to_storage_buffer(_ENDS)
+        needed = int(_FIRST_SHARE * cells) + 1
+        while True:
+            nodes, media = storage("light_nodes", _NODE * needed), storage("light_media", _MEDIUM * needed)
+            count.write(np.zeros(1, np.uint32))
+            heads.clear()
+            for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, nodes), (_MEDIA, media)):
+                buffer.bind_to_storage_buffer(binding)
+            for light_job, offset in zip(jobs, _offsets(jobs), strict=True):
+                self._draw(light_job, spec, offset)
+            found = int(np.frombuffer(count.read(), np.uint32)[0]) + spare
+            if found <= min(nodes.size // _NODE, media.size // _MEDIUM):
+                break
+            needed = int(found * _SLACK)
+        for light_job, offset in zip(jobs, _offsets(jobs), strict=True):
+            self._sort(light_job, spec, offset)
+
+    def _draw(self, job: FrameJob, spec: PassSpec, offset: int) -> None:
+        """Put the crossings of one view into its lists."""
+        gl = self._gl
+        job.bind()
+        if job.scene.opaque:
+            self._draw_opaque(job)
+        job.targets.nothing().use()
+        gl.enable_only(moderngl.NOTHING)
+        if job.scene.opaque:
+            job.targets.opaque().color_attachments[0].use(0)
+        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=bool(job.scene.opaque), GRADIENT=1)
+        set_uniform(program, "cell_offset", offset)
+        job.draw(program, spec.objects)
+        gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
+
+    def _draw_opaque(self, job: FrameJob) -> None:
+        opaque = tuple(i for i, item in enumerate(job.scene.objects) if item.medium is None)
+        self._opaque.run(job, PassSpec("opaque", "shadows", opaque))
+
+    def _sort(self, job: FrameJob, spec: PassSpec, offset: int) -> None:
+        """Sort the lists of one view, and add up the optical depth along them."""
+        job.bind()
+        if job.scene.opaque:
+            self._draw_opaque(job)
+            job.targets.opaque().color_attachments[0].use(0)
+        job.targets.nothing().use()
+        self._gl.enable_only(moderngl.NOTHING)
+        switches = {
+            **walk_switches(job),
+            "EMISSION": False,
+            "SCATTER": False,
+            "OPAQUE": bool(job.scene.opaque),
+            "GRADIENT": 1,
+        }
+        program = self._sorting.program(**switches)
+        set_uniform(program, "cell_offset", offset)
+        self._sorting.draw_fullscreen(program)
+        self._gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
+
+
+def _cells(job: FrameJob) -> int:
+    return job.targets.size[0] * job.targets.size[1]
+
+
+def _offsets(jobs: Sequence[FrameJob]) -> list[int]:
+    """Number of the first texel of each view."""
+    return [sum(_cells(light_job) for light_job in jobs[:i]) for i in range(len(jobs))]
+
+
+def light_views(groups: Sequence[Sequence[FrameJob]]) -> LightViews:
+    """Where each light's views are, and how points get into them; a group holds the views of one light."""
+    jobs = [light_job for group in groups for light_job in group]
+    offsets = _offsets(jobs)
+    spans, first = [], 0
+    for group in groups:
+        spans.append((first, len(group), group[0].targets.size[0], offsets[first]))
+        first += len(group)
+    center, _ = media_sphere(jobs[0].scene)
+    rows = np.concatenate([_rows(light_job, center) for light_job in jobs])
+    inside = tuple(group[0].starts_inside for group in groups)
+    return LightViews(center, inside, np.array(spans, dtype=np.float64), rows)
+
+
+def _rows(job: FrameJob, center: Array) -> Array:
+    """(4, 4): x, y and w of the picture, and place, of a point given from the center of the media."""
+    camera = job.scene.camera
+    axes = np.stack([camera.right, camera.up, camera.forward])
+    seen = np.column_stack([axes, axes @ (center - camera.eye)])
+    half_width, half_height = camera.half_extent(job.targets.size)
+    one = np.array([0.0, 0.0, 0.0, 1.0])
+    media = job.media_range
+    place = (seen[2] - media.near * one) / media.length
+    return np.stack([seen[0] / half_width, seen[1] / half_height, one if camera.fov_y is None else seen[2], place])
