@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from translucent import reference
 from translucent.albedo import scattering_medium
-from translucent.appearance import average_color, medium_for_average_color
+from translucent.appearance import Appearance, appearance_of, average_color, medium_for_average_color
+from translucent.backdrop import Backdrop
 from translucent.camera import Camera
 from translucent.conversion import (
     DistanceMatch,
@@ -22,12 +23,13 @@ from translucent.conversion import (
     distance_for_color,
     extinction_from_colors,
 )
+from translucent.density import DensityGrid, ExponentialDensity, LinearDensity
 from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
 from translucent.fitting import Fit, fit_medium, fit_wedge
 from translucent.frame import Frame
 from translucent.gltf.load import load_scene
 from translucent.lights import DirectionalLight, Environment, PointLight
-from translucent.materials import text_block
+from translucent.materials import load_medium, text_block
 from translucent.materials.gltf import read_materials
 from translucent.materials.gltf_write import write_medium
 from translucent.medium import Medium
@@ -35,32 +37,47 @@ from translucent.mesh import Mesh, load_mesh
 from translucent.metrics import Errors, compare, interior
 from translucent.plan import plan
 from translucent.presets import Preset, preset, presets
-from translucent.render_plan import RenderPlan
+from translucent.render_plan import Capabilities, RenderPlan
 from translucent.scene import Object, Scene
 from translucent.showcase import showcase
-from translucent.thickness import BackFaceDepth, DepthPeeling, FragmentLists, KBuffer, SignedDepth, ThinLayer
+from translucent.thickness import (
+    BackFaceDepth,
+    DepthPeeling,
+    FragmentLists,
+    KBuffer,
+    RayMarched,
+    SignedDepth,
+    ThinLayer,
+)
 
 if TYPE_CHECKING:
     from translucent.renderer import Renderer
 
 __all__ = [
+    "Appearance",
     "BackFaceDepth",
+    "Backdrop",
     "Camera",
+    "Capabilities",
+    "DensityGrid",
     "DepthPeeling",
     "DirectionalLight",
     "DistanceMatch",
     "Environment",
     "Errors",
+    "ExponentialDensity",
     "Fit",
     "FragmentLists",
     "Frame",
     "InputError",
     "KBuffer",
+    "LinearDensity",
     "Medium",
     "Mesh",
     "Object",
     "PointLight",
     "Preset",
+    "RayMarched",
     "RenderError",
     "RenderPlan",
     "Renderer",
@@ -69,6 +86,7 @@ __all__ = [
     "ThinLayer",
     "TranslucentError",
     "TranslucentWarning",
+    "appearance_of",
     "average_color",
     "clamp_colors",
     "color_at_distance",
@@ -79,6 +97,7 @@ __all__ = [
     "fit_medium",
     "fit_wedge",
     "interior",
+    "load_medium",
     "load_mesh",
     "load_scene",
     "medium_for_average_color",

@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, get_args
 
+from translucent.cpu.embree import embree_versions
+from translucent.cpu.threads import processors
+from translucent.errors import RenderError
 from translucent.gpu.context import Backend, NoContextError, open_context
+from translucent.gpu.renderer import SHADER_STORAGE
 
 #: Packages beside the core, and what each is for.
 OPTIONAL = {
@@ -40,10 +44,21 @@ def examine_backends(names: Sequence[str] = get_args(Backend)) -> list[BackendRe
             continue
         info = context.info
         detail = f"{context.renderer}; {info['GL_VERSION']}; textures up to {info['GL_MAX_TEXTURE_SIZE']}"
+        if context.gl.version_code < SHADER_STORAGE:
+            detail += "; no fragment lists, k-buffer and scattered light, which need 4.3"
         reports.append(BackendReport(name, True, detail))
         if name != "window":
             context.gl.release()
+    reports.append(_examine_cpu())
     return reports
+
+
+def _examine_cpu() -> BackendReport:
+    try:
+        found = embree_versions()
+    except RenderError as error:
+        return BackendReport("cpu", False, str(error))
+    return BackendReport("cpu", True, f"Embree {found['embree']}, on {processors()} processors")
 
 
 def examine() -> dict[str, Any]:
@@ -70,13 +85,14 @@ def report(facts: dict[str, Any]) -> str:
     for name, found in facts["optional"].items():
         lines.append(f"optional: {name} {found or 'not installed'}: {OPTIONAL[name]}")
     for name, state in facts["backends"].items():
-        lines.append(f"OpenGL {name}: {'works' if state['works'] else 'no'}: {state['detail']}")
-    if facts["backend"] is None:
+        kind = "without OpenGL:" if name == "cpu" else "OpenGL"
+        lines.append(f"{kind} {name}: {'works' if state['works'] else 'no'}: {state['detail']}")
+    if facts["backend"] in (None, "cpu"):
         lines.append(
             "No OpenGL 3.3 without a window: apt-get install libegl1 libgl1 libgl1-mesa-dri, "
             "or pip install --no-deps lavavu-osmesa (Linux x86-64)."
         )
-    else:
+    if facts["backend"] is not None:
         lines.append(f"Rendering uses {facts['backend']}.")
     return "\n".join(lines)
 

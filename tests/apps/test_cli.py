@@ -100,6 +100,11 @@ def no_opengl(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     return
 
 
+@pytest.fixture
+def no_embree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
+
+
 def strict_json(text: str) -> Any:
     """One JSON object; NaN and infinities, which JSON does not have, fail."""
 
@@ -579,32 +584,56 @@ class TestRendering:
         told = strict_json(result.out)
         assert (result.code, result.err) == (0, "")
         assert told["backends"][told["backend"]]["works"] is True
-        assert set(told["backends"]) == {"egl", "window", "osmesa"}
+        assert set(told["backends"]) == {"egl", "window", "osmesa", "cpu"}
 
 
 # No OpenGL
 
 
-def test_without_opengl_render_fails_in_one_line_that_says_what_to_do(
+@pytest.mark.filterwarnings("default::translucent.errors.TranslucentWarning")
+def test_without_opengl_render_works_on_the_cpu_and_says_so(
     run: Run, cube: Path, tmp_path: Path, no_opengl: None
+) -> None:
+    result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "4x4", "--json")
+    assert result.code == 0
+    (line,) = result.err.splitlines()
+    assert line.startswith("warning: rendering on the CPU, for want of OpenGL: OpenGL 3.3 context; none; tried egl: no")
+    assert "`translucent doctor` explains this machine" in line
+    assert strict_json(result.out)["provenance"]["backend"] == "cpu"
+    assert (tmp_path / "cube.png").exists()
+
+
+def test_without_opengl_and_embree_render_fails_in_one_line_that_says_what_to_do(
+    run: Run, cube: Path, tmp_path: Path, no_opengl: None, no_embree: None
 ) -> None:
     result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "4x4")
     assert result.code == 1
     line = one_error_line(result)
     assert "OpenGL 3.3 context; none; tried egl: no such library; osmesa: no such library; apt-get install" in line
-    assert "`translucent doctor` explains this machine" in line
     assert not (tmp_path / "cube.png").exists()
 
 
-def test_without_opengl_doctor_says_so_and_fails(run: Run, no_opengl: None) -> None:
-    result = run("doctor")
+def test_a_backend_that_was_asked_for_is_not_replaced(run: Run, cube: Path, tmp_path: Path, no_opengl: None) -> None:
+    result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "4x4", "--backend", "egl")
     assert result.code == 1
+    assert "tried egl: no such library" in one_error_line(result)
+
+
+def test_without_opengl_doctor_says_so(run: Run, no_opengl: None) -> None:
+    result = run("doctor")
+    assert (result.code, result.err) == (0, "")
     assert "OpenGL egl: no: no such library" in result.out
     assert "No OpenGL 3.3 without a window: apt-get install" in result.out
-    assert result.err.splitlines() == ["error: OpenGL 3.3; no backend works without a window; see the lines above"]
+    assert "Rendering uses cpu." in result.out
 
 
-def test_without_opengl_doctor_prints_one_json_object(run: Run, no_opengl: None) -> None:
+def test_without_opengl_and_embree_doctor_fails(run: Run, no_opengl: None, no_embree: None) -> None:
+    result = run("doctor")
+    assert result.code == 1
+    assert result.err.splitlines() == ["error: rendering; neither OpenGL nor Embree works; see the lines above"]
+
+
+def test_without_opengl_doctor_prints_one_json_object(run: Run, no_opengl: None, no_embree: None) -> None:
     result = run("doctor", "--json")
     assert result.code == 1
     assert strict_json(result.out)["backend"] is None

@@ -20,6 +20,16 @@ KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Program", "Query")
 NAMES = range(1, 4000)
 
 
+METHODS = (
+    None,
+    tl.BackFaceDepth(),
+    tl.ThinLayer(),
+    tl.FragmentLists(),
+    tl.DepthPeeling(),
+    tl.KBuffer(),
+)
+
+
 def _counter(renderer: tl.Renderer) -> Callable[[], dict[str, int]]:
     """Counts living OpenGL objects by asking the driver about every name, independent of any bookkeeping of ours."""
     if renderer.gpu.context.backend == "osmesa":
@@ -46,8 +56,7 @@ def test_a_thousand_renders_and_a_hundred_resizes_leave_nothing_behind() -> None
 
         def work(renders: int, resizes: int) -> None:
             for i in range(renders):
-                method = (None, tl.BackFaceDepth(), tl.ThinLayer())[i % 3]
-                renderer.render(_scene(mesh), (32, 24), method)
+                renderer.render(_scene(mesh), (32, 24), METHODS[i % len(METHODS)])
             for i in range(resizes):
                 renderer.render(_scene(mesh), (20 + i % 50, 20))
             renderer.render(_scene(mesh), (32, 24))

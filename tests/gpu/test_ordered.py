@@ -362,7 +362,7 @@ def test_several_samples_average_light_and_leave_layers_at_the_centers(renderer:
 def test_without_shader_storage_the_planner_peels(monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.gpu import renderer as module
 
-    monkeypatch.setattr(module, "_SHADER_STORAGE", 1000)
+    monkeypatch.setattr(module, "SHADER_STORAGE", 1000)
     with tl.Renderer() as renderer:
         frame = renderer.render(shells(3), (32, 24))
         assert frame.plan.method == tl.DepthPeeling()

@@ -19,4 +19,4 @@ def doctor(as_json: bool) -> None:
     facts = examination.examine()
     click.echo(json.dumps(facts) if as_json else examination.report(facts))
     if facts["backend"] is None:
-        raise TranslucentError("OpenGL 3.3", "no backend works without a window", "see the lines above")
+        raise TranslucentError("rendering", "neither OpenGL nor Embree works", "see the lines above")

@@ -42,6 +42,11 @@ from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lin
 )
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
+@click.option(
+    "--opaque-with",
+    type=click.Choice(["pyrender"]),
+    help="Let another renderer draw the opaque objects of a glTF file.",
+)
 @click.option("--backend", metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
 @common_options
 def render(
@@ -61,6 +66,7 @@ def render(
     method_name: str | None,
     thickness: str | None,
     samples: int,
+    opaque_with: str | None,
     backend: str | None,
     as_json: bool,
 ) -> None:
@@ -80,7 +86,12 @@ def render(
     scene = read_scene(model, unit, medium, View(camera, eye, target, up, fov), pixels, environment)
     require_translucent(model, scene)
     with tl.Renderer(backend) as renderer:
-        frame = renderer.render(scene, pixels, method, samples)
+        if opaque_with is None:
+            frame = renderer.render(scene, pixels, method, samples)
+        else:
+            from translucent.interop.pyrender import render_scene
+
+            frame = render_scene(scene, pixels, method, samples, renderer)
     frame.save(output)
     warn_if_black(frame)
     media = medium_lines(scene)
@@ -89,6 +100,8 @@ def render(
         return
     drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
     click.echo(f"{output}: {pixels[0]}x{pixels[1]}, {', '.join(drawn_by)}")
+    if "opaque" in frame.provenance:
+        click.echo(f"opaque objects: {frame.provenance['opaque']}")
     for line in media:
         click.echo(f"medium: {line}")
     click.echo(str(frame.plan))

@@ -25,7 +25,7 @@ from translucent.sampling import sample_shifts
 from translucent.scene import Scene
 
 #: OpenGL from which on shaders write to buffers.
-_SHADER_STORAGE = 430
+SHADER_STORAGE = 430
 
 
 class GpuRenderer:
@@ -72,7 +72,7 @@ class GpuRenderer:
     @property
     def capabilities(self) -> Capabilities:
         """What the planner may count on."""
-        return Capabilities(shader_storage=self.context.gl.version_code >= _SHADER_STORAGE)
+        return Capabilities(shader_storage=self.context.gl.version_code >= SHADER_STORAGE)
 
     def render(
         self,

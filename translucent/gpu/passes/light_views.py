@@ -65,11 +65,6 @@ class LightViewsPass:
             if name != "light_ends" or job.scene.opaque:
                 job.targets.storage(name, 1).bind_to_storage_buffer(binding)
 
-    def release(self) -> None:
-        """Free the targets of the views."""
-        for targets in self._targets.values():
-            targets.release()
-
     def _light_jobs(self, job: FrameJob, light: Light) -> list[FrameJob]:
         cameras = light_cameras(light, job.scene)
         targets = self._targets[_SIDE if len(cameras) == 1 else _CUBE_SIDE]

@@ -1,0 +1,106 @@
+"""``translucent render --opaque-with pyrender``."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from translucent.cli import main
+from translucent.materials.gltf_file import read_gltf, write_gltf
+
+Run = Callable[..., tuple[int, str, str]]
+
+GLASS = {
+    "KHR_materials_transmission": {"transmissionFactor": 1},
+    "KHR_materials_volume": {"thicknessFactor": 1, "attenuationColor": [0.25, 0.5, 1], "attenuationDistance": 0.5},
+}
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
+
+    def _run(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return _run
+
+
+def write(path: Path, *materials: dict[str, Any]) -> Path:
+    """A file with a box of 1 m for each material, the second behind the first, and a lamp in front."""
+    boxes = trimesh.Scene()
+    for i in range(len(materials)):
+        shift = trimesh.transformations.translation_matrix((0.3 * i, 0, -1.5 * i))
+        boxes.add_geometry(trimesh.creation.box((1, 1, 1)), f"Box {i}", f"Box {i}", transform=shift)
+    path.write_bytes(boxes.export(file_type="glb"))
+    file = read_gltf(path)
+    file.tree["materials"] = list(materials)
+    for i, mesh in enumerate(file.tree["meshes"]):
+        mesh["primitives"][0]["material"] = i
+    file.tree["extensionsUsed"] = ["KHR_lights_punctual"]
+    file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 30.0}]}}
+    file.tree["nodes"].append({"translation": [0, 2, 4], "extensions": {"KHR_lights_punctual": {"light": 0}}})
+    file.tree["scenes"][0]["nodes"].append(len(file.tree["nodes"]) - 1)
+    write_gltf(file, path)
+    return path
+
+
+def test_pyrender_draws_the_opaque_objects_of_a_file(pyrender: ModuleType, run: Run, tmp_path: Path) -> None:
+    red = {"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.1, 0.1, 1]}}
+    model = write(tmp_path / "scene.glb", {"extensions": GLASS}, red)
+    arrays = {}
+    for name, options in (("own", ()), ("pyrender", ("--opaque-with", "pyrender"))):
+        output = tmp_path / f"{name}.npz"
+        code, out, err = run("render", model, "-o", output, "--size", "64x48", "--samples", 4, *options)
+        assert (code, err) == (0, "")
+        with np.load(output) as file:
+            arrays[name] = dict(file)
+    assert "opaque objects: pyrender 0.1.45 through arrays" in out
+    assert "1. backdrop: opaque objects come as a picture drawn elsewhere" in out
+    own, drawn = arrays["own"], arrays["pyrender"]
+    np.testing.assert_allclose(drawn["thickness"], own["thickness"], atol=1e-5)
+    red_box = (own["radiance"][..., 0] > 3 * own["radiance"][..., 1]) & (own["transmittance"] == 1).all(axis=-1)
+    assert red_box.sum() > 50
+    assert (drawn["radiance"][red_box] != own["radiance"][red_box]).any()
+    ratio = drawn["radiance"][red_box].mean() / own["radiance"][red_box].mean()
+    assert 0.85 < ratio < 1.2
+
+
+def test_the_record_says_what_drew_the_opaque_objects(pyrender: ModuleType, run: Run, tmp_path: Path) -> None:
+    model = write(tmp_path / "scene.glb", {"extensions": GLASS}, {})
+    code, out, _ = run(
+        "render",
+        model,
+        "-o",
+        tmp_path / "a.png",
+        "--size",
+        "32x24",
+        "--samples",
+        1,
+        "--opaque-with",
+        "pyrender",
+        "--json",
+    )
+    assert code == 0
+    assert json.loads(out)["provenance"]["opaque"] == "pyrender 0.1.45 through arrays"
+
+
+def test_it_needs_something_opaque_and_a_known_name(pyrender: ModuleType, run: Run, tmp_path: Path) -> None:
+    model, output = write(tmp_path / "scene.glb", {"extensions": GLASS}), tmp_path / "a.png"
+    code, _, err = run("render", model, "-o", output, "--size", "32x24", "--opaque-with", "pyrender")
+    assert code == 2
+    assert err == ("error: drawing opaque objects with pyrender; 'Box 0': all have media; render without pyrender\n")
+    code, _, err = run("render", model, "-o", output, "--opaque-with", "blender")
+    assert code == 2
+    assert "'blender' is not" in err
+    assert not output.exists()

@@ -1,0 +1,280 @@
+"""pyrender draws what is opaque, and translucent objects are shaded over it.
+
+Without a window, set ``PYOPENGL_PLATFORM=egl`` in the environment before anything imports pyrender: PyOpenGL, which
+pyrender draws with, binds itself to one window system when it is first imported, and that has to be the one of the
+renderer's context. Where they differ, pyrender draws in a context of its own, and the picture is copied.
+
+pyrender's pictures have 8 bits, which hold radiance to the power of 1 / 2.2, cut off at 1. Decoded, they are off by at
+most 1.1 / 255 of white, and by less where it is darker: 0.5 / 255 * 2.2 * L^(6/11) at a radiance L. Edges are the mean
+of four samples of these encoded values, as pyrender makes them.
+
+Units are the same: a `PointLight` of pyrender has W/sr, a `DirectionalLight` W/m^2 on a surface that faces it, each its
+intensity times its color, and `ambient_light` is the radiance of a constant environment.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from translucent.backdrop import Backdrop
+from translucent.camera import check_size
+from translucent.errors import InputError, RenderError
+from translucent.interop._pyrender_shim import load_pyrender
+from translucent.medium import Medium
+from translucent.scene import Overlap, Scene
+from translucent.thickness import Method
+
+if TYPE_CHECKING:
+    from translucent.frame import Frame
+    from translucent.renderer import Renderer
+
+#: What pyrender sees first is taken to be this share nearer: it may lie between the pixel centers that were looked at.
+_NEARER = 0.5
+
+
+def scene_from_pyrender(
+    scene: Any, media: Mapping[str, Medium], size: tuple[int, int], overlap: Overlap = "add"
+) -> Scene:
+    """The translucent objects of a pyrender scene, with its camera and lights.
+
+    Parameters
+    ----------
+    scene : pyrender.Scene
+    media : dict of str to Medium
+        What fills the visible nodes of this name, or those whose mesh has it; the name of the node comes first.
+    size : (width, height)
+        Of the picture, in pixels, which some cameras of pyrender depend on.
+    overlap : {"add", "union", "priority"}
+        As for `Scene`.
+
+    Returns
+    -------
+    Scene
+        Meshes are welded and wound as by `load_mesh`. The environment is the background color of the pyrender scene.
+        Spot lights are left out, with a `TranslucentWarning`. The camera's clipping planes do not clip media.
+
+    Raises
+    ------
+    InputError
+        If no visible node has one of the names, a mesh has points or lines, or there is no camera; if the camera
+        stretches the picture, looks beside its middle, or is scaled; if the transform of a light is singular.
+    RenderError
+        If pyrender cannot be imported.
+    """
+    load_pyrender()
+    from translucent.interop._pyrender_reading import converted
+
+    return converted(scene, media, check_size(size), overlap)
+
+
+def backdrop_from_pyrender(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int = 0) -> Backdrop:
+    """Everything else of a pyrender scene as a picture, drawn by pyrender in an OpenGL context of its own.
+
+    Parameters
+    ----------
+    scene : pyrender.Scene
+        Is left as it is.
+    translucent : collection of str
+        Names of the nodes or meshes to leave out, as for `scene_from_pyrender`.
+    size : (width, height)
+        In pixels.
+    flags : int
+        `pyrender.RenderFlags` for shadows, culling and wireframes.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a flag makes no picture.
+    RenderError
+        If pyrender cannot be imported, or has no OpenGL.
+    """
+    load_pyrender()
+    from translucent.interop._pyrender_drawing import drawn_apart
+
+    size = check_size(size)
+    return drawn_apart(_opaque_part(scene, translucent, size, flags), size, flags).backdrop()
+
+
+def render(
+    scene: Any,
+    media: Mapping[str, Medium],
+    size: tuple[int, int],
+    method: Method | None = None,
+    samples: int = 1,
+    renderer: Renderer | None = None,
+    shared: bool | None = None,
+    flags: int = 0,
+    overlap: Overlap = "add",
+) -> Frame:
+    """Render a pyrender scene: pyrender draws its opaque objects, and translucent ones are shaded over them.
+
+    Parameters
+    ----------
+    scene : pyrender.Scene
+        Is left as it is, and may be in use by a renderer of pyrender.
+    media, size, overlap
+        As for `scene_from_pyrender`.
+    method, samples
+        As for `Renderer.render`. What pyrender draws is the same for all samples.
+    renderer : Renderer, optional
+        Default: a new one for this frame.
+    shared : bool, optional
+        True: pyrender draws in the OpenGL context of the renderer, and nothing is read back. False: in one of its own,
+        and arrays are copied. None: shared where that works. ``frame.provenance["opaque"]`` says which, and why.
+    flags : int
+        `pyrender.RenderFlags` for shadows, culling and wireframes. Media cast no shadows.
+
+    Returns
+    -------
+    Frame
+        What pyrender blends by alpha counts as opaque where it is.
+
+    Raises
+    ------
+    InputError
+        As `scene_from_pyrender`, and if a flag makes no picture.
+    RenderError
+        If pyrender cannot be imported or has no OpenGL, or cannot share the context although it is told to.
+    """
+    from translucent.renderer import Renderer
+
+    if renderer is None:
+        with Renderer() as made:
+            return render(scene, media, size, method, samples, made, shared, flags, overlap)
+    context = renderer.gpu.context
+    pyrender = load_pyrender(context.backend)
+    from translucent.interop import _pyrender_drawing as drawing
+
+    size = check_size(size)
+    ours = scene_from_pyrender(scene, media, size, overlap)
+    opaque = _opaque_part(scene, media, size, flags)
+    why_apart = "asked for" if shared is False else drawing.why_not_in(context)
+    if why_apart is None:
+        with drawing.drawn_in(context, opaque, size, flags) as textures:
+            frame = renderer.render(ours, size, method, samples, textures)
+        how = "in the same OpenGL context"
+    else:
+        _require_copying(why_apart, owned=context.owned, shared=shared)
+        arrays = drawing.drawn_apart(opaque, size, flags).backdrop()
+        frame = renderer.render(ours, size, method, samples, arrays)
+        how = f"through arrays: {why_apart}"
+    frame.provenance["opaque"] = f"pyrender {pyrender.__version__} {how}"
+    return frame
+
+
+def _require_copying(why: str, *, owned: bool, shared: bool | None) -> None:
+    if shared:
+        raise RenderError(
+            "sharing an OpenGL context with pyrender",
+            why,
+            "leave shared out, or bind PyOpenGL to the same window system: without a window, set PYOPENGL_PLATFORM=egl "
+            "before anything imports pyrender",
+        )
+    if not owned:
+        raise RenderError(
+            "copying a picture of pyrender",
+            f"{why}; the renderer draws in a context of somebody else, which pyrender's own would displace",
+            "give another renderer, or set PYOPENGL_PLATFORM for the window before anything imports pyrender",
+        )
+
+
+def to_pyrender(scene: Scene) -> Any:
+    """The opaque objects of a scene as a pyrender scene, with its camera and lights.
+
+    The eye is at the origin of it, since pyrender's coordinates are float32. Faces are flat and reflect alike on both
+    sides. Of the environment it has the light, as the mean from everywhere, and a background without opacity.
+
+    Returns
+    -------
+    pyrender.Scene
+
+    Raises
+    ------
+    InputError
+        If nothing is opaque, or there are more lights of a kind than pyrender draws with.
+    RenderError
+        If pyrender cannot be imported.
+    """
+    load_pyrender()
+    from translucent.interop._pyrender_writing import written
+
+    _require_opaque(scene)
+    return written(scene)
+
+
+def render_scene(
+    scene: Scene,
+    size: tuple[int, int],
+    method: Method | None = None,
+    samples: int = 1,
+    renderer: Renderer | None = None,
+) -> Frame:
+    """Render a scene of the toolkit, whose opaque objects pyrender draws.
+
+    They reflect as pyrender's rough dielectrics do. The environment is seen behind them.
+
+    Parameters
+    ----------
+    scene : Scene
+        With at least one opaque object.
+    size, method, samples
+        As for `Renderer.render`.
+    renderer : Renderer, optional
+        Default: a new one for this frame.
+
+    Raises
+    ------
+    InputError
+        As `to_pyrender` and `Renderer.render`.
+    RenderError
+        If pyrender cannot be imported or has no OpenGL.
+    """
+    from translucent.renderer import Renderer
+
+    if renderer is None:
+        with Renderer() as made:
+            return render_scene(scene, size, method, samples, made)
+    _require_opaque(scene)
+    context = renderer.gpu.context
+    _require_copying("its opaque objects always come so", owned=context.owned, shared=None)
+    pyrender = load_pyrender(context.backend)
+    from translucent.interop._pyrender_drawing import drawn_apart
+    from translucent.interop._pyrender_writing import written
+
+    size = check_size(size)
+    picture = drawn_apart(written(scene), size, 0)
+    # Depth has most of its digits near the camera: once that is known, it need not begin at the eye.
+    nearest = float(picture.depth.min())
+    if scene.camera.fov_y is not None and np.isfinite(nearest):
+        picture = drawn_apart(written(scene, _NEARER * nearest), size, 0)
+    backdrop = picture.before(scene.environment, scene.camera)
+    frame = renderer.render(dataclasses.replace(scene, objects=scene.bodies), size, method, samples, backdrop)
+    frame.provenance["opaque"] = f"pyrender {pyrender.__version__} through arrays"
+    return frame
+
+
+def _require_opaque(scene: Scene) -> None:
+    if not scene.opaque:
+        names = ", ".join(repr(body.mesh.name) for body in scene.bodies)
+        raise InputError("drawing opaque objects with pyrender", f"{names}: all have media", "render without pyrender")
+
+
+def _opaque_part(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int) -> Any:
+    """What pyrender is to draw, checked."""
+    from translucent.interop._pyrender_drawing import PICTURE_FLAGS
+    from translucent.interop._pyrender_reading import camera_of, translucent_nodes
+    from translucent.interop._pyrender_twins import opaque_part
+
+    if flags & ~PICTURE_FLAGS:
+        raise InputError(
+            f"pyrender flags {flags}",
+            f"{flags & ~PICTURE_FLAGS} is not for shadows of directional or spot lights, culling or wireframes",
+            "leave it out",
+        )
+    hidden = [node for node, _ in translucent_nodes(scene, translucent)]
+    camera_of(scene, size)
+    return opaque_part(scene, hidden)
