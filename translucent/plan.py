@@ -111,7 +111,11 @@ def plan_over_backdrop(
         )
     chosen = plan(scene, method, capabilities)
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
-    return dataclasses.replace(chosen, passes=(PassSpec("backdrop", reason, cost=COSTS["resolve"]), *chosen.passes))
+    return dataclasses.replace(
+        chosen,
+        passes=(PassSpec("backdrop", reason, cost=COSTS["resolve"]), *chosen.passes),
+        unmodelled=(*chosen.unmodelled, "shadows between the media and what is drawn elsewhere"),
+    )
 
 
 def _why_order_matters(scene: Scene, method: Method | None) -> str | None:
