@@ -23,6 +23,7 @@ from translucent.thickness import (
     KBuffer,
     Method,
     OrderedMethod,
+    RayMarched,
     SignedDepth,
     ThinLayer,
 )
@@ -76,7 +77,9 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
     if scene.overlap == "priority":
         require_clear_priorities(scene)
     if not capabilities.opengl:
-        return _plan_traced(scene, method)
+        return _plan_traced(scene, method, capabilities)
+    if isinstance(method, RayMarched) or any(body.density is not None for body in scene.bodies):
+        raise _no_marching(scene)
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
     if (why := _why_order_matters(scene, method)) is not None:
@@ -156,7 +159,17 @@ def _light_views(scene: Scene) -> PassSpec:
     return PassSpec("light_views", reason, solids, lights, cost=lights * COSTS["fragment_lists"])
 
 
-def _plan_traced(scene: Scene, method: Method | None) -> RenderPlan:
+def _no_marching(scene: Scene) -> InputError:
+    """What to say where rays would have to be marched, which no pass does."""
+    dense = [body for body in scene.bodies if body.density is not None]
+    return InputError(
+        f"rendering {_names(dense)} with a density that varies" if dense else "RayMarched",
+        "no pass of the renderer marches rays",
+        "march them on the CPU: tl.reference.march(scene, size)",
+    )
+
+
+def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities) -> RenderPlan:
     """The plan of a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
     chosen = method or FragmentLists()
     sheets = isinstance(method, ThinLayer)
@@ -166,7 +179,8 @@ def _plan_traced(scene: Scene, method: Method | None) -> RenderPlan:
         PassSpec("shade", "sheets in order" if sheets else "the intervals between them in order, exactly"),
     )
     limits += mesh_limits(scene, chosen)
-    return RenderPlan(chosen, passes, True, tuple(limits), unmodelled_effects(scene, scatters=False))
+    scatters = capabilities.scattering and _scatters(scene)
+    return RenderPlan(chosen, passes, True, tuple(limits), unmodelled_effects(scene, scatters=scatters))
 
 
 def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilities, why: str) -> RenderPlan:

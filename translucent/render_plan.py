@@ -18,10 +18,14 @@ class Capabilities:
         Shaders can write to buffers: OpenGL 4.3.
     opengl : bool
         There is OpenGL at all; else rays are traced on the CPU, which finds all intervals whatever the method.
+
+    scattering : bool
+        Light that media scatter can be followed.
     """
 
     shader_storage: bool = True
     opengl: bool = True
+    scattering: bool = True
 
 
 @dataclass(frozen=True)

@@ -460,3 +460,42 @@ def test_an_unknown_order_of_peeling_names_the_known_ones(order: Any) -> None:
     message = f"DepthPeeling order {order!r}; not known; use one of both-ends, front-to-back, back-to-front"
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         tl.DepthPeeling(order=order)
+
+
+# Without OpenGL, and what no pass does
+
+
+@pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.KBuffer(k=2), tl.ThinLayer(0.01)], ids=str)
+def test_without_opengl_rays_find_all_intervals_whatever_the_method(method: Any) -> None:
+    found = plan(scene(body(FIRE), body(WINE, x=0.5), body(None), overlap="union"), method, Capabilities(opengl=False))
+    assert names(found) == ["intersect", "shade"]
+    assert found.passes[0].objects == (0, 1, 2)
+    assert "no OpenGL" in found.passes[0].reason
+    # Of all that the methods could leave out, only what ThinLayer means to is.
+    assert found.exact == (not isinstance(method, tl.ThinLayer))
+
+
+def test_without_opengl_slots_and_emitting_sheets_are_no_limit() -> None:
+    media = [tl.Medium(absorption=i + 1.0, emission=1.0) for i in range(20)]
+    assert plan(scene(*[body(medium) for medium in media]), None, Capabilities(opengl=False)).exact
+    assert plan(scene(*[sheet(medium) for medium in media]), None, Capabilities(opengl=False)).exact
+
+
+@pytest.mark.parametrize(
+    ("scattering", "told"), [(True, "light scattered more than once"), (False, "in-scattered light")]
+)
+def test_without_opengl_light_may_be_followed_or_not(scattering: bool, told: str) -> None:
+    lit = scene(body(tl.Medium(scattering=1.0)), lights=[tl.DirectionalLight((0, -1, 0), (1, 1, 1))])
+    found = plan(lit, None, Capabilities(opengl=False, scattering=scattering))
+    assert found.unmodelled[0].startswith(told)
+
+
+def test_rays_that_would_have_to_be_marched_are_refused() -> None:
+    with pytest.raises(
+        tl.InputError, match=r"RayMarched; no pass of the renderer marches rays; .*tl\.reference\.march"
+    ):
+        plan(scene(body()), tl.RayMarched())
+    cloud = body(density=tl.DensityGrid(np.ones((2, 2, 2))))
+    with pytest.raises(tl.InputError, match=r"rendering 'box' with a density that varies; no pass"):
+        plan(scene(cloud))
+    assert plan(scene(cloud), None, Capabilities(opengl=False)).exact

@@ -60,7 +60,7 @@ class CpuRenderer:
     @property
     def capabilities(self) -> Capabilities:
         """What the planner may count on."""
-        return Capabilities(shader_storage=False, opengl=False)
+        return Capabilities(shader_storage=False, opengl=False, scattering=False)
 
     def render(self, scene: Scene, size: tuple[int, int], plan: RenderPlan, samples: int) -> Frame:
         """Render a scene.

@@ -63,4 +63,4 @@ def light_cameras(light: Light, scene: Scene) -> list[Camera]:
 
 def _any_up(direction: Array) -> Array:
     """A unit axis that is far from a direction."""
-    return np.eye(3)[int(np.abs(direction).argmin())]
+    return np.asarray(np.eye(3)[int(np.abs(direction).argmin())])

@@ -249,7 +249,7 @@ def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightV
         scatter_right=[*(camera.right * half_width), 0.0],
         scatter_up=[*(camera.up * half_height), 0.0],
         scatter_off_axis=[*off_axis, 0.0],
-        scatter_near=[media.near, media.near - center @ camera.forward, float(camera.fov_y is not None), 0.0],
+        scatter_near=[media.near, media.near - float(center @ camera.forward), float(camera.fov_y is not None), 0.0],
         scatter_light_place=place,
         scatter_light_power=power,
         scatter_light_views=spans,
