@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from translucent.camera import Camera
 from translucent.color import parse_color
+from translucent.density import Density
 from translucent.errors import InputError
 from translucent.lights import ColorLike, DirectionalLight, Environment, PointLight
 from translucent.medium import Medium
@@ -43,6 +44,9 @@ class Object:
         Declares the mesh a thin sheet of this thickness in metres, not the border of a solid.
     color : str or array_like (3,)
         What an opaque object diffusely reflects, 0 to 1: a color as text, or linear RGB.
+    density : DensityGrid, LinearDensity or ExponentialDensity, optional
+        Scales absorption, scattering and emission of the medium from place to place, over the bounds of the mesh in
+        object space. Default: homogeneous.
     """
 
     mesh: Mesh
@@ -51,6 +55,7 @@ class Object:
     priority: int = 0
     sheet_thickness: float | None = None
     color: ColorLike = OPAQUE_COLOR
+    density: Density | None = None
 
     def __post_init__(self) -> None:
         _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
@@ -78,6 +83,11 @@ class Object:
                 "give metres, for example 1e-3",
             )
         object.__setattr__(self, "color", _reflectance(self.color, self.mesh.name))
+        if self.density is not None:
+            _require_type("density of an object", self.density, get_args(Density), "use for example tl.DensityGrid")
+            if self.medium is None or self.sheet_thickness is not None:
+                what = "opaque" if self.medium is None else "a sheet, which has no inside"
+                raise InputError(f"density of {self.mesh.name!r}", f"it is {what}", "give it a medium to fill, or none")
 
     def __repr__(self) -> str:
         return f"Object({self.mesh!r}, {self.medium!r})"

@@ -184,3 +184,30 @@ def test_an_infinite_way_through_nothing_loses_nothing() -> None:
 def test_what_no_float32_could_carry_is_refused(values: dict[str, float], message: str) -> None:
     with pytest.raises(tl.InputError, match=message):
         Medium(**values)
+
+
+def test_particles_cover_what_they_project() -> None:
+    """Max 1995: sigma_t = rho pi r^2, of which the albedo scatters; what absorbs also glows."""
+    medium = Medium.from_particles(1e6, 1e-3, albedo=(0.0, 0.25, 1.0), glow=(1.0, 2.0, 3.0), anisotropy=-0.3)
+    assert medium.extinction == pytest.approx([math.pi] * 3, rel=1e-15)
+    assert medium.scattering == pytest.approx([0, 0.25 * math.pi, math.pi], rel=1e-15)
+    # Without background a deep medium of them shines as they do, where they do not scatter.
+    assert medium.emission == pytest.approx([math.pi, 1.5 * math.pi, 0], rel=1e-15)
+    assert medium.anisotropy == -0.3
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"number_density": -1.0, "radius": 1.0}, "number_density -1.0; not a number of 0 and above"),
+        ({"number_density": 1.0, "radius": NAN}, "radius nan"),
+        ({"number_density": 1.0, "radius": INF}, "radius inf"),
+        ({"number_density": 1.0, "radius": 1.0, "albedo": 1.5}, "albedo .* above 1"),
+        ({"number_density": 1.0, "radius": 1.0, "albedo": -0.1}, "albedo .* negative"),
+        ({"number_density": 1.0, "radius": 1.0, "glow": NAN}, "glow .* not finite"),
+        ({"number_density": 1e300, "radius": 1e300}, "not finite"),
+    ],
+)
+def test_particles_that_cannot_be(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(tl.InputError, match=message):
+        Medium.from_particles(**values)

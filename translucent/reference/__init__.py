@@ -2,6 +2,8 @@
 
 from translucent.reference.hits import Hits, camera_hits, line_hits
 from translucent.reference.intervals import Intervals
+from translucent.reference.march import march
+from translucent.reference.path_trace import path_trace
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import hit_counts, render, shade_hits
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
@@ -14,6 +16,8 @@ __all__ = [
     "camera_hits",
     "hit_counts",
     "line_hits",
+    "march",
+    "path_trace",
     "pixel_rays",
     "render",
     "shade_hits",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,24 +13,40 @@ import numpy.typing as npt
 
 from translucent import optics
 from translucent.camera import check_size
-from translucent.frame import ARRAYS, Frame
+from translucent.errors import InputError
+from translucent.frame import Frame
 from translucent.plan import plan
 from translucent.reference.compositing import composite
+from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits, line_hits
 from translucent.reference.intervals import scene_intervals
-from translucent.reference.opaque import nearest_opaque, reflected_radiance
+from translucent.reference.light_paths import LightPaths
+from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
 from translucent.reference.rays import Rays, pixel_rays
-from translucent.reference.segments import scene_segments
+from translucent.reference.scattering import scattered_once
+from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
+from translucent.reference.volume import Volume, volume_segments
+from translucent.render_plan import Capabilities
 from translucent.scene import Scene
 from translucent.thickness import Method, ThinLayer
 
 #: Surfaces, times objects, that are put in order at a time: the working arrays stay below 500 MB.
 CHUNK = 1 << 24
 
+#: What the planner may count on: rays are traced, and light is followed into media.
+TRACED = Capabilities(shader_storage=False, opengl=False)
 
-def render(scene: Scene, size: tuple[int, int], method: Method | None = None) -> Frame:
+#: Relative error of scattered light, unless told otherwise.
+TOLERANCE = 1e-6
+
+
+def render(scene: Scene, size: tuple[int, int], method: Method | None = None, tolerance: float = TOLERANCE) -> Frame:
     """True thickness, transmittance and radiance of a scene.
+
+    Radiance holds what is behind, what media emit, and the light of all lights that solid media scatter once; not what
+    they scatter out of the environment, what sheets scatter, or what is scattered twice (`path_trace` has it all).
+    Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
 
     Parameters
     ----------
@@ -39,34 +56,49 @@ def render(scene: Scene, size: tuple[int, int], method: Method | None = None) ->
     method : Method, optional
         `ThinLayer` makes every surface of a medium a sheet; a sheet's own declared thickness goes first. All other
         methods are ways to the same true thickness.
+    tolerance : float
+        Relative error of scattered light, at most, 1e-12 to 1. All else is exact.
 
     Returns
     -------
     Frame
-        Of float64 arrays; `shade_hits` tells what is valid.
+        Of float64 arrays; `shade_hits` tells what is valid. Also invalid is a pixel whose scattered light misses the
+        tolerance, since its ray meets a point light inside a medium, or comes through the hole of a body. With
+        scattered light, ``provenance["scattering error"]`` is the largest estimated error of a valid pixel, relative to
+        its brightest channel.
 
     Raises
     ------
     InputError
-        If the size is not one, or the planner refuses the scene.
+        If the size is not one, the tolerance not in its range, or the planner refuses the scene.
     """
     start = time.perf_counter()
     size = check_size(size)
-    chosen = plan(scene, method if isinstance(method, ThinLayer) else None)
-    hits = _scene_hits(scene, size)
+    if not 1e-12 <= tolerance <= 1:
+        raise InputError(f"tolerance {tolerance}", "not in 1e-12 to 1", f"use for example {TOLERANCE:g}")
+    chosen = plan(scene, method if isinstance(method, ThinLayer) else None, TRACED)
+    hits = scene_hits(scene, size)
     crossed = time.perf_counter()
     rays, sheets = pixel_rays(scene.camera, size), sheet_thicknesses(scene, method)
-    parts = [
-        shade_hits(scene, rays.where(part), [_along(line, part) for line in hits], sheets)
-        for part in _parts(hits, len(rays))
-    ]
-    arrays = {name: np.concatenate([part[name] for part in parts]) for name in ARRAYS}
+    paths = LightPaths(scene, sheets) if scene.lights and Volume(scene).scatters else None
+    found = []
+    for part in _parts(hits, len(rays)):
+        own = rays.where(part), [_along(line, part) for line in hits]
+        shaded = shade_hits(scene, *own, sheets)
+        if paths is not None:
+            _add_scattered(shaded, scene, *own, paths, tolerance)
+        found.append(shaded)
+    arrays = {name: np.concatenate([shaded[name] for shaded in found]) for name in found[0]}
+    provenance = {"backend": "reference", "numpy": np.__version__}
+    if paths is not None:
+        error = arrays.pop("error")[arrays["valid"]]
+        provenance["scattering error"] = f"{error.max(initial=0.0):.1e}"
     end = time.perf_counter()
     return Frame(
         **{name: array.reshape(size[::-1] + array.shape[1:]) for name, array in arrays.items()},
         plan=chosen,
         seconds={"intersect": crossed - start, "shade": end - crossed, "total": end - start},
-        provenance={"backend": "reference", "numpy": np.__version__},
+        provenance=provenance,
     )
 
 
@@ -93,18 +125,11 @@ def shade_hits(
         before an opaque surface stops it. Invalid is one that ends inside a solid though nothing stops it, that a
         solid's faces wind around a negative number of times, or whose optical depth overflows.
     """
-    wall = nearest_opaque(scene, hits, len(rays))
-    solids = [i for i, body in enumerate(scene.objects) if body.medium is not None and sheets[i] is None]
-    intervals, defective = scene_intervals(scene, hits, solids, wall.distance)
-    crossings = scene_crossings(scene, rays, hits, sheets, wall.distance)
-    segments = scene_segments(scene, intervals, crossings)
+    media = crossed_media(scene, Volume(scene), rays, hits, sheets)
+    segments, defective = media.segments, media.defective
     emitted, depth = composite(segments, len(rays))
     transmittance = optics.transmittance(depth)
-    behind = np.where(
-        np.isinf(wall.distance)[:, None],
-        scene.environment.radiance(rays.directions, rays.backdrop),
-        reflected_radiance(scene, rays, wall),
-    )
+    behind = seen_behind(scene, rays, media.wall)
     coverage = defective.copy()
     coverage[segments.pixel] = True
     with np.errstate(under="ignore"):
@@ -119,10 +144,70 @@ def shade_hits(
     }
 
 
+@dataclass(frozen=True, eq=False)
+class CrossedMedia:
+    """What rays cross before an opaque surface stops them.
+
+    Attributes
+    ----------
+    wall : OpaqueHits
+        What stops them.
+    segments : Segments
+    filling : (k, n) float64
+        What fills each segment; `Volume` explains it.
+    defective : (n,) bool
+        Rays on which some body shows a hole or faces wound wrongly.
+    """
+
+    wall: OpaqueHits
+    segments: Segments
+    filling: npt.NDArray[np.float64]
+    defective: npt.NDArray[np.bool_]
+
+
+def crossed_media(
+    scene: Scene, volume: Volume, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
+) -> CrossedMedia:
+    """What rays cross, from all surfaces on them; parameters as for `shade_hits`, and the `Volume` of the scene."""
+    wall = nearest_opaque(scene, hits, len(rays))
+    solids = [i for i, body in enumerate(scene.objects) if body.medium is not None and sheets[i] is None]
+    intervals, defective = scene_intervals(scene, hits, solids, wall.distance)
+    crossings = scene_crossings(scene, rays, hits, sheets, wall.distance)
+    segments, filling = volume_segments(scene, volume, rays, intervals, crossings)
+    segments = emission_of_mixtures(volume, rays, segments, filling)
+    return CrossedMedia(wall, segments, filling, defective)
+
+
+def seen_behind(scene: Scene, rays: Rays, wall: OpaqueHits) -> npt.NDArray[np.float64]:
+    """(n, 3): radiance behind all media, of the environment or of what stops the rays."""
+    return np.where(
+        np.isinf(wall.distance)[:, None],
+        scene.environment.radiance(rays.directions, rays.backdrop),
+        reflected_radiance(scene, rays, wall),
+    )
+
+
+def _add_scattered(
+    shaded: dict[str, npt.NDArray[Any]],
+    scene: Scene,
+    rays: Rays,
+    hits: Sequence[Hits],
+    paths: LightPaths,
+    tolerance: float,
+) -> None:
+    """Add light scattered once to what `shade_hits` gives, and its relative ``error`` (n,)."""
+    media = crossed_media(scene, paths.volume, rays, hits, paths.sheets)
+    light = scattered_once(paths, rays, media.segments, media.filling, tolerance)
+    brightest = light.radiance.max(axis=1)
+    shaded["radiance"] = shaded["radiance"] + light.radiance
+    shaded["valid"] = shaded["valid"] & light.valid
+    shaded["error"] = light.error.max(axis=1) / np.where(brightest > 0, brightest, 1.0)
+
+
 def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
     """(h, w): how many surfaces of media each pixel's ray crosses before an opaque one stops it."""
     width, height = check_size(size)
-    hits = _scene_hits(scene, (width, height))
+    hits = scene_hits(scene, (width, height))
     end = nearest_opaque(scene, hits, width * height).distance
     counts = np.zeros(width * height, dtype=np.int64)
     for body, line in zip(scene.objects, hits, strict=True):
@@ -132,7 +217,8 @@ def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
     return counts.reshape(height, width)
 
 
-def _scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
+def scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
+    """All surfaces of each object on the pixel rays, as `line_hits` gives them."""
     return [line_hits(body.mesh, body.matrix, scene.camera, size) for body in scene.objects]
 
 

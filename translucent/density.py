@@ -1,0 +1,251 @@
+"""Relative density inside a body: what scales its medium from place to place.
+
+Positions are in the unit box of the body: 0 to 1 along each axis of the mesh's bounds in object space, as in a 3D
+texture. An affine transform keeps straight lines straight, so means along them hold in the world as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: Largest relative density: its products with extinctions and lengths of any scene stay within float32.
+MAX_DENSITY = 1e12
+
+#: Pieces of segments that a grid integrates at a time: the working arrays stay below 100 MB.
+CHUNK = 1 << 18
+
+#: Gauss-Legendre points of [0, 1] that integrate cubics exactly, and trilinear density is cubic along a line.
+_GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DensityGrid:
+    """Density from samples: trilinear between the centers of the voxels, constant from there to the border.
+
+    Parameters
+    ----------
+    values : array_like (nx, ny, nz)
+        Relative density, >= 0; sample [i, j, k] is at ((i + 0.5) / nx, (j + 0.5) / ny, (k + 0.5) / nz) of the unit
+        box. One voxel is a constant.
+
+    Raises
+    ------
+    InputError
+        If the array is empty or not of three dimensions, or a value is negative, not finite or above 1e12.
+    """
+
+    values: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        try:
+            values = np.array(self.values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError("density grid", "not numbers", "give an array (nx, ny, nz)") from None
+        if values.ndim != 3 or not values.size:
+            raise InputError(
+                "density grid", f"shape {values.shape}, not (nx, ny, nz)", "give at least one voxel along each axis"
+            )
+        bad = ~((values >= 0) & (values <= MAX_DENSITY))
+        if bad.any():
+            where = tuple(int(i) for i in np.argwhere(bad)[0])
+            raise InputError(
+                "density grid",
+                f"{int(bad.sum())} values not in 0 to {MAX_DENSITY:g}, the first is {values[where]} at {where}",
+                "replace them, for example by 0",
+            )
+        values.setflags(write=False)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def load(cls, path: str | Path) -> DensityGrid:
+        """Read the array of a NumPy file (``.npy``); raises `InputError` if there is none that can be used."""
+        where = f"density grid {str(path)!r}"
+        try:
+            with Path(path).open("rb") as stream:
+                values = np.lib.format.read_array(stream, allow_pickle=False)
+        except OSError as error:
+            raise InputError(where, f"it cannot be read ({error.strerror})", "check the path") from None
+        except (ValueError, EOFError) as error:
+            raise InputError(where, f"not a NumPy array ({error})", "write it with numpy.save") from None
+        return cls(values)
+
+    def __repr__(self) -> str:
+        return f"DensityGrid of {' x '.join(str(n) for n in np.shape(self.values))} voxels"
+
+    @property
+    def maximum(self) -> float:
+        """Largest density."""
+        return float(np.max(self.values))
+
+    def at(self, points: npt.ArrayLike) -> Array:
+        """(...,): density at points (..., 3)."""
+        values = np.asarray(self.values)
+        count = np.array(values.shape)
+        place = np.clip(np.asarray(points, dtype=np.float64) * count - 0.5, 0.0, count - 1.0)
+        low = np.minimum(place.astype(np.int64), np.maximum(count - 2, 0))
+        share = place - low
+        high = np.minimum(low + 1, count - 1)
+        with np.errstate(under="ignore"):
+            (x, y, z), (u, v, w) = (np.moveaxis(np.stack([low, high]), -1, 0), np.moveaxis(share, -1, 0))
+            rows = [values[x[i], y[j], z[0]] * (1 - w) + values[x[i], y[j], z[1]] * w for i in (0, 1) for j in (0, 1)]
+            return np.asarray((rows[0] * (1 - v) + rows[1] * v) * (1 - u) + (rows[2] * (1 - v) + rows[3] * v) * u)
+
+    def mean_between(self, start: Array, end: Array) -> Array:
+        """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding.
+
+        Between the planes through the centers of voxels the density is a cubic of the position on the line.
+        """
+        count = np.array(np.shape(self.values))
+        begin, stop = start * count - 0.5, end * count - 0.5
+        ends = np.cumsum(3 + np.abs(stop - begin).sum(axis=1).astype(np.int64))
+        means = np.zeros(len(start))
+        first = 0
+        while first < len(start):
+            done = ends[first - 1] if first else 0
+            last = max(int(np.searchsorted(ends, done + CHUNK, side="right")), first + 1)
+            means[first:last] = self._means(begin[first:last], stop[first:last])
+            first = last
+        return means
+
+    def _means(self, begin: Array, stop: Array) -> Array:
+        """`mean_between` in voxels, counted from the center of the first."""
+        count = np.array(np.shape(self.values))
+        line = np.arange(len(begin))
+        cuts = [_cuts(begin[:, axis], stop[:, axis], count[axis]) for axis in range(3)]
+        line = np.concatenate([line, *(index for index, _ in cuts), line])
+        t = np.concatenate([np.zeros(len(begin)), *(at for _, at in cuts), np.ones(len(begin))])
+        order = np.lexsort((t, line))
+        line, t = line[order], t[order]
+        same = np.flatnonzero(line[1:] == line[:-1])
+        length, line = t[same + 1] - t[same], line[same]
+        inner = t[same, None] + length[:, None] * _GAUSS
+        place = begin[line, None] + inner[..., None] * (stop - begin)[line, None]
+        with np.errstate(under="ignore"):
+            mean = self.at((place + 0.5) / count).mean(axis=1)
+            return np.asarray(np.bincount(line, mean * length, len(begin)), dtype=np.float64)
+
+
+def _cuts(begin: Array, stop: Array, count: int) -> tuple[Integers, Array]:
+    """Lines, and where on each, 0 to 1, the coordinate between `begin` and `stop` (k,) is one of 0 to count - 1."""
+    low, high = np.minimum(begin, stop), np.maximum(begin, stop)
+    first = np.clip(np.floor(low) + 1, 0, count).astype(np.int64)
+    number = np.maximum(np.clip(np.ceil(high), 0, count).astype(np.int64) - first, 0)
+    line = np.repeat(np.arange(len(begin)), number)
+    plane = np.arange(len(line)) - np.repeat(np.cumsum(number) - number - first, number)
+    return line, np.clip((plane - begin[line]) / (stop - begin)[line], 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class LinearDensity:
+    """Density that changes linearly along an axis.
+
+    Parameters
+    ----------
+    axis : {0, 1, 2}
+        Of the object.
+    start, end : float
+        Density where the unit box begins and ends, >= 0.
+
+    Raises
+    ------
+    InputError
+        If the axis is none of these, or a density not in its range.
+    """
+
+    axis: int
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        _check_profile("LinearDensity", self.axis, self.start, self.end)
+
+    @property
+    def maximum(self) -> float:
+        """Largest density."""
+        return max(self.start, self.end)
+
+    def at(self, points: npt.ArrayLike) -> Array:
+        """(...,): density at points (..., 3)."""
+        u = _along(points, self.axis)
+        with np.errstate(under="ignore"):
+            return np.asarray(self.start * (1.0 - u) + self.end * u)
+
+    def mean_between(self, start: Array, end: Array) -> Array:
+        """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding."""
+        return 0.5 * (self.at(start) + self.at(end))
+
+
+@dataclass(frozen=True)
+class ExponentialDensity:
+    """Density that changes exponentially along an axis, as that of an atmosphere.
+
+    Parameters
+    ----------
+    axis : {0, 1, 2}
+        Of the object.
+    start, end : float
+        Density where the unit box begins and ends, > 0.
+
+    Raises
+    ------
+    InputError
+        If the axis is none of these, or a density not in its range.
+    """
+
+    axis: int
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        _check_profile("ExponentialDensity", self.axis, self.start, self.end, positive=True)
+
+    @property
+    def maximum(self) -> float:
+        """Largest density."""
+        return max(self.start, self.end)
+
+    def at(self, points: npt.ArrayLike) -> Array:
+        """(...,): density at points (..., 3)."""
+        with np.errstate(under="ignore"):
+            return np.asarray(self.start * np.exp(self._log_ratio * _along(points, self.axis)))
+
+    def mean_between(self, start: Array, end: Array) -> Array:
+        """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding."""
+        difference = _along(start, self.axis) - _along(end, self.axis)
+        with np.errstate(under="ignore"):
+            return np.asarray(self.at(start) * optics.mean_transmittance(self._log_ratio * difference))
+
+    @property
+    def _log_ratio(self) -> float:
+        return float(np.log(self.end) - np.log(self.start))
+
+
+Density = DensityGrid | LinearDensity | ExponentialDensity
+
+
+def _along(points: npt.ArrayLike, axis: int) -> Array:
+    """Positions on one axis of the unit box; what rounding puts outside is on the border."""
+    return np.clip(np.asarray(points, dtype=np.float64)[..., axis], 0.0, 1.0)
+
+
+def _check_profile(name: str, axis: int, start: float, end: float, positive: bool = False) -> None:
+    if axis not in (0, 1, 2):
+        raise InputError(f"{name} axis {axis!r}", "not known", "use 0, 1 or 2 for x, y or z of the object")
+    for label, value in (("start", start), ("end", end)):
+        if not 0 <= value <= MAX_DENSITY or (positive and value == 0):
+            least = "above 0 and" if positive else "at least 0 and"
+            raise InputError(
+                f"{name} {label} {value}",
+                f"not {least} at most {MAX_DENSITY:g}",
+                "give a relative density, for example 1",
+            )

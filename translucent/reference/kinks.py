@@ -1,0 +1,75 @@
+"""Where the light that reaches a view ray changes its way: at the outlines of bodies as the light sees them.
+
+There its path through a body begins to exist, or a shadow begins. Rules of quadrature take such a place for smooth
+unless an interval ends there, and miss what is between two of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.lights import DirectionalLight
+from translucent.reference.rays import Rays
+from translucent.reference.tracer import TracedObject
+from translucent.scene import Light
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: Pairs of an edge and a ray that are looked at together: the working arrays stay below 100 MB.
+PAIRS = 1 << 18
+
+
+def outline_edges(traced: TracedObject, light: Light) -> Array:
+    """(e, 2, 3): edges of an object of which the light sees one face from its front and not the other."""
+    faces, corners = traced.body.mesh.faces, traced.corners
+    with np.errstate(under="ignore"):
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        if isinstance(light, DirectionalLight):
+            towards = -np.broadcast_to(np.asarray(light.direction), normals.shape)
+        else:
+            towards = np.asarray(light.position) - corners[:, 0]
+        lit = np.einsum("ki,ki->k", normals, towards) > 0
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    pairs = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
+    _, first, edge = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    # Each lit face counts as 1 and each other one as -1: an edge between two faces alike has 2.
+    net = np.bincount(edge.ravel(), np.where(np.repeat(lit, 3), 1.0, -1.0))
+    chosen = first[np.abs(net) != 2]
+    return np.stack([corners.reshape(-1, 3)[chosen], np.roll(corners, -1, axis=1).reshape(-1, 3)[chosen]], axis=1)
+
+
+def kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
+    """Numbers of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
+    found = [(np.empty(0, np.int64), np.empty(0))]
+    each = max(PAIRS // max(len(edges), 1), 1)
+    for begin in range(0, len(rays), each):
+        ray, t = _kinks(rays.where(slice(begin, begin + each)), edges, light)
+        found.append((ray + begin, t))
+    return np.concatenate([ray for ray, _ in found]), np.concatenate([t for _, t in found])
+
+
+@np.errstate(all="ignore")
+def _kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
+    """`kinks` of few rays. Where nothing is finite, the ray and the light make no plane: there is no such place."""
+    if isinstance(light, DirectionalLight):
+        way = np.broadcast_to(np.asarray(light.direction), rays.directions.shape)
+    else:
+        way = np.asarray(light.position) - rays.origins
+    # Each edge has at most one point in the plane of a ray and the light.
+    normal = np.cross(rays.directions, way)
+    above, below = (normal @ (edges[:, i].T) - np.einsum("ki,ki->k", normal, rays.origins)[:, None] for i in (0, 1))
+    ray, edge = np.nonzero((above > 0) != (below > 0))
+    share = above[ray, edge] / (above[ray, edge] - below[ray, edge])
+    point = edges[edge, 0] + share[:, None] * (edges[edge, 1] - edges[edge, 0]) - rays.origins[ray]
+    if isinstance(light, DirectionalLight):
+        source, direction = point, way[ray]
+    else:
+        source, direction = way[ray], point - way[ray]
+    across = np.cross(rays.directions[ray], direction)
+    t = np.einsum("ki,ki->k", np.cross(source, direction), across) / np.einsum("ki,ki->k", across, across)
+    # The light passes the edge first.
+    after = np.einsum("ki,ki->k", t[:, None] * rays.directions[ray] - point, direction) > 0
+    keep = np.isfinite(t) & after
+    return ray[keep], t[keep]

@@ -1,0 +1,155 @@
+"""Light on its way from lights to places in a scene: what bodies leave of it, and what stops it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.lights import MAX_RADIANCE, DirectionalLight, PointLight
+from translucent.reference.boxes import Lines
+from translucent.reference.hits import Hits
+from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs
+from translucent.reference.rays import Rays
+from translucent.reference.sheets import scene_crossings
+from translucent.reference.tracer import Tracer
+from translucent.reference.volume import Volume, volume_segments
+from translucent.scene import Light, Scene
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Opaque surfaces within this share of the scene's size of a light, or of a lit place, do not shadow it: it lies on
+#: them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the rest.
+CONTACT = 1e-9
+
+#: Paths that are followed at a time: the working arrays stay below 500 MB.
+PATHS = 1 << 15
+
+
+@dataclass(frozen=True, eq=False)
+class Arrival:
+    """Light of one source that arrives at places.
+
+    Attributes
+    ----------
+    travel : (k, 3) float64
+        Unit vectors in which it travels; 0 at a point light itself.
+    irradiance : (k, 3) float64
+        On a surface that faces it, in W/m^2; at most 1e18.
+    sound : (k,) bool
+        The place is not at the light itself, and no hole of a body was on the way.
+    """
+
+    travel: Array
+    irradiance: Array
+    sound: Mask
+
+
+class LightPaths:
+    """The ways of light to places in a scene, straight and through its bodies.
+
+    Parameters
+    ----------
+    scene : Scene
+        Places are in metres from the eye of its camera, along the axes of the world.
+    sheets : sequence of float or None
+        As `sheet_thicknesses` gives them.
+    """
+
+    def __init__(self, scene: Scene, sheets: tuple[float | None, ...]) -> None:
+        self.scene, self.sheets = scene, sheets
+        self.tracer, self.volume = Tracer(scene), Volume(scene)
+        self.lights = tuple(_placed(light, scene.camera.eye) for light in scene.lights)
+
+    def arrival(self, light: Light, points: Array) -> Arrival:
+        """What arrives of one of `lights` at points (k, 3), before any scattering."""
+        parts = [self._arrival(light, points[i : i + PATHS]) for i in range(0, max(len(points), 1), PATHS)]
+        return Arrival(*(np.concatenate([getattr(part, name) for part in parts]) for name in Arrival.__match_args__))
+
+    def _arrival(self, light: Light, points: Array) -> Arrival:
+        travel, distance = _way(light, points)
+        transmittance, sound = self.transmittance(points, travel, distance)
+        irradiance = light.irradiance_on(points, -travel)
+        # So bright is only the light itself, and no sum over it converges.
+        sound &= (irradiance < MAX_RADIANCE).all(axis=1)
+        with np.errstate(under="ignore"):
+            return Arrival(travel, irradiance * transmittance, sound)
+
+    def transmittance(self, points: Array, travel: Array, distance: Array) -> tuple[Array, Mask]:
+        """What is left of light (k, 3) that has travelled in directions (k, 3) over distances (k,) to points (k, 3).
+
+        Parameters
+        ----------
+        points, travel : (k, 3) float64
+        distance : (k,) float64
+            In metres; inf for light from infinitely far away.
+
+        Returns
+        -------
+        transmittance : (k, 3) float64
+            0 behind opaque surfaces.
+        sound : (k,) bool
+            No hole of a body was on the way.
+        """
+        # Far away from the scene there is nothing, and short ways keep their digits.
+        _, outside = self.tracer.ball(points, -travel)
+        length = np.minimum(distance, np.maximum(outside, 0.0))
+        rays = Rays(points - length[:, None] * travel, travel, np.zeros((len(points), 2)))
+        hits = [self._hits(index, rays, length) for index in range(len(self.scene.objects))]
+        intervals, sound = self._intervals(hits, length)
+        crossings = scene_crossings(self.scene, rays, hits, self.sheets, length)
+        segments, _ = volume_segments(self.scene, self.volume, rays, intervals, crossings)
+        with np.errstate(over="ignore", under="ignore"):
+            depths = segments.extinction * segments.length[:, None]
+            depth = np.stack([np.bincount(segments.pixel, depths[:, c], len(points)) for c in range(3)], axis=-1)
+        return np.where(self._shadowed(hits, length)[:, None], 0.0, optics.transmittance(depth)), sound
+
+    def _hits(self, index: int, rays: Rays, length: Array) -> Hits:
+        """Surfaces of an object behind the origins and as far ahead as the way goes; of an open one on all the line."""
+        traced = self.tracer.objects[index]
+        open_body = traced.body.medium is not None and not traced.body.mesh.diagnosis.solid
+        end = np.full(len(rays), np.inf) if open_body else length
+        return traced.hits(Lines(rays.origins, rays.directions, np.full(len(rays), -np.inf), end))
+
+    def _intervals(self, hits: list[Hits], length: Array) -> tuple[Intervals, Mask]:
+        """Parts of the ways inside solids, and (k,): where the entries and exits of each balance."""
+        sound = np.ones(len(length), dtype=bool)
+        parts = []
+        for index, (body, line) in enumerate(zip(self.scene.objects, hits, strict=True)):
+            if body.medium is not None and self.sheets[index] is None:
+                if not body.mesh.diagnosis.solid:
+                    sound &= sum_signs(line, len(length)) == 0
+                # What is behind the light tells whether it is inside, also for a light on the surface.
+                origin = sum_signs(line.where(line.distance < 0), len(length))
+                parts.append(body_intervals(line.before(length), origin, length, index))
+        nothing = body_intervals(hits[0].where(slice(0)), np.zeros_like(length, dtype=np.int64), length)
+        return merge([nothing, *parts]), sound
+
+    def _shadowed(self, hits: list[Hits], length: Array) -> Mask:
+        """(k,): whether an opaque surface is on the way."""
+        shadowed = np.zeros(len(length), dtype=bool)
+        margin = CONTACT * self.tracer.radius
+        for body, line in zip(self.scene.objects, hits, strict=True):
+            if body.medium is None:
+                between = (line.distance > margin) & (line.distance < length[line.pixel] - margin)
+                shadowed[line.pixel[between]] = True
+        return shadowed
+
+
+def _placed(light: Light, eye: Array) -> Light:
+    """The light with its position, where it has one, relative to the eye."""
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
+
+
+def _way(light: Light, points: Array) -> tuple[Array, Array]:
+    """Unit vectors (k, 3) in which light travels to points (k, 3), and how far (k,)."""
+    if isinstance(light, DirectionalLight):
+        return np.broadcast_to(np.asarray(light.direction), points.shape), np.full(len(points), np.inf)
+    way = points - np.asarray(light.position)
+    with np.errstate(under="ignore"):
+        distance = np.linalg.norm(way, axis=1)
+    return way / np.where(distance > 0, distance, 1.0)[:, None], distance

@@ -1,0 +1,246 @@
+"""Monte Carlo path tracing through media: light scattered any number of times, with error bars.
+
+Free paths by delta tracking (Woodcock et al. 1965; Novak et al. 2018, section 5.1), each light at each event with its
+exact transmittance, directions by the phase function itself, and Russian roulette (Arvo & Kirk 1990).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import check_size
+from translucent.errors import InputError
+from translucent.frame import Frame
+from translucent.reference.boxes import Lines
+from translucent.reference.compositing import _layers
+from translucent.reference.light_paths import LightPaths
+from translucent.reference.phase import scattered_directions
+from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind, shade_hits
+from translucent.reference.volume import places
+from translucent.render_plan import PassSpec, RenderPlan
+from translucent.scene import Scene
+from translucent.thickness import SignedDepth
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: Paths that are followed together: the working arrays stay below 500 MB.
+BATCH = 1 << 14
+
+#: Paths that carry less of the light than this end by chance, or go on with this much.
+ROULETTE = 0.1
+
+
+def path_trace(
+    scene: Scene, size: tuple[int, int], paths: int = 64, seed: int = 0, max_events: int | None = None
+) -> tuple[Frame, Array]:
+    """The scene with light that media scatter any number of times, of all lights, of the environment and emitted.
+
+    Opaque surfaces send back what they do for `render`, and a backdrop fixed to the picture lights like the mean of its
+    squares. Light inside a medium has no finite variance: there the error bars say little.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its bodies are closed, and none is a sheet.
+    size : (width, height)
+        In pixels.
+    paths : int
+        Of each pixel and channel, from 2; the error falls with their square root.
+    seed : int
+        Of the random numbers.
+    max_events : int, optional
+        Light scattered more often is left out; 1 is single scattering. Default: no limit.
+
+    Returns
+    -------
+    frame : Frame
+        Of float64 arrays; all but the radiance is exact.
+    standard_error : (h, w, 3) float64
+        Of the radiance.
+
+    Raises
+    ------
+    InputError
+        If an argument is not in its range, or a body is open or a sheet.
+    """
+    began = time.perf_counter()
+    width, height = check_size(size)
+    _check(scene, paths, max_events)
+    light = LightPaths(scene, (None,) * len(scene.objects))
+    rays = pixel_rays(scene.camera, (width, height))
+    arrays = shade_hits(scene, rays, scene_hits(scene, (width, height)), light.sheets)
+    rng = np.random.default_rng(seed)
+    radiance, error = np.zeros((2, len(rays), 3))
+    for channels in _channel_groups(light):
+        radiance[:, channels], error[:, channels] = _estimate(light, rays, channels, paths, max_events, rng)
+    arrays["radiance"] = radiance
+    reason = (
+        f"asked for: {paths} paths for each pixel, scattered {'without limit' if max_events is None else max_events}"
+    )
+    frame = Frame(
+        **{name: array.reshape(height, width, *array.shape[1:]) for name, array in arrays.items()},
+        plan=RenderPlan(SignedDepth(), (PassSpec("path_trace", reason),), limits=("radiance has noise",)),
+        seconds={"total": time.perf_counter() - began},
+        provenance={"backend": "reference", "numpy": np.__version__},
+    )
+    return frame, error.reshape(height, width, 3)
+
+
+def _check(scene: Scene, paths: int, max_events: int | None) -> None:
+    if paths < 2:
+        raise InputError(f"path tracing with {paths} paths", "no spread without two", "use for example 64")
+    if max_events is not None and max_events < 0:
+        raise InputError(f"max_events {max_events}", "below 0", "use 1 for single scattering, None for no limit")
+    for body in scene.bodies:
+        if body.sheet_thickness is not None or not body.mesh.diagnosis.solid:
+            what = "a sheet" if body.sheet_thickness is not None else "not closed"
+            raise InputError(f"path tracing {body.mesh.name!r}", what, "use tl.reference.render")
+
+
+def _channel_groups(light: LightPaths) -> list[Integers]:
+    """Channels that all media treat alike: one path stands for all of them."""
+    columns = np.concatenate([light.volume.extinction, light.volume.scattering])
+    _, group = np.unique(columns, axis=1, return_inverse=True)
+    return [np.flatnonzero(group.ravel() == number) for number in np.unique(group)]
+
+
+def _estimate(
+    light: LightPaths, rays: Rays, channels: Integers, paths: int, max_events: int | None, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Mean (n, c) over the paths of each ray, and its standard error."""
+    mean, spread = np.zeros((2, len(rays), len(channels)))
+    each = max(BATCH // paths, 1)
+    for begin in range(0, len(rays), each):
+        some = np.arange(begin, min(begin + each, len(rays)))
+        tracer = _Paths(light, rays.where(np.repeat(some, paths)), channels, max_events, rng)
+        found = tracer.radiance().reshape(len(some), paths, len(channels))
+        mean[some] = found.mean(axis=1)
+        spread[some] = found.std(axis=1, ddof=1)
+    return mean, spread / np.sqrt(paths)
+
+
+@dataclass(frozen=True, eq=False)
+class _Events:
+    """Where paths meet matter: number of each path that does, where, and what fills that place."""
+
+    path: Integers
+    points: Array
+    weights: Array
+
+
+class _Paths:
+    """Paths from the eye, one for each ray, for channels that all media treat alike."""
+
+    def __init__(
+        self, light: LightPaths, rays: Rays, channels: Integers, max_events: int | None, rng: np.random.Generator
+    ) -> None:
+        self.light, self.scene, self.volume = light, light.scene, light.volume
+        self.rays, self.channels, self.max_events, self.rng = rays, channels, max_events, rng
+        self.extinction, self.scattering = (
+            table[:, channels[0]] for table in (light.volume.extinction, light.volume.scattering)
+        )
+        self.found = np.zeros((len(rays), len(channels)))
+
+    def radiance(self) -> Array:
+        """(n, c): what each path finds."""
+        rays, throughput, owner = self.rays, np.ones(len(self.rays)), np.arange(len(self.rays))
+        events = 0
+        while len(owner):
+            media = self._media(rays)
+            met = self._fly(rays, media, throughput, owner)
+            self._add_behind(rays, media, throughput, owner, met, scattered=events > 0)
+            if events == self.max_events:
+                break
+            events += 1
+            throughput, owner = throughput[met.path] * self._albedo(met.weights), owner[met.path]
+            rays = replace(rays.where(met.path), origins=met.points)
+            self._add_lights(rays, met.weights, throughput, owner)
+            lives, throughput = self._roulette(throughput)
+            rays, throughput, owner = rays.where(lives), throughput[lives], owner[lives]
+            g = self._anisotropy(met.weights[lives])
+            rays = replace(rays, directions=scattered_directions(rays.directions, g, self.rng))
+        return self.found
+
+    def _media(self, rays: Rays) -> CrossedMedia:
+        everywhere = np.full(len(rays), np.inf)
+        hits = self.light.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, everywhere))
+        return crossed_media(self.scene, self.volume, rays, hits, self.light.sheets)
+
+    def _fly(self, rays: Rays, media: CrossedMedia, throughput: Array, owner: Integers) -> _Events:
+        """Follow the rays to their first events; adds what media emit on the way."""
+        flying = np.ones(len(rays), dtype=bool)
+        found = [_Events(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, len(self.extinction))))]
+        segments = media.segments
+        for layer in _layers(segments.pixel):
+            layer = layer[flying[segments.pixel[layer]]]
+            t, majorant = segments.t_enter[layer], self._majorants(media, layer)
+            some = majorant > 0
+            layer, t, majorant = layer[some], t[some], majorant[some]
+            while len(layer):
+                t = t + self.rng.exponential(size=len(t)) / majorant
+                inside = t < segments.t_exit[layer]
+                layer, t, majorant = layer[inside], t[inside], majorant[inside]
+                path = segments.pixel[layer]
+                points = places(rays, path, t)
+                weights = self.volume.at(media.filling[layer], points)
+                emission = (weights @ self.volume.emission)[:, self.channels]
+                self._add(owner[path], emission * (throughput[path] / majorant)[:, None])
+                real = self.rng.random(len(layer)) * majorant < weights @ self.extinction
+                found.append(_Events(path[real], points[real], weights[real]))
+                flying[path[real]] = False
+                layer, t, majorant = layer[~real], t[~real], majorant[~real]
+        return _Events(*(np.concatenate([getattr(part, name) for part in found]) for name in _Events.__match_args__))
+
+    def _majorants(self, media: CrossedMedia, layer: Integers) -> Array:
+        """(k,): bounds of the extinction in segments; what emits without it is met about once, too."""
+        filling, segments = media.filling[layer], media.segments
+        emits = (filling @ self.volume.emission > 0).any(axis=1)
+        once = np.where(emits, 1.0 / segments.length[layer], 0.0)
+        return np.maximum(self.volume.majorant(filling, self.extinction), once)
+
+    def _add_behind(
+        self, rays: Rays, media: CrossedMedia, throughput: Array, owner: Integers, met: _Events, scattered: bool
+    ) -> None:
+        through = np.ones(len(rays), dtype=bool)
+        through[met.path] = False
+        behind = seen_behind(self.scene, rays, media.wall)
+        environment = self.scene.environment
+        if scattered and environment.kind == "checkerboard":
+            behind[np.isinf(media.wall.distance)] = 0.5 * (environment.first + environment.second)
+        self._add(owner[through], behind[through][:, self.channels] * throughput[through, None])
+
+    def _add_lights(self, rays: Rays, weights: Array, throughput: Array, owner: Integers) -> None:
+        """Light that reaches the origins of `rays`, where they come from, and is scattered towards the eye."""
+        total = weights @ self.scattering
+        for light in self.light.lights:
+            arrival = self.light.arrival(light, rays.origins)
+            cosine = -np.einsum("ki,ki->k", arrival.travel, rays.directions)
+            phase = self.volume.source(weights, cosine)[:, self.channels[0]] / np.where(total > 0, total, 1.0)
+            with np.errstate(under="ignore"):
+                self._add(owner, arrival.irradiance[:, self.channels] * (phase * throughput)[:, None])
+
+    def _add(self, owner: Integers, radiance: Array) -> None:
+        # A path has at most one such event at a time, so no index comes twice.
+        self.found[owner] += radiance
+
+    def _albedo(self, weights: Array) -> Array:
+        """(k,): share of the light that an event scatters."""
+        return np.asarray((weights @ self.scattering) / (weights @ self.extinction))
+
+    def _anisotropy(self, weights: Array) -> Array:
+        """(k,): of one of the media at each place, chosen by how much they scatter."""
+        shares = np.cumsum(weights * self.scattering, axis=1)
+        chosen = (shares < self.rng.random((len(weights), 1)) * shares[:, -1:]).sum(axis=1)
+        return np.asarray(self.volume.anisotropy[np.minimum(chosen, len(self.scattering) - 1)])
+
+    def _roulette(self, throughput: Array) -> tuple[Integers, Array]:
+        """Paths that go on, and what each of all would then carry."""
+        chance = np.minimum(throughput / ROULETTE, 1.0)
+        lives = np.flatnonzero(self.rng.random(len(throughput)) < chance)
+        return lives, throughput / np.where(chance > 0, chance, 1.0)

@@ -1,0 +1,95 @@
+"""Where a march through an interval takes its samples, and what each of them stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Words = npt.NDArray[np.uint64]
+
+_MASK = np.uint64(0xFFFFFFFF)
+
+#: Maps places (k, p) in intervals, 0 to 1, to distances (k, p) on the rays, and tells their derivative (k, p).
+Variable = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Steps through intervals, in order; in metres along the rays.
+
+    Attributes
+    ----------
+    begin, end : (k, p) float64
+        Of each step. The medium at the sample counts for all of it.
+    at : (k, p) float64
+        Where the sample is, from `begin` to `end`.
+    weight : (k, p) float64
+        Length for which the source at the sample counts.
+    """
+
+    begin: Array
+    end: Array
+    at: Array
+    weight: Array
+
+
+def even_steps(variable: Variable, offset: Array) -> Steps:
+    """Steps that are even in some variable, as a Riemann sum has them.
+
+    In the distance itself, offset 0 is the left rule, 0.5 the midpoint rule, and random ones are stratified sampling.
+
+    Parameters
+    ----------
+    variable : callable
+    offset : (k, p) float64
+        Place of each sample in its step, 0 to 1.
+    """
+    count = offset.shape[1]
+    borders, _ = variable(np.broadcast_to(np.arange(count + 1) / count, (len(offset), count + 1)))
+    at, stretch = variable((np.arange(count) + offset) / count)
+    begin, end = borders[:, :-1], borders[:, 1:]
+    # Rounding may put a sample an ulp outside of its step, and so outside of the body.
+    return Steps(begin, end, np.clip(at, begin, end), stretch / count)
+
+
+def gauss_steps(start: Array, end: Array, count: int) -> Steps:
+    """The `count` points of Gauss and Legendre from `start` (k,) to `end` (k,).
+
+    Each point stands for a step of the length of its weight; by the separation theorem (Szego 1939, section 3.41) these
+    steps, put one after the other, hold one point each.
+    """
+    points, weights = np.polynomial.legendre.leggauss(count)
+    borders = np.concatenate([[0.0], np.cumsum(weights)]) / weights.sum()
+    length = (end - start)[:, None]
+    at = start[:, None] + length * (0.5 + 0.5 * points)
+    borders = start[:, None] + length * borders
+    return Steps(borders[:, :-1], borders[:, 1:], at, length * (0.5 * weights))
+
+
+def hashed(column: Integers, row: Integers, number: Integers, seed: int) -> Array:
+    """Random numbers in 0 to 1 - 2^-24, all of them multiples of 2^-24, so that float32 holds them exactly.
+
+    The first component of pcg3d (Jarzynski & Olano 2020) of column, row, and number + 2654435769 seed, mod 2^32.
+
+    Parameters
+    ----------
+    column, row, number : (...) int64
+        Of the pixel, and of the sample in it; >= 0, they broadcast.
+    seed : int
+    """
+    keys = np.broadcast_arrays(column, row, number + (2654435769 * seed & 0xFFFFFFFF))
+    # Modulo 2^32; a product and a sum of such numbers stay below 2^64.
+    x, y, z = ((key.astype(np.uint64) & _MASK) * np.uint64(1664525) + np.uint64(1013904223) & _MASK for key in keys)
+    x, y, z = (value ^ (value >> np.uint64(16)) for value in _mixed(x, y, z))
+    return np.asarray((_mixed(x, y, z)[0] >> np.uint64(8)) * 2.0**-24)
+
+
+def _mixed(x: Words, y: Words, z: Words) -> tuple[Words, Words, Words]:
+    x = (x + y * z) & _MASK
+    y = (y + z * x) & _MASK
+    return x, y, (z + x * y) & _MASK

@@ -1,0 +1,227 @@
+"""Light that media scatter once towards the eye, to a tolerance (Max 1995, sections 5 and 6).
+
+L = integral over the ray of T(t) sum sigma_s p(cos) E(t) dt, with the transmittance T from the eye to t and the
+irradiance E of each light there, attenuated by all bodies on its way and stopped by opaque objects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.lights import PointLight
+from translucent.reference.adaptive import integrate
+from translucent.reference.compositing import _layers
+from translucent.reference.equiangular import equiangular
+from translucent.reference.kinks import kinks, outline_edges
+from translucent.reference.light_paths import LightPaths
+from translucent.reference.rays import Rays
+from translucent.reference.segments import Segments
+from translucent.reference.volume import places
+from translucent.scene import Light
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Segments are cut where they begin, so that a rule of 15 points sees what little of a dense one is seen at all.
+MOST_CUTS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Scattered:
+    """Light scattered once towards the origins of rays.
+
+    Attributes
+    ----------
+    radiance : (n, 3) float64
+    error : (n, 3) float64
+        Estimated error of the radiance.
+    valid : (n,) bool
+        The tolerance is met, the ray does not meet a light, and no light came through a hole of a body.
+    """
+
+    radiance: Array
+    error: Array
+    valid: Mask
+
+
+def scattered_once(paths: LightPaths, rays: Rays, segments: Segments, filling: Array, tolerance: float) -> Scattered:
+    """Light of all lights of a scene, scattered once.
+
+    Parameters
+    ----------
+    paths : LightPaths
+    rays : Rays
+    segments : Segments
+        Of `volume_segments`, and so is `filling`.
+    filling : (k, n) float64
+    tolerance : float
+        Relative to the radiance of each ray.
+    """
+    spans = _joined([_spans(paths, number, rays, segments, filling) for number in range(len(paths.lights))])
+    work = _InScatter(paths, rays, segments, filling, spans)
+    span, start, end = _cut(work)
+    group = segments.pixel[spans.segment[span]]
+    result = integrate(lambda index, u: work(span[index], u), start, end, group, len(rays), tolerance)
+    met = (result.error <= 2.0 * tolerance * result.value.max(axis=1, keepdims=True)).all(axis=1)
+    return Scattered(result.value, result.error, met & work.sound)
+
+
+@dataclass(frozen=True, eq=False)
+class _Spans:
+    """Parts of segments between kinks of the light's way: flat arrays.
+
+    Attributes
+    ----------
+    light : (m,) int64
+        Index into `LightPaths.lights`.
+    segment : (m,) int64
+    start, end : (m,) float64
+        Distances along the ray in metres.
+    """
+
+    light: Integers
+    segment: Integers
+    start: Array
+    end: Array
+
+
+class _InScatter:
+    """The integrand: of each span, in the variable of its light, 0 to 1."""
+
+    def __init__(self, paths: LightPaths, rays: Rays, segments: Segments, filling: Array, spans: _Spans) -> None:
+        self.paths, self.rays, self.segments, self.filling, self.spans = paths, rays, segments, filling, spans
+        self.before = depths_before(segments, len(rays))
+        self.sound = np.ones(len(rays), dtype=bool)
+
+    def __call__(self, span: Integers, u: Array) -> Array:
+        values = np.zeros((*u.shape, 3))
+        for number, light in enumerate(self.paths.lights):
+            chosen = np.flatnonzero(self.spans.light[span] == number)
+            if chosen.size:
+                values[chosen] = self._of_light(light, span[chosen], u[chosen])
+        return values
+
+    def _of_light(self, light: Light, span: Integers, u: Array) -> Array:
+        segment = self.spans.segment[span]
+        ends = self.spans.start[span], self.spans.end[span]
+        t, stretch = light_variable(light, self.rays, self.segments.pixel[segment], *ends, u)
+        owner, distance = np.repeat(segment, u.shape[1]), t.ravel()
+        pixel = self.segments.pixel[owner]
+        points = places(self.rays, pixel, distance)
+        weights = self.paths.volume.at(self.filling[owner], points)
+        source, sound = light_source(self.paths, light, weights, points, self.rays.directions[pixel])
+        self.sound[pixel[~sound]] = False
+        with np.errstate(under="ignore"):
+            values = self.transmittance(owner, distance) * source
+            return np.asarray(values.reshape(*u.shape, 3) * stretch[..., None])
+
+    def transmittance(self, segment: Integers, distance: Array) -> Array:
+        """(k, 3): from the eye to distances (k,) in segments (k,); exact."""
+        pixel, enter = self.segments.pixel[segment], self.segments.t_enter[segment]
+        volume = self.paths.volume
+        ends = (places(self.rays, pixel, t) for t in (enter, distance))
+        with np.errstate(under="ignore", over="ignore"):
+            extinction = volume.between(self.filling[segment], *ends) @ volume.extinction
+            return optics.transmittance(self.before[segment] + extinction * (distance - enter)[:, None])
+
+
+def light_source(
+    paths: LightPaths, light: Light, weights: Array, points: Array, directions: Array
+) -> tuple[Array, Mask]:
+    """Source term sigma_s p(cos) E of one light: radiance per metre (k, 3) that it adds to rays; and where it is sound.
+
+    Parameters
+    ----------
+    paths : LightPaths
+    light : PointLight or DirectionalLight
+        One of `LightPaths.lights`.
+    weights : (k, n) float64
+        What fills the points, as `Volume.at` gives it.
+    points, directions : (k, 3) float64
+        In metres from the eye, and of the rays that run from the eye.
+    """
+    arrival = paths.arrival(light, points)
+    # The ray runs from the eye, and light to it.
+    cosine = -np.einsum("ki,ki->k", arrival.travel, directions)
+    with np.errstate(under="ignore"):
+        return paths.volume.source(weights, cosine) * arrival.irradiance, arrival.sound
+
+
+def light_variable(
+    light: Light | None, rays: Rays, ray: Integers, start: Array, end: Array, u: Array
+) -> tuple[Array, Array]:
+    """Distances t (k, p) on rays (k,) between `start` and `end` (k,), at places u (k, p), 0 to 1, and dt/du.
+
+    For a point light equal steps of u are equal angles as seen from it, else equal lengths.
+    """
+    if not isinstance(light, PointLight):
+        length = (end - start)[:, None]
+        return start[:, None] + u * length, np.broadcast_to(length, u.shape)
+    way, direction = np.asarray(light.position) - rays.origins[ray], rays.directions[ray]
+    middle = np.einsum("ki,ki->k", way, direction)
+    return equiangular(start, end, middle, np.linalg.norm(way - middle[:, None] * direction, axis=1), u)
+
+
+@np.errstate(over="ignore")
+def depths_before(segments: Segments, pixels: int) -> Array:
+    """(k, 3): optical depth of each ray where each of its segments begins."""
+    before, depth = np.zeros((len(segments.pixel), 3)), np.zeros((pixels, 3))
+    for layer in _layers(segments.pixel):
+        pixel = segments.pixel[layer]
+        before[layer] = depth[pixel]
+        depth[pixel] += segments.extinction[layer] * segments.length[layer, None]
+    return before
+
+
+def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, filling: Array) -> _Spans:
+    """All segments that scatter, cut where the way of a light has kinks."""
+    scatters = (segments.t_exit > segments.t_enter) & (filling @ paths.volume.scattering > 0).any(axis=1)
+    chosen = np.flatnonzero(scatters)
+    seen = np.unique(segments.pixel[chosen])
+    light = paths.lights[number]
+    edges = np.concatenate([outline_edges(traced, light) for traced in paths.tracer.objects])
+    ray, t = kinks(rays.where(seen), edges, light)
+    # In the order along each ray, a cut belongs to the segment that began last, if it has not ended.
+    pixel = np.concatenate([segments.pixel[chosen], seen[ray]])
+    t = np.concatenate([segments.t_enter[chosen], t])
+    begins = np.arange(len(pixel)) < len(chosen)
+    order = np.lexsort((~begins, t, pixel))
+    last = np.cumsum(begins[order]) - 1
+    pixel, t = pixel[order], t[order]
+    owner = chosen[np.maximum(last, 0)]
+    inside = (last >= 0) & (segments.pixel[owner] == pixel) & (t < segments.t_exit[owner])
+    owner, start = owner[inside], t[inside]
+    end = np.where(np.append(owner[1:] == owner[:-1], False), np.append(start[1:], 0.0), segments.t_exit[owner])
+    some = end > start
+    return _Spans(np.full(int(some.sum()), number), owner[some], start[some], end[some])
+
+
+def _joined(parts: list[_Spans]) -> _Spans:
+    return _Spans(*(np.concatenate([getattr(part, name) for part in parts]) for name in _Spans.__match_args__))
+
+
+def _cut(work: _InScatter) -> tuple[Integers, Array, Array]:
+    """Spans, and parts 0 to 1 of them, each twice as large as the one before.
+
+    The first is at most one deep, or as short as float64 allows.
+    """
+    spans, segments = work.spans, work.segments
+    reach = spans.end - spans.start
+    for number, light in enumerate(work.paths.lights):
+        own = np.flatnonzero(spans.light == number)
+        ends = spans.start[own], spans.end[own]
+        at_start = np.zeros((len(own), 1))
+        _, stretch = light_variable(light, work.rays, segments.pixel[spans.segment[own]], *ends, at_start)
+        reach[own] = np.maximum(reach[own], stretch[:, 0])
+    with np.errstate(over="ignore"):
+        depth = segments.extinction[spans.segment].max(axis=1, initial=0.0) * reach
+    cuts = np.ceil(np.log2(np.clip(depth, 1.0, 2.0**MOST_CUTS))).astype(np.int64)
+    owner = np.repeat(np.arange(len(cuts)), cuts + 1)
+    number_in_span = np.arange(len(owner)) - np.repeat(np.cumsum(cuts + 1) - cuts - 1, cuts + 1)
+    last = np.exp2(number_in_span - cuts[owner])
+    return owner, np.where(number_in_span == 0, 0.0, 0.5 * last), last

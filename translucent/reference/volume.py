@@ -1,0 +1,193 @@
+"""What fills each place of a scene: which media, how often, and how dense they are there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.reference.intervals import Intervals
+from translucent.reference.rays import Rays
+from translucent.reference.segments import Segments, _pieces, scene_segments
+from translucent.reference.sheets import Crossings
+from translucent.reference.tracer import center_from
+from translucent.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+class Volume:
+    """The media of a scene as tables, one row for each of `Scene.objects`; 0 for opaque ones.
+
+    Places are in metres from the eye of its camera, along the axes of the world. What fills a place is a row of
+    weights, one for each object: how much of its medium is there.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Attributes
+    ----------
+    extinction, scattering, emission : (n, 3) float64
+        Where the density is 1.
+    anisotropy : (n,) float64
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        media = [body.medium for body in scene.objects]
+        self.extinction, self.scattering, self.emission = (
+            np.array([getattr(medium, name) if medium else np.zeros(3) for medium in media], dtype=np.float64)
+            for name in ("extinction", "scattering", "emission")
+        )
+        self.anisotropy = np.array([medium.anisotropy if medium else 0.0 for medium in media])
+        self._densities = [(i, body.density) for i, body in enumerate(scene.objects) if body.density is not None]
+        self._boxes = {i: _UnitBox(scene, i) for i, _ in self._densities}
+
+    @property
+    def varied(self) -> Integers:
+        """Objects in which a density varies."""
+        return np.array([i for i, _ in self._densities], dtype=np.int64)
+
+    @property
+    def scatters(self) -> bool:
+        """Whether any medium scatters."""
+        return bool((self.scattering > 0).any())
+
+    def at(self, filling: Array, points: Array) -> Array:
+        """(k, n): weights at points (k, 3), from those where the density is 1, `filling` (k, n)."""
+        weights = filling.copy() if self._densities else filling
+        for i, density in self._densities:
+            inside = np.flatnonzero(filling[:, i])
+            weights[inside, i] *= density.at(self._boxes[i].places(points[inside]))
+        return weights
+
+    def between(self, filling: Array, start: Array, end: Array) -> Array:
+        """(k, n): mean weights on straight lines between points (k, 3), exact; `filling` as for `at`."""
+        weights = filling.copy() if self._densities else filling
+        for i, density in self._densities:
+            inside = np.flatnonzero(filling[:, i])
+            places = (self._boxes[i].places(points[inside]) for points in (start, end))
+            weights[inside, i] *= density.mean_between(*places)
+        return weights
+
+    def majorant(self, filling: Array, table: Array) -> Array:
+        """(k, ...): largest value that a coefficient, given as a `table` (n, ...), has where `filling` (k, n) is."""
+        largest = np.ones(filling.shape[1])
+        for i, density in self._densities:
+            largest[i] = density.maximum
+        return np.asarray((filling * largest) @ table)
+
+    def source(self, weights: Array, cosine: Array) -> Array:
+        """Sum of sigma_s p of all media in a place, (k, 3) in 1/(m sr); each scatters by its own phase function.
+
+        Parameters
+        ----------
+        weights : (k, n) float64
+            As `at` gives them.
+        cosine : (k,) float64
+            Between the directions of travel before and after the event.
+        """
+        total = np.zeros((len(weights), 3))
+        scattering = np.flatnonzero((self.scattering > 0).any(axis=1))
+        for g in np.unique(self.anisotropy[scattering]):
+            alike = scattering[self.anisotropy[scattering] == g]
+            phase = optics.henyey_greenstein(cosine, g)
+            total += weights[:, alike] @ self.scattering[alike] * phase[:, None]
+        return total
+
+
+class _UnitBox:
+    """Where places are in the box of an object, 0 to 1 along each of its axes."""
+
+    def __init__(self, scene: Scene, index: int) -> None:
+        body = scene.objects[index]
+        low, high = body.mesh.bounds
+        extent = high - low
+        inverse = np.linalg.inv(body.matrix[:3, :3])
+        # All of a flat mesh is in the middle of its box.
+        self._linear = np.where(extent > 0, 1.0 / np.where(extent > 0, extent, 1.0), 0.0)[:, None] * inverse
+        self._center = center_from(body, scene.camera.eye)
+
+    def places(self, points: Array) -> Array:
+        """(k, 3): points (k, 3) in the box."""
+        return np.asarray(0.5 + (points - self._center) @ self._linear.T)
+
+
+def places(rays: Rays, chosen: Integers, distance: Array) -> Array:
+    """(k, 3): places at distances (k,) on the `chosen` rays (k,), in metres from the eye."""
+    return np.asarray(rays.origins[chosen] + distance[:, None] * rays.directions[chosen])
+
+
+def volume_segments(
+    scene: Scene, volume: Volume, rays: Rays, intervals: Intervals, crossings: Crossings
+) -> tuple[Segments, Array]:
+    """The media on each ray, in order, and what fills each segment where the density is 1.
+
+    Segments get the mean extinction and emission between their ends, so that their optical depth is exact. So is what
+    they emit where it varies as the extinction does, that is in one medium; for mixtures see `emission_of_mixtures`.
+
+    Parameters
+    ----------
+    scene : Scene
+    volume : Volume
+        Of the scene.
+    rays : Rays
+    intervals, crossings
+        As for `scene_segments`.
+
+    Returns
+    -------
+    segments : Segments
+    filling : (k, n) float64
+        `Volume` explains it.
+    """
+    segments = scene_segments(scene, intervals, crossings)
+    filling = _filling(scene, intervals, crossings)
+    ends = (places(rays, segments.pixel, t) for t in (segments.t_enter, segments.t_exit))
+    weights = volume.between(filling, *ends)
+    extinction, emission = weights @ volume.extinction, weights @ volume.emission
+    return replace(segments, extinction=extinction, emission=emission), filling
+
+
+def _filling(scene: Scene, intervals: Intervals, crossings: Crossings) -> Array:
+    """(k, n): what fills each segment that `scene_segments` makes of the same arguments."""
+    pixel, t_enter, t_exit, bodies, windings = _pieces(intervals, crossings)
+    solid = np.zeros((len(pixel), len(scene.objects)))
+    solid[:, bodies] = _weights(scene, bodies, windings).T
+    sheet = np.zeros((len(crossings.body), len(scene.objects)))
+    sheet[np.arange(len(sheet)), crossings.body] = 1.0
+    at = crossings.distance
+    columns = [np.concatenate(pair) for pair in ((t_exit, at), (t_enter, at), (pixel, crossings.pixel))]
+    return np.concatenate([solid, sheet])[np.lexsort(columns)]
+
+
+def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> Array:
+    """(b, k): how often the medium of each body fills each place, by the overlap policy of the scene."""
+    inside = windings > 0
+    if scene.overlap == "add" or not len(bodies):
+        return np.maximum(windings, 0).astype(np.float64)
+    weights = np.zeros(windings.shape)
+    places = np.flatnonzero(inside.any(axis=0))
+    if scene.overlap == "priority":
+        order = np.argsort([-scene.objects[i].priority for i in bodies], kind="stable")
+        weights[order[inside[order].argmax(axis=0)][places], places] = 1.0
+        return weights
+    keys = [_medium_key(scene, i) for i in bodies]
+    for key in dict.fromkeys(keys):
+        alike = np.array([row for row, other in enumerate(keys) if other == key])
+        present = np.flatnonzero(inside[alike].any(axis=0))
+        weights[alike[inside[alike].argmax(axis=0)][present], present] = 1.0
+    return weights
+
+
+def _medium_key(scene: Scene, index: int) -> tuple[object, ...]:
+    """Equal for bodies of one medium, which fill their common places once; what a density scales is only its body's."""
+    body = scene.objects[index]
+    medium = body.medium
+    if medium is None or body.density is not None:
+        return (index,)
+    values = (medium.extinction, medium.scattering, medium.emission)
+    return (*(tuple(np.asarray(v).tolist()) for v in values), medium.anisotropy if medium.scatters else 0.0)
