@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -89,10 +90,16 @@ class Frame:
         linear = np.clip(np.asarray(self.radiance, dtype=np.float64) * 2.0**exposure, 0.0, 1.0)
         return np.rint(linear_to_srgb(linear) * 255.0).astype(np.uint8)
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, exposure: float = 0.0) -> None:
         """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).
 
         The file appears complete or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+        exposure : float
+            Stops that a ``.png`` is brighter; the other files hold what was rendered.
 
         Raises
         ------
@@ -103,20 +110,20 @@ class Frame:
         """
         path = Path(path)
         check_output(path)
-        write_atomically(path, _WRITERS[path.suffix.lower()].__get__(self))
+        write_atomically(path, partial(_WRITERS[path.suffix.lower()], self, exposure=exposure))
 
-    def _write_png(self, path: Path) -> None:
+    def _write_png(self, path: Path, exposure: float) -> None:
         from PIL import Image
 
-        Image.fromarray(self.to_srgb8()).save(path, format="PNG")
+        Image.fromarray(self.to_srgb8(exposure)).save(path, format="PNG")
 
-    def _write_npz(self, path: Path) -> None:
+    def _write_npz(self, path: Path, exposure: float) -> None:
         with path.open("wb") as stream:
             arrays = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS)}
             arrays = {name: array for name, array in arrays.items() if array is not None}
             np.savez_compressed(stream, allow_pickle=False, **arrays)
 
-    def _write_exr(self, path: Path) -> None:
+    def _write_exr(self, path: Path, exposure: float) -> None:
         import OpenEXR
 
         channels = {"RGB": np.ascontiguousarray(self.radiance, dtype=np.float32)}
@@ -145,7 +152,7 @@ class Frame:
         return stream.getvalue()
 
 
-_WRITERS: dict[str, Callable[[Frame, Path], None]] = {
+_WRITERS: dict[str, Callable[..., None]] = {
     ".png": Frame._write_png,
     ".exr": Frame._write_exr,
     ".npz": Frame._write_npz,

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.camera import MAX_COORDINATE
 from translucent.color import parse_color
 from translucent.errors import InputError
 
@@ -35,7 +36,10 @@ class PointLight:
     intensity: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", _vector("light position", self.position))
+        position = _vector("light position", self.position)
+        if (farthest := float(np.abs(position).max())) > MAX_COORDINATE:
+            raise InputError("light position", f"{farthest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
+        object.__setattr__(self, "position", position)
         object.__setattr__(self, "intensity", _positive("light intensity", self.intensity))
 
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
@@ -130,7 +134,9 @@ class Environment:
         return cls("gradient", _radiance(bottom), _radiance(top))
 
     @classmethod
-    def checkerboard(cls, first: ColorLike, second: ColorLike, tiles: float = 8.0) -> Environment:
+    def checkerboard(
+        cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
+    ) -> Environment:
         """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
         return cls("checkerboard", _radiance(first), _radiance(second), tiles)
 

@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterable
 
 from translucent.errors import InputError
 from translucent.plan_limits import (
+    MAX_SCATTER_LIGHTS,
     closed_sheet_limits,
     mesh_limits,
     open_bodies,
     open_limits,
+    scattering_limits,
     unmodelled_effects,
 )
 from translucent.render_plan import Capabilities, PassSpec, RenderPlan
@@ -88,7 +90,7 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         return _plan_back_face_depth(scene, method)
     if isinstance(method, ThinLayer):
         return _plan_thin_layer(scene, method)
-    if method is None and _scatters(scene) and capabilities.shader_storage:
+    if _scatters(scene) and capabilities.shader_storage and method is None:
         why = "light scattered into the rays: each interval looks at the lights"
         return _plan_ordered(scene, FragmentLists(), capabilities, why)
     if method is None and not _solids(scene):
@@ -150,11 +152,17 @@ def _scatters(scene: Scene) -> bool:
     )
 
 
-def _light_views(scene: Scene) -> PassSpec:
+def _light_views(scene: Scene, points: int) -> PassSpec:
     solids, lights = _solids(scene), len(scene.lights)
+    if lights > MAX_SCATTER_LIGHTS:
+        raise InputError(
+            f"{lights} lights on media that scatter",
+            f"at most {MAX_SCATTER_LIGHTS} are followed into media",
+            f"leave out {lights - MAX_SCATTER_LIGHTS}, or let the media only absorb",
+        )
     reason = (
         f"{lights} {'light' if lights == 1 else 'lights'} on a medium that scatters: the surfaces on the way from each "
-        "light, in order, tell how much of it reaches any point"
+        f"light, in order, tell how much of it reaches the {points} points of an interval"
     )
     return PassSpec("light_views", reason, solids, lights, cost=lights * COSTS["fragment_lists"])
 
@@ -254,9 +262,11 @@ def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilitie
         passes.append(_declared_sheets(sheets))
     passes += _fallback_passes(scene, spectral=True)
     if _scatters(scene) and not isinstance(method, DepthPeeling):
-        passes.append(_light_views(scene))
+        passes.append(_light_views(scene, method.light_points))
     passes.append(_ordered_pass(scene, method, why))
     limits = open_limits(scene) + _layer_limits(scene, method)
+    if _scatters(scene):
+        limits += scattering_limits(scene)
     if sheets and any(body.medium is not None and body.medium.emits for body in scene.bodies):
         limits.append(
             "declared sheets among emitting media have no place in the order: they dim all light, and what they emit "

@@ -2,8 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from translucent.medium import Medium
 from translucent.scene import Object, Scene
 from translucent.thickness import Method, ThinLayer
+
+#: Lights that are followed into media.
+MAX_SCATTER_LIGHTS = 8
+
+#: Optical depth across a scene beyond which float32 places are too coarse for where light is scattered.
+DENSE = 1e5
+
+#: What a plan says that does not follow lights into media; the renderer warns of it.
+LIGHTS_LEFT_OUT = (
+    "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
+)
 
 
 def open_bodies(scene: Scene) -> tuple[int, ...]:
@@ -45,21 +59,45 @@ def mesh_limits(scene: Scene, method: Method) -> list[str]:
     return limits
 
 
+def scattering_limits(scene: Scene) -> list[str]:
+    """Where float32 cannot tell how far light gets into a medium that scatters it."""
+    dense = [
+        body.mesh.name
+        for body in scene.bodies
+        if body.medium is not None and body.medium.extinction.max() * scene.diagonal > DENSE
+    ]
+    names = ", ".join(map(repr, dense))
+    return [f"{names}: scattered light is not exact beyond an optical depth of {DENSE:g}"] if dense else []
+
+
 def unmodelled_effects(scene: Scene, *, scatters: bool) -> tuple[str, ...]:
     """What the scene asks for and a plan does not render; `scatters`: it has light scattered into the rays."""
     media = [body.medium for body in scene.bodies if body.medium is not None]
     effects = []
-    if any(medium.scatters for medium in media):
-        effects.append(
-            "light scattered more than once, and light from the environment scattered"
-            if scatters
-            else "in-scattered light: scattering only removes light"
-        )
+    if scattering := [medium for medium in media if medium.scatters]:
+        if scatters:
+            densest = max(float(np.max(np.asarray(medium.scattering))) for medium in scattering)
+            effects.append(
+                "light scattered more than once, of which there is much in bodies that are thicker than a mean free "
+                f"path, here {1 / densest:.2g} m; light of the environment scattered"
+            )
+        else:
+            effects.append(LIGHTS_LEFT_OUT if scene.lights else "in-scattered light: scattering only removes light")
+    elif scene.lights and not scene.opaque:
+        effects.append("lights: they shine on nothing, since no medium scatters and nothing is opaque")
     if any(medium.ior > 1 for medium in media):
         effects.append("refraction and reflection: rays go straight, though ior is above 1")
+    if clear := [body.mesh.name for body in scene.bodies if body.medium is not None and _clear(body.medium)]:
+        effects.append(f"{', '.join(map(repr, clear))}: invisible, since nothing in it absorbs, scatters or emits")
     if scene.opaque:
         effects.append("shadows: light reaches opaque objects through everything")
+    if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
+        effects.append(f'priorities: overlap="{scene.overlap}" does not use them')
     return tuple(effects)
+
+
+def _clear(medium: Medium) -> bool:
+    return not (medium.extinction > 0).any() and not medium.emits
 
 
 def _is_sheet(body: Object, method: Method) -> bool:

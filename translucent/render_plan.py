@@ -120,10 +120,8 @@ class RenderPlan:
         }
 
     def __str__(self) -> str:
-        lines = [
-            f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}, "
-            f"at about the cost of {self.cost:.1f} depth-only draws"
-        ]
+        cost = f", at about the cost of {self.cost:.1f} depth-only draws" if self.cost else ""
+        lines = [f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
         lines += [f"  limit: {limit}" for limit in self.limits]
         lines += [f"  not modelled: {effect}" for effect in self.unmodelled]

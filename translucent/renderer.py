@@ -19,6 +19,7 @@ from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
 from translucent.plan import plan, plan_over_backdrop
+from translucent.plan_limits import LIGHTS_LEFT_OUT
 from translucent.render_plan import RenderPlan
 from translucent.scene import Scene
 from translucent.thickness import Method
@@ -228,6 +229,8 @@ def _check_backdrop(backdrop: Backdrop | TextureBackdrop, size: tuple[int, int])
 
 
 def _warn(frame: Frame) -> None:
+    if LIGHTS_LEFT_OUT in frame.plan.unmodelled:
+        warnings.warn(LIGHTS_LEFT_OUT, TranslucentWarning, stacklevel=3)
     if invalid := int(np.count_nonzero(~frame.valid)):
         covered = int(np.count_nonzero(frame.coverage))
         why = "; ".join(frame.plan.limits) or "a surface that does not balance"

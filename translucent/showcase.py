@@ -13,7 +13,7 @@ from translucent.camera import Camera
 from translucent.lights import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
-from translucent.scene import Object, Scene
+from translucent.scene import Light, Object, Scene
 
 #: Linear color that the default medium keeps of white light after `DEFAULT_REACH` of the mesh's diagonal.
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
@@ -31,6 +31,7 @@ def showcase(
     size: tuple[int, int] = (1280, 720),
     camera: Camera | None = None,
     environment: Environment | None = None,
+    lights: Sequence[Light] = (),
 ) -> Scene:
     """A scene that shows one mesh well.
 
@@ -44,10 +45,12 @@ def showcase(
     camera : Camera, optional
         Default: from the front right and above, the whole mesh in view.
     environment : Environment, optional
-        Default: a light table, white above and light grey below.
+        Default: a light table, white above and light grey below. Lights show best before a dark one.
+    lights : sequence of PointLight or DirectionalLight
+        What shines into the medium, if it scatters.
     """
     shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
-    return Scene([shown], camera or framing([shown], size), environment=environment or LIGHT_TABLE)
+    return Scene([shown], camera or framing([shown], size), lights, environment or LIGHT_TABLE)
 
 
 def framing(

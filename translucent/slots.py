@@ -58,14 +58,18 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
 
 def require_clear_priorities(scene: Scene) -> None:
     """Raise where two bodies of different media and equal priority may claim the same place."""
-    bodies = [body for body in scene.bodies if body.sheet_thickness is None]
-    for j, later in enumerate(bodies):
-        for earlier in bodies[:j]:
-            if later.priority == earlier.priority and not same_medium(later, earlier) and may_overlap(later, earlier):
+    bodies = [
+        (i, body) for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None
+    ]
+    for place, (j, later) in enumerate(bodies):
+        for i, earlier in bodies[:place]:
+            if later.priority != earlier.priority or _fill_alike(scene, later, earlier):
+                continue
+            if may_overlap(later, earlier):
                 raise InputError(
                     'overlap="priority"',
-                    f"{earlier.mesh.name!r} and {later.mesh.name!r} may overlap with different media, and both have "
-                    f"priority {later.priority}",
+                    f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap with different "
+                    f"media, and both have priority {later.priority}",
                     "give the one that displaces the other a higher priority",
                 )
 
@@ -85,9 +89,7 @@ def may_overlap(a: Object, b: Object) -> bool:
 
 
 def _share(scene: Scene, a: Object, b: Object) -> bool:
-    if not (_never_negative(a) and _never_negative(b) and same_medium(a, b)):
-        return False
-    if scene.lights and not _scatter_alike(a, b):
+    if not (_never_negative(a) and _never_negative(b) and _fill_alike(scene, a, b)):
         return False
     return scene.overlap != "priority" or a.priority == b.priority
 
@@ -96,8 +98,11 @@ def _never_negative(body: Object) -> bool:
     return body.mesh.diagnosis.solid and not body.mesh.diagnosis.inside_out_parts
 
 
-def _scatter_alike(a: Object, b: Object) -> bool:
-    assert a.medium is not None
-    assert b.medium is not None
+def _fill_alike(scene: Scene, a: Object, b: Object) -> bool:
+    """Whether it makes no difference which of two bodies fills a place."""
+    if a.medium is None or b.medium is None or not same_medium(a, b):
+        return False
+    if not scene.lights:
+        return True
     same = np.array_equal(a.medium.scattering, b.medium.scattering)
     return same and a.medium.anisotropy == b.medium.anisotropy

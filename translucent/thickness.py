@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -210,4 +211,6 @@ def method_from_name(name: str) -> Method:
     try:
         return METHODS[name.replace("_", "-").lower()]()
     except KeyError:
-        raise InputError(f"method {name!r}", "not a known method", f"use one of {', '.join(METHODS)}") from None
+        close = difflib.get_close_matches(name.replace("_", "-").lower(), METHODS, n=1)
+        do = f"did you mean {close[0]}?" if close else f"use one of {', '.join(METHODS)}"
+        raise InputError(f"method {name!r}", "not a known method", do) from None

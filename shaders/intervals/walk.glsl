@@ -4,6 +4,7 @@
 
 #include "lib/optics.glsl"
 #include "intervals/crossing.glsl"
+#include "intervals/slots.glsl"
 #if SCATTER
 #include "volume/in_scatter.glsl"
 #endif
@@ -31,31 +32,14 @@ struct Contents {
 Contents contents(int winding[SLOTS]) {
     Contents mix = Contents(vec3(0.0), vec3(0.0), 0.0, false);
     for (int slot = 0; slot < SLOTS; ++slot) {
-        int turns = winding[slot];
-        mix.inside_out = mix.inside_out || turns < 0;
-        // Left before it is entered: next to a silhouette, where rounding has the two change places.
-        if (turns <= 0) { continue; }
+        mix.inside_out = mix.inside_out || winding[slot] < 0;
+        float turns = float(slot_turns(winding, slot));
+        mix.extinction += turns * slot_extinction[slot].rgb;
+        mix.emission += turns * slot_emission[slot].rgb;
 #if UNION
-        // Open bodies have slots of their own: a medium that an earlier slot has brought does not count again.
-        bool again = false;
-        for (int other = 0; other < slot; ++other) {
-            again = again || (winding[other] > 0 && slot_extinction[other].rgb == slot_extinction[slot].rgb
-                              && slot_emission[other].rgb == slot_emission[slot].rgb);
-        }
-        if (again) { continue; }
-#endif
-#if UNION || PRIORITY
-        turns = 1;
-#endif
-        mix.extinction += float(turns) * slot_extinction[slot].rgb;
-        mix.emission += float(turns) * slot_emission[slot].rgb;
-#if UNION
-        mix.count = 1.0;
+        mix.count = max(mix.count, turns);
 #else
-        mix.count += float(turns);
-#endif
-#if PRIORITY
-        break;  // slots are sorted by priority
+        mix.count += turns;
 #endif
     }
     return mix;

@@ -19,6 +19,7 @@ layout(location = 0) out vec2 path_and_count;
 #endif
 
 void main() {
+    if (axial < axial_start) { discard; }  // behind an orthographic picture
 #if OPAQUE
     // What lies on an opaque surface is seen, also where rounding puts it behind.
     if (axial > last_axial() + sheet_tolerance) { discard; }

@@ -6,6 +6,7 @@
 // point light is near, the angle seen from it takes the place of s (equiangular sampling, Kulla & Fajardo 2012), which
 // cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone.
 
+#include "intervals/slots.glsl"
 #include "volume/light_views.glsl"
 
 struct ViewRay {
@@ -29,15 +30,10 @@ ViewRay ray_from(float place) {
 vec3 scattering_phase(int winding[SLOTS], float cos_scatter) {
     vec3 sum = vec3(0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
-        int turns = winding[slot];
-        if (turns <= 0) { continue; }
-#if UNION || PRIORITY
-        turns = 1;
-#endif
-        sum += float(turns) * slot_scattering[slot].rgb * henyey_greenstein(cos_scatter, slot_scattering[slot].a);
-#if PRIORITY
-        break;
-#endif
+        int turns = slot_turns(winding, slot);
+        if (turns > 0) {
+            sum += float(turns) * slot_scattering[slot].rgb * henyey_greenstein(cos_scatter, slot_scattering[slot].a);
+        }
     }
     return sum;
 }
@@ -55,14 +51,19 @@ vec4 scattered_here(int winding[SLOTS], int light, ViewRay ray, float s, out vec
     return vec4(power * scattering_phase(winding, cos_scatter), depth.a);
 }
 
-// (1 - e^-x) / x for any x, and its inverse warp.
-float secant_point(float u, float x) {
-    return abs(x) < 1e-3 ? u * (1.0 - 0.5 * x * (1.0 - u)) : -log(1.0 - (1.0 - exp(-x)) * u) / x;
-}
-
-float secant_jacobian(float u, float x) {
-    float q = 1.0 - exp(-x);
-    return abs(x) < 1e-3 ? 1.0 - 0.5 * x * (1.0 - 2.0 * u) : q / x / (1.0 - q * u);
+// Where v in 0..1 a share u of the integral of e^(-x v) is reached, and dv / du there. A rising exponential is a falling
+// one seen from its other end.
+vec2 secant_point(float u, float x) {
+    float fall = abs(x);
+    float share = x < 0.0 ? 1.0 - u : u;
+    float q = opacity(vec3(fall)).x;
+    vec2 found;
+    if (fall < 1e-3) {
+        found = vec2(share * (1.0 - 0.5 * fall * (1.0 - share)), 1.0 - 0.5 * fall * (1.0 - 2.0 * share));
+    } else {
+        found = vec2(-log_one_minus(q * share), q / (1.0 - q * share)) / fall;
+    }
+    return x < 0.0 ? vec2(1.0 - found.x, found.y) : found;
 }
 
 vec3 scatter_from_light(int winding[SLOTS], int light, ViewRay ray, float metres, vec3 sigma) {
@@ -92,12 +93,11 @@ vec3 scatter_from_light(int winding[SLOTS], int light, ViewRay ray, float metres
         const int channels = 3;
 #endif
         for (int channel = 0; channel < channels; ++channel) {
-            float x = clamp(rise[channel], -60.0, 60.0);
-            float v = secant_point(u, x);
-            float weight = gauss[i].y * secant_jacobian(u, x);
-            float s = metres * v;
+            vec2 warped = secant_point(u, rise[channel]);
+            float weight = gauss[i].y * warped.y;
+            float s = metres * warped.x;
             if (angular) {
-                float tangent = tan(first + angle * v);
+                float tangent = tan(first + angle * warped.x);
                 s = clamp(closest + height * tangent, 0.0, metres);
                 weight *= angle * height * (1.0 + tangent * tangent);
             } else {

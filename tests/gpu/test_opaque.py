@@ -177,3 +177,29 @@ def test_several_samples_smooth_the_edges_of_opaque_objects(renderer: tl.Rendere
     one, many = (renderer.render(scene, SIZE, samples=n) for n in (1, 16))
     np.testing.assert_array_equal(one.thickness, many.thickness)
     assert len(np.unique(many.radiance)) > len(np.unique(one.radiance))
+
+
+def test_of_coincident_opaque_objects_the_first_is_seen(renderer: tl.Renderer) -> None:
+    objects = [tl.Object(BODY, None, color=color) for color in ((1, 0, 0), (0, 0, 1))]
+    scene = tl.Scene([tl.Object(BALL, WINE, np.diag([0.5, 0.5, 0.5, 1])), *objects], CAMERAS["perspective"])
+    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
+    assert frame.radiance[..., 0][60, 80] > 0.5
+    assert (np.abs(frame.radiance - truth.radiance) > 1e-3).mean() <= 0.02
+
+
+def test_lights_that_shine_on_nothing_opaque_are_not_counted(renderer: tl.Renderer) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE)], CAMERAS["perspective"], LIGHTS * 17)
+    assert renderer.render(scene, SIZE).valid.all()
+
+
+@pytest.mark.parametrize("z", [0.0, -2.0])
+def test_a_sheet_behind_an_orthographic_picture_is_not_seen(renderer: tl.Renderer, z: float) -> None:
+    matrix = np.eye(4)
+    matrix[2, 3] = z
+    bubble = tl.Object(BALL, WINE, matrix, sheet_thickness=0.01)
+    camera = tl.Camera.orthographic((0.1, 0.2, 0.1), (0.1, 0.2, 5), height=3)
+    scene = tl.Scene([bubble], camera)
+    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
+    inside = interior(tl.reference.hit_counts(scene, SIZE))
+    assert np.quantile(np.abs(frame.thickness - truth.thickness)[inside], 0.98) <= 1e-4
+    assert frame.coverage.any() == (z == 0.0)

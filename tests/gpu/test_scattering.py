@@ -201,7 +201,9 @@ def test_buffers_of_the_views_grow(renderer: tl.Renderer, monkeypatch: pytest.Mo
 def test_more_lights_than_the_shaders_hold_are_refused(renderer: tl.Renderer) -> None:
     scene = ball_scene(LIGHTS["side"], 3.0)
     many = tl.Scene(scene.objects, scene.camera, [LIGHTS["side"]] * 9, BLACK)
-    with pytest.raises(tl.InputError, match="scattering; 9 lights; use at most 8"):
+    with pytest.raises(
+        tl.InputError, match="9 lights on media that scatter; at most 8 are followed into media; leave out 1"
+    ):
         renderer.render(many, SIZE)
 
 
@@ -210,3 +212,88 @@ def test_samples_average_scattered_light(renderer: tl.Renderer) -> None:
     one, many = renderer.render(scene, SIZE), renderer.render(scene, SIZE, samples=4)
     np.testing.assert_allclose(many.radiance[20:40, 20:40], one.radiance[20:40, 20:40], rtol=0.1, atol=1e-4)
     assert (one.radiance != many.radiance).any()
+
+
+@pytest.mark.parametrize("depth", [300.0, 1e4])
+def test_dense_media_stay_bright(renderer: tl.Renderer, depth: float) -> None:
+    """A slab that only scatters, lit from the camera's side: p E / (1 + 1 / mu), whatever its density."""
+    slab = Box.slab((4.0, 4.0), 1.0).tessellate()
+    camera = tl.Camera.orthographic((0, 0, 5), (0, 0, 0), height=1.0)
+    light = tl.DirectionalLight((0.3, 0.2, -1), (1, 1, 1))
+    scene = tl.Scene([tl.Object(slab, tl.Medium(scattering=depth))], camera, [light], BLACK)
+    cosine = -np.asarray(light.direction)[2]
+    exact = 1 / (4 * np.pi) / (1 + 1 / cosine)
+    frame = renderer.render(scene, (16, 16))
+    np.testing.assert_allclose(frame.radiance, exact, rtol=5e-3)
+
+
+def test_denser_media_than_float32_can_tell_are_a_limit(renderer: tl.Renderer) -> None:
+    limits = renderer.plan(ball_scene(LIGHTS["side"], 1e6)).limits
+    assert any("not exact beyond an optical depth of 100000" in limit for limit in limits)
+
+
+def test_views_shrink_until_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    from translucent.gpu.targets import Targets
+
+    scene = ball_scene(LIGHTS["near"], 3.0)
+    with tl.Renderer() as roomy:
+        usual = roomy.render(scene, SIZE).radiance
+    monkeypatch.setattr(Targets, "largest_storage", property(lambda _: 5_000_000))
+    with tl.Renderer() as tight:
+        small = tight.render(scene, SIZE).radiance
+    assert (small != usual).any()
+    error = np.sqrt(((small - usual) ** 2).mean() / (usual**2).mean())
+    assert error <= 0.01
+    monkeypatch.setattr(Targets, "largest_storage", property(lambda _: 50_000))
+    with (
+        tl.Renderer() as none,
+        pytest.raises(tl.RenderError, match="1 lights on media that scatter; what they see does"),
+    ):
+        none.render(scene, SIZE)
+
+
+def test_a_frame_after_a_failed_one_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    from translucent.gpu.targets import Targets
+
+    scene = ball_scene(LIGHTS["near"], 3.0)
+    with tl.Renderer() as renderer:
+        usual = renderer.render(scene, SIZE).radiance
+        with monkeypatch.context() as patched:
+            patched.setattr(Targets, "largest_storage", property(lambda _: 50_000))
+            with pytest.raises(tl.RenderError):
+                renderer.render(scene, (48, 48))
+        np.testing.assert_array_equal(renderer.render(scene, SIZE).radiance, usual)
+
+
+def test_union_scatters_a_medium_once(renderer: tl.Renderer) -> None:
+    """An open twin of a body has a slot of its own, and yet its medium is there already."""
+    cube = Box().tessellate()
+    stray = np.concatenate([cube.vertices, [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]])
+    twin = tl.Mesh(stray, [*cube.faces.tolist(), [8, 9, 10]], name="with a stray triangle")
+    milk = tl.Medium(absorption=0.5, scattering=1.0)
+    camera = tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))
+    one = tl.Scene([tl.Object(cube, milk)], camera, [LIGHTS["side"]], BLACK, overlap="union")
+    two = tl.Scene([tl.Object(cube, milk), tl.Object(twin, milk)], camera, [LIGHTS["side"]], BLACK, overlap="union")
+    single = renderer.render(one, SIZE)
+    with pytest.warns(tl.TranslucentWarning, match="stray triangle"):
+        double = renderer.render(two, SIZE)
+    sound = double.valid & (single.thickness > 0.5)
+    np.testing.assert_allclose(double.radiance[sound], single.radiance[sound], rtol=1e-3)
+
+
+def test_numbers_at_the_limits_stay_finite(renderer: tl.Renderer) -> None:
+    camera = tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))
+    for medium in (tl.Medium(scattering=1e300), tl.Medium(absorption=1e-300, scattering=1e-12)):
+        for place in ((1e18, 0, 0), (0, 0, 1e-9)):
+            lights = [tl.PointLight(place, (1, 1, 1))]
+            scene = tl.Scene([tl.Object(Box().tessellate(), medium)], camera, lights, BLACK)
+            assert np.isfinite(renderer.render(scene, (16, 16)).radiance).all()
+    with pytest.raises(tl.InputError, match="light position; 1e\\+39 m away; stay within 1e\\+18 m"):
+        tl.PointLight((1e39, 0, 0), (1, 1, 1))
+
+
+def test_a_method_that_leaves_scattered_light_out_says_so(renderer: tl.Renderer) -> None:
+    scene = ball_scene(LIGHTS["side"], 3.0)
+    for method in (tl.SignedDepth(), tl.DepthPeeling()):
+        with pytest.warns(tl.TranslucentWarning, match="this method leaves out what lights send into media"):
+            renderer.render(scene, SIZE, method)

@@ -169,10 +169,8 @@ def test_a_disc_receives_what_goes_into_its_solid_angle() -> None:
         ((0, 0, 1e-310), 1e18),
         ((0, 0, 1e-200), 1e18),
         ((0, 0, 1e-9), 1e18),
-        ((0, 0, 1e150), 5e-300),
-        ((0, 0, 1e200), 0.0),
-        ((1.7e308, 1.7e308, 1.7e308), 0.0),
-        ((1.7e308, 1.7e308, -1.7e308), 0.0),
+        ((0, 0, 1e18), 5e-36),
+        ((-1e18, 1e18, -1e18), 0.0),
     ],
 )
 def test_a_point_light_anywhere_gives_a_number(position: tuple[float, ...], irradiance: float) -> None:

@@ -424,7 +424,13 @@ def test_a_method_has_a_name(name: str) -> None:
         assert method_from_name(written) == METHODS[name]()
 
 
-@pytest.mark.parametrize("name", ["magic", "signed depth", ""])
+def test_a_misspelt_method_is_guessed() -> None:
+    for name in ("signed depth", "Fragment-List", "kbuffer"):
+        with pytest.raises(tl.InputError, match=r"not a known method; did you mean (signed-depth|fragment|k-buffer)"):
+            method_from_name(name)
+
+
+@pytest.mark.parametrize("name", ["magic", ""])
 def test_an_unknown_method_names_the_known_ones(name: str) -> None:
     known = "signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists, k-buffer"
     with pytest.raises(tl.InputError, match=f"^method '{name}'; not a known method; use one of {known}"):

@@ -168,8 +168,8 @@ def test_the_bounds_are_those_of_the_turned_body() -> None:
 def test_two_media_of_one_priority_must_not_claim_one_place(method: Any) -> None:
     wine = body(WINE, OPEN, (0.5, 0, 0), priority=4)
     message = (
-        "overlap=\"priority\"; 'box' and 'open box' may overlap with different media, and both have priority 4; give "
-        "the one that displaces the other a higher priority"
+        "overlap=\"priority\"; objects 1 ('box') and 2 ('open box') may overlap with different media, and both have "
+        "priority 4; give the one that displaces the other a higher priority"
     )
     scene = tl.Scene([body(at=(9, 0, 0)), body(priority=4), wine], CAMERA, overlap="priority")
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):

@@ -84,7 +84,7 @@ def read_environment(background: str) -> Environment | None:
     if background == "studio":
         return None
     if background == "checkerboard":
-        return Environment.checkerboard((0.9, 0.9, 0.9), (0.6, 0.6, 0.6), tiles=12)
+        return Environment.checkerboard(tiles=12)
     return Environment.constant(background)
 
 

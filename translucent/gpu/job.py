@@ -88,7 +88,7 @@ class FrameJob:
                 )
             ),
             MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self.media_range)),
-            LIGHTS: gl.buffer(light_uniforms(scene)),
+            LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque)),
             ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
         }
         self._cleared: set[str] = set()

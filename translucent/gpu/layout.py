@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.plan_limits import MAX_SCATTER_LIGHTS
 from translucent.slots import MAX_SLOTS
 
 #: GLSL type, size and alignment in bytes (std140) of a NumPy field. Other shapes are not used: std140 pads them oddly.
@@ -23,8 +24,7 @@ _TYPES: dict[tuple[str, tuple[int, ...]], tuple[str, int, int]] = {
 #: Lights that shine on opaque objects.
 MAX_LIGHTS = 32
 
-#: Lights that media scatter, and views from them: one each, or the six of a cube.
-MAX_SCATTER_LIGHTS = 8
+#: Views from lights that media scatter: one each, or the six of a cube.
 MAX_LIGHT_VIEWS = 6 * MAX_SCATTER_LIGHTS
 
 #: Gauss-Legendre points for each interval.

@@ -129,8 +129,6 @@ class GpuRenderer:
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
-        gl = self.context.gl
-        gl.viewport = (0, 0, *job.targets.size)
         self._timer.begin_frame()
         for spec in job.plan.passes:
             if geometry_only and not spec.geometry_passes:

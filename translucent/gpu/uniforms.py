@@ -15,7 +15,6 @@ from translucent.gpu.layout import (
     LIGHTS,
     MAX_LIGHT_VIEWS,
     MAX_LIGHTS,
-    MAX_SCATTER_LIGHTS,
     MAX_SCATTER_POINTS,
     MEDIA,
     SCATTER,
@@ -26,6 +25,7 @@ from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
 from translucent.gpu.shaders import CONSTANTS
 from translucent.lights import Environment, PointLight
 from translucent.medium import Medium
+from translucent.plan_limits import MAX_SCATTER_LIGHTS
 from translucent.reference.sheets import SHEET_ON_OPAQUE
 from translucent.scene import Scene
 from translucent.slots import MAX_SLOTS, Slot
@@ -179,7 +179,8 @@ def media_uniforms(scene: Scene, slots: tuple[Slot, ...], placements: list[Place
     for i, slot in enumerate(slots[:MAX_SLOTS]):
         extinction[i, :3] = bounded_extinction(slot.medium, scene.diagonal)
         emission[i, :3] = slot.medium.emission
-        scattering[i] = *np.asarray(slot.medium.scattering), slot.medium.anisotropy
+        share = extinction[i, :3] / np.where(slot.medium.extinction > 0, slot.medium.extinction, 1.0)
+        scattering[i] = *(share * np.asarray(slot.medium.scattering)), slot.medium.anisotropy
         extinction[i, 3] = sum(placements[k].expected_count[0] for k in slot.objects)
         emission[i, 3] = sum(placements[k].expected_count[1] for k in slot.objects)
     return MEDIA.pack(
@@ -211,12 +212,6 @@ class LightViews:
     inside: tuple[bool, ...]
     spans: Array
     rows: Array
-
-
-def require_few_lights(scene: Scene) -> None:
-    """Raise where there are more lights than the Scatter block holds."""
-    if len(scene.lights) > MAX_SCATTER_LIGHTS:
-        raise InputError("scattering", f"{len(scene.lights)} lights", f"use at most {MAX_SCATTER_LIGHTS}")
 
 
 def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightViews, points: int) -> bytes:
@@ -265,23 +260,24 @@ def slot_bits(count: int) -> int:
     return max(count - 1, 0).bit_length()
 
 
-def light_uniforms(scene: Scene) -> bytes:
-    """Contents of the Lights block.
+def light_uniforms(scene: Scene, shine: bool) -> bytes:
+    """Contents of the Lights block: none where there is nothing opaque that they could shine on.
 
     Raises
     ------
     InputError
         If there are more lights than the block holds.
     """
-    if len(scene.lights) > MAX_LIGHTS:
-        raise InputError("lighting opaque objects", f"{len(scene.lights)} lights", f"use at most {MAX_LIGHTS}")
+    lights = scene.lights if shine else ()
+    if len(lights) > MAX_LIGHTS:
+        raise InputError("lighting opaque objects", f"{len(lights)} lights", f"use at most {MAX_LIGHTS}")
     place, power = np.zeros((MAX_LIGHTS, 4)), np.zeros((MAX_LIGHTS, 4))
-    for i, light in enumerate(scene.lights):
+    for i, light in enumerate(lights):
         if isinstance(light, PointLight):
             place[i], power[i, :3] = [*(np.asarray(light.position) - scene.camera.eye), 1.0], light.intensity
         else:
             place[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
-    return LIGHTS.pack(light_place=place, light_power=power, light_count=len(scene.lights))
+    return LIGHTS.pack(light_place=place, light_power=power, light_count=len(lights))
 
 
 def shade_uniforms(

@@ -34,6 +34,13 @@ class FragmentListsPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw and resolve the frame, in bands of rows where one buffer cannot hold it all."""
+        try:
+            self._run_bands(job, spec)
+        finally:
+            for framebuffer in (job.targets.nothing(), job.targets.ordered()):
+                framebuffer.scissor = None
+
+    def _run_bands(self, job: FrameJob, spec: PassSpec) -> None:
         width, height = job.targets.size
         pending = [(0, height)]
         while pending:
@@ -55,8 +62,6 @@ class FragmentListsPass:
                     f"one row has {needed} surfaces, and this OpenGL holds {job.targets.largest_storage // _NODE}",
                     "use DepthPeeling",
                 )
-        for framebuffer in (job.targets.nothing(), job.targets.ordered()):
-            framebuffer.scissor = None
 
     def _nodes(self, job: FrameJob) -> moderngl.Buffer:
         width, height = job.targets.size

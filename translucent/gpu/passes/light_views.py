@@ -9,13 +9,14 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.errors import RenderError
 from translucent.gpu.job import FrameJob
 from translucent.gpu.light_cameras import light_cameras, media_sphere
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
-from translucent.gpu.uniforms import LightViews, require_few_lights
+from translucent.gpu.uniforms import LightViews
 from translucent.render_plan import PassSpec
 from translucent.scene import Light
 
@@ -24,8 +25,8 @@ _NODE, _MEDIUM = 16, 16
 
 Array = npt.NDArray[np.float64]
 
-#: Texels along a side of a light's only view, and of the six of a cube.
-_SIDE, _CUBE_SIDE = 1024, 512
+#: Texels along a side of a light's view, and twice those of each of the six of a cube: the first that fit are taken.
+_SIDES = (1024, 512, 256, 128)
 
 #: Binding points of the buffers while they are made, and while they are read.
 _COUNT, _HEADS, _NODES, _MEDIA, _ENDS = 0, 1, 2, 5, 6
@@ -46,41 +47,57 @@ class LightViewsPass:
         self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
         self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_place=0)
         self._opaque = OpaquePass(gl)
-        self._targets = {side: Targets(gl, (side, side)) for side in (_SIDE, _CUBE_SIDE)}
+        self._targets: dict[int, Targets] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Make the lists of all views, and tell the shaders where the lights are."""
-        require_few_lights(job.scene)
         if job.light_views is None:  # else this is one more sample of a frame, and lights do not move
-            groups = [self._light_jobs(job, light) for light in job.scene.lights]
-            jobs = [light_job for group in groups for light_job in group]
-            try:
-                self._fill(job, spec, jobs)
-                job.light_views = light_views(groups)
-            finally:
-                for light_job in jobs:
-                    light_job.release()
+            for side in _SIDES:
+                if (found := self._look(job, spec, side)) is not None:
+                    job.light_views = found
+                    break
+            else:
+                raise RenderError(
+                    f"{len(job.scene.lights)} lights on media that scatter",
+                    f"what they see does not fit into the {job.targets.largest_storage / 1e6:.0f} MB that a shader of "
+                    "this OpenGL reaches",
+                    "use fewer lights, or simpler bodies",
+                )
         job.bind()
         for name, binding in _READ.items():
             if name != "light_ends" or job.scene.opaque:
                 job.targets.storage(name, 1).bind_to_storage_buffer(binding)
 
-    def _light_jobs(self, job: FrameJob, light: Light) -> list[FrameJob]:
-        cameras = light_cameras(light, job.scene)
-        targets = self._targets[_SIDE if len(cameras) == 1 else _CUBE_SIDE]
-        return [
-            FrameJob(job.gl, replace(job.scene, camera=camera), job.plan, targets, job.meshes) for camera in cameras
-        ]
+    def _look(self, job: FrameJob, spec: PassSpec, side: int) -> LightViews | None:
+        """What all lights see, in views of some size; None if no buffer holds it."""
+        groups = [self._light_jobs(job, light, side) for light in job.scene.lights]
+        jobs = [light_job for group in groups for light_job in group]
+        try:
+            return light_views(groups) if self._fill(job, spec, jobs) else None
+        finally:
+            for light_job in jobs:
+                light_job.release()
 
-    def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> None:
-        """Make all lists; once more, with larger buffers, if they did not fit."""
+    def _light_jobs(self, job: FrameJob, light: Light, side: int) -> list[FrameJob]:
+        cameras = light_cameras(light, job.scene)
+        side = side if len(cameras) == 1 else side // 2
+        if side not in self._targets:
+            self._targets[side] = Targets(self._gl, (side, side))
+        scenes = [replace(job.scene, camera=camera) for camera in cameras]
+        return [FrameJob(job.gl, scene, job.plan, self._targets[side], job.meshes) for scene in scenes]
+
+    def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> bool:
+        """Make all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
         storage, cells = job.targets.storage, sum(_cells(light_job) for light_job in jobs)
         # Where a light is inside, each of its lists begins with a crossing of its own.
         spare = sum(_cells(light_job) for light_job in jobs if light_job.starts_inside)
+        most = job.targets.largest_storage // max(_NODE, _MEDIUM)
+        if 4 * cells > job.targets.largest_storage or spare > most:
+            return False
         heads, count = storage("light_heads", 4 * cells), storage("light_count", 4)
         if job.scene.opaque:
             storage("light_ends", 4 * cells).bind_to_storage_buffer(_ENDS)
-        needed = int(_FIRST_SHARE * cells) + 1
+        needed = min(int(_FIRST_SHARE * cells) + 1, most)
         while True:
             nodes, media = storage("light_nodes", _NODE * needed), storage("light_media", _MEDIUM * needed)
             count.write(np.zeros(1, np.uint32))
@@ -92,9 +109,12 @@ class LightViewsPass:
             found = int(np.frombuffer(count.read(), np.uint32)[0]) + spare
             if found <= min(nodes.size // _NODE, media.size // _MEDIUM):
                 break
-            needed = int(found * _SLACK)
+            if found > most:
+                return False
+            needed = min(int(found * _SLACK), most)
         for light_job, offset in zip(jobs, _offsets(jobs), strict=True):
             self._sort(light_job, spec, offset)
+        return True
 
     def _draw(self, job: FrameJob, spec: PassSpec, offset: int) -> None:
         """Put the crossings of one view into its lists."""

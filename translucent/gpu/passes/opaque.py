@@ -23,7 +23,7 @@ class OpaquePass:
         nothing = float(CONSTANTS["NOTHING"])
         framebuffer.clear(nothing, 0.0, 0.0, 0.0, depth=1.0)
         job.gl.enable_only(moderngl.DEPTH_TEST)
-        # Surfaces at the very end of the range count, too.
+        # Surfaces at the very end of the range count, too; and of surfaces in one place, those of the first object.
         job.gl.depth_func = "<="
-        job.draw(self._variants.program(WITH_NORMAL=1, WITH_POSITION=1), spec.objects)
+        job.draw(self._variants.program(WITH_NORMAL=1, WITH_POSITION=1), spec.objects[::-1])
         job.gl.depth_func = "<"

@@ -1,0 +1,25 @@
+// How often the medium of a slot fills a place with the given winding numbers. Left before it is entered, as next to a
+// silhouette, where rounding has the two change places, it does not.
+
+#include <Media>
+
+int slot_turns(int winding[SLOTS], int slot) {
+    if (winding[slot] <= 0) { return 0; }
+#if PRIORITY
+    // Slots are sorted by priority.
+    for (int other = 0; other < slot; ++other) {
+        if (winding[other] > 0) { return 0; }
+    }
+    return 1;
+#elif UNION
+    // Open bodies have slots of their own: a medium that an earlier slot has brought does not count again.
+    for (int other = 0; other < slot; ++other) {
+        bool alike = slot_extinction[other].rgb == slot_extinction[slot].rgb
+            && slot_emission[other].rgb == slot_emission[slot].rgb && slot_scattering[other] == slot_scattering[slot];
+        if (winding[other] > 0 && alike) { return 0; }
+    }
+    return 1;
+#else
+    return winding[slot];
+#endif
+}
