@@ -75,7 +75,7 @@ class Frame:
     def summary(self) -> dict[str, Any]:
         """What happened, in numbers that JSON can hold; thickness in metres over the valid, covered pixels."""
         seen = self.thickness[self.coverage & self.valid]
-        return {
+        found: dict[str, Any] = {
             "size": list(self.size),
             "plan": self.plan.summary(),
             "seconds": dict(self.seconds),
@@ -84,6 +84,9 @@ class Frame:
             "invalid_pixels": int((~self.valid).sum()),
             "thickness": {"median": float(np.median(seen)), "max": float(seen.max())} if seen.size else None,
         }
+        if self.layers is not None and self.truncated is not None:
+            found["layers"] = {"max": int(self.layers.max()), "truncated_pixels": int((self.truncated > 0).sum())}
+        return found
 
     def to_srgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: the radiance, `exposure` stops brighter, clamped to 0..1 and sRGB-encoded."""

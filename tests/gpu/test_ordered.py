@@ -370,6 +370,14 @@ def test_without_shader_storage_the_planner_peels(monkeypatch: pytest.MonkeyPatc
             renderer.render(shells(3), (32, 24), tl.FragmentLists())
 
 
+def test_the_summary_counts_layers(renderer: tl.Renderer) -> None:
+    with pytest.warns(tl.TranslucentWarning, match="more than 4 surfaces"):
+        summary = renderer.render(shells(3), (32, 24), tl.KBuffer(k=4)).summary()
+    assert summary["layers"]["max"] == 6
+    assert summary["layers"]["truncated_pixels"] == summary["invalid_pixels"] > 0
+    assert "layers" not in renderer.render(shells(1), (32, 24), tl.SignedDepth()).summary()
+
+
 def test_a_saved_frame_holds_its_layers(renderer: tl.Renderer, tmp_path: Path) -> None:
     frame = renderer.render(shells(3), (32, 24))
     frame.save(tmp_path / "a.npz")
