@@ -12,6 +12,7 @@ from translucent.plan_limits import (
     mesh_limits,
     open_bodies,
     open_limits,
+    refuse_varying_density,
     scattering_limits,
     unmodelled_effects,
 )
@@ -19,6 +20,7 @@ from translucent.render_plan import Capabilities, PassSpec, RenderPlan
 from translucent.scene import Object, Scene
 from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, require_clear_priorities, same_medium
 from translucent.thickness import (
+    MAX_LIGHT_POINTS,
     BackFaceDepth,
     DepthPeeling,
     FragmentLists,
@@ -44,6 +46,7 @@ COSTS = {
     "depth_peeling": 2.4,
     "fragment_lists": 3.4,
     "k_buffer": 8.5,
+    "step": 0.1,  # of marching
     "resolve": 0.8,
 }
 
@@ -80,8 +83,7 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         require_clear_priorities(scene)
     if not capabilities.opengl:
         return _plan_traced(scene, method, capabilities)
-    if isinstance(method, RayMarched) or any(body.density is not None for body in scene.bodies):
-        raise _no_marching(scene)
+    refuse_varying_density(scene)
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
     if (why := _why_order_matters(scene, method)) is not None:
@@ -167,16 +169,6 @@ def _light_views(scene: Scene, points: int) -> PassSpec:
     return PassSpec("light_views", reason, solids, lights, cost=lights * COSTS["fragment_lists"])
 
 
-def _no_marching(scene: Scene) -> InputError:
-    """What to say where rays would have to be marched, which no pass does."""
-    dense = [body for body in scene.bodies if body.density is not None]
-    return InputError(
-        f"rendering {_names(dense)} with a density that varies" if dense else "RayMarched",
-        "no pass of the renderer marches rays",
-        "march them on the CPU: tl.reference.march(scene, size)",
-    )
-
-
 def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities) -> RenderPlan:
     """The plan of a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
     chosen = method or FragmentLists()
@@ -220,6 +212,11 @@ def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
     if isinstance(method, FragmentLists):
         reason = f"{why}; one draw into a list for each pixel, sorted afterwards"
         return PassSpec("fragment_lists", reason, solids, 1, cost=COSTS["fragment_lists"])
+    if isinstance(method, RayMarched):
+        reason = f"{why}; one draw into a list for each pixel, then {method.steps} steps through each interval"
+        return PassSpec(
+            "fragment_lists", reason, solids, 1, cost=COSTS["fragment_lists"] + COSTS["step"] * method.steps
+        )
     if isinstance(method, KBuffer):
         reason = f"{why}; one draw, of which each pixel keeps the {method.k} nearest surfaces"
         return PassSpec("k_buffer", reason, solids, 1, cost=COSTS["k_buffer"])
@@ -234,7 +231,7 @@ def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
 
 def _layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
     """What is left out where a ray can cross more surfaces than the method keeps."""
-    if isinstance(method, FragmentLists):
+    if isinstance(method, FragmentLists | RayMarched):
         return []
     most = method.max_layers if isinstance(method, DepthPeeling) else method.k
     bodies = [scene.objects[i] for i in _solids(scene)]
@@ -256,13 +253,16 @@ def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilitie
             f"{count} winding numbers for each ray, one for each medium, priority and open body: more than {MAX_SLOTS}",
             "let bodies share media and priorities, or close them",
         )
+    if isinstance(method, RayMarched) and method.quadrature == "gauss" and method.steps > MAX_LIGHT_POINTS:
+        raise InputError(f"{method}", f"shaders hold {MAX_LIGHT_POINTS} Gauss-Legendre points", "use fewer steps")
     passes = []
     # Sheets go first: their sums are read where the intervals are resolved.
     if sheets:
         passes.append(_declared_sheets(sheets))
     passes += _fallback_passes(scene, spectral=True)
     if _scatters(scene) and not isinstance(method, DepthPeeling):
-        passes.append(_light_views(scene, method.light_points))
+        points = method.steps if isinstance(method, RayMarched) else method.light_points
+        passes.append(_light_views(scene, points))
     passes.append(_ordered_pass(scene, method, why))
     limits = open_limits(scene) + _layer_limits(scene, method)
     if _scatters(scene):

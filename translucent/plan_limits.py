@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from translucent.errors import InputError
 from translucent.medium import Medium
 from translucent.scene import Object, Scene
 from translucent.thickness import Method, ThinLayer
@@ -46,6 +47,16 @@ def closed_sheet_limits(scene: Scene, method: ThinLayer) -> list[str]:
     solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
     names = ", ".join(repr(body.mesh.name) for body in solid)
     return [f"{names} closed, but drawn as sheets: what is inside is left out"] if solid else []
+
+
+def refuse_varying_density(scene: Scene) -> None:
+    """Raise where a density varies in space, which no pass renders."""
+    if dense := [body.mesh.name for body in scene.bodies if body.density is not None]:
+        raise InputError(
+            f"rendering {', '.join(map(repr, dense))} with a density that varies",
+            "no pass of the renderer goes through one",
+            "march the rays on the CPU: tl.reference.march(scene, size)",
+        )
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[str]:

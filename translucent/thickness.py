@@ -190,9 +190,9 @@ def _check_count(what: str, value: object, most: int) -> None:
 
 
 #: Methods that find the ordered intervals of each ray.
-OrderedMethod = DepthPeeling | FragmentLists | KBuffer
+OrderedMethod = DepthPeeling | FragmentLists | KBuffer | RayMarched
 
-Method = SignedDepth | BackFaceDepth | ThinLayer | OrderedMethod | RayMarched
+Method = SignedDepth | BackFaceDepth | ThinLayer | OrderedMethod
 
 #: Names on the command line.
 METHODS: dict[str, type[Method]] = {

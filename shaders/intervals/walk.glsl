@@ -8,6 +8,9 @@
 #if SCATTER
 #include "volume/in_scatter.glsl"
 #endif
+#if MARCH
+#include "volume/march.glsl"
+#endif
 
 #if SLOTS < 1
 #error a walk needs a slot
@@ -52,7 +55,12 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
     vec3 added = emitted_radiance(mix.emission, mix.extinction, metres);
 #if SCATTER
     if (mix.count > 0.0) {
+#if MARCH
+        ViewRay ray = ray_from(float(walk.place) / float(place_steps()));
+        added = marched(walk.winding, ray, metres, mix.extinction, mix.emission);
+#else
         added += in_scattered(walk.winding, ray_from(float(walk.place) / float(place_steps())), metres, mix.extinction);
+#endif
     }
 #endif
     if (backwards) {

@@ -496,12 +496,19 @@ def test_without_opengl_light_may_be_followed_or_not(scattering: bool, told: str
     assert found.unmodelled[0].startswith(told)
 
 
-def test_rays_that_would_have_to_be_marched_are_refused() -> None:
-    with pytest.raises(
-        tl.InputError, match=r"RayMarched; no pass of the renderer marches rays; .*tl\.reference\.march"
-    ):
-        plan(scene(body()), tl.RayMarched())
+def test_marching_goes_through_the_lists() -> None:
+    found = plan(scene(body(FIRE), body(WINE, x=0.5)), tl.RayMarched(steps=32))
+    assert names(found) == ["fragment_lists", "transmittance"]
+    assert "32 steps through each interval" in found.passes[0].reason
+    assert found.cost < plan(scene(body(FIRE), body(WINE, x=0.5)), tl.RayMarched(steps=64)).cost
+    with pytest.raises(tl.InputError, match="shaders hold 16 Gauss-Legendre points; use fewer steps"):
+        plan(scene(body()), tl.RayMarched(steps=17, quadrature="gauss"))
+    with pytest.raises(tl.InputError, match="RayMarched; this OpenGL has no shader storage"):
+        plan(scene(body()), tl.RayMarched(), NO_STORAGE)
+
+
+def test_densities_that_vary_are_refused() -> None:
     cloud = body(density=tl.DensityGrid(np.ones((2, 2, 2))))
-    with pytest.raises(tl.InputError, match=r"rendering 'box' with a density that varies; no pass"):
+    with pytest.raises(tl.InputError, match="rendering 'box' with a density that varies; no pass"):
         plan(scene(cloud))
     assert plan(scene(cloud), None, Capabilities(opengl=False)).exact

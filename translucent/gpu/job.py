@@ -29,7 +29,7 @@ from translucent.plan import FALLBACK_SHEET
 from translucent.render_plan import RenderPlan
 from translucent.scene import Object, Scene
 from translucent.slots import medium_slots
-from translucent.thickness import SignedDepth, ThinLayer
+from translucent.thickness import RayMarched, SignedDepth, ThinLayer
 
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
@@ -108,9 +108,12 @@ class FrameJob:
 
     def bind(self) -> None:
         """Bind this frame's uniforms, where another's have been bound since it was placed."""
+        if self.marches and not self.scatters and self.light_views is None:
+            self.light_views = LightViews(self.scene.camera.eye, (), np.zeros((0, 4)), np.zeros((0, 4)))
         if self.light_views is not None and SCATTER not in self._constant:
             view = View(self.scene.camera, self.targets.size)
-            points = getattr(self.plan.method, "light_points", 1)
+            method = self.plan.method
+            points = method.steps if isinstance(method, RayMarched) else getattr(method, "light_points", 1)
             content = scatter_uniforms(self.scene, self.media_range, view, self.light_views, points)
             self._constant[SCATTER] = self.gl.buffer(content)
         self._view.bind_to_uniform_block(VIEW.binding)
@@ -126,6 +129,11 @@ class FrameJob:
     def scatters(self) -> bool:
         """Whether light from the lights is scattered into the rays."""
         return any(step.name == "light_views" for step in self.plan.passes)
+
+    @property
+    def marches(self) -> bool:
+        """Whether the method steps through the intervals."""
+        return isinstance(self.plan.method, RayMarched)
 
     @property
     def starts_inside(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import moderngl
 
@@ -14,6 +14,7 @@ from translucent.color import LUMINANCE_WEIGHTS
 from translucent.errors import RenderError
 from translucent.gpu.layout import BLOCKS
 from translucent.optics import MIN_THIN_LAYER_COSINE
+from translucent.thickness import Quadrature
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8
@@ -33,6 +34,7 @@ CONSTANTS: dict[str, str] = {
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
     "PEEL_BATCH": str(PEEL_BATCH),
     "STEEP_IN_LIGHT_VIEW": "5e-3",  # places per texel, from which on a face may well curve within a texel
+    **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this share of it are near
     "FLAG_COVERED": "1.0",
     "FLAG_VALID": "2.0",

@@ -226,7 +226,8 @@ def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightV
     camera = view.camera
     half_width, half_height = camera.half_extent(view.size)
     place, power, spans = (np.zeros((MAX_SCATTER_LIGHTS, 4)) for _ in range(3))
-    for i, light in enumerate(scene.lights):
+    seen = scene.lights[: len(lights.spans)]
+    for i, light in enumerate(seen):
         if isinstance(light, PointLight):
             place[i], power[i, :3] = [*(np.asarray(light.position) - lights.center), 1.0], light.intensity
         else:
@@ -236,6 +237,7 @@ def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightV
     rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
     rows[: len(lights.rows)] = lights.rows
     gauss = np.zeros((MAX_SCATTER_POINTS, 4))
+    points = min(points, MAX_SCATTER_POINTS)  # marching by other rules has no use for them
     nodes, weights = np.polynomial.legendre.leggauss(points)
     gauss[:points, 0], gauss[:points, 1] = (nodes + 1) / 2, weights / 2
     center = lights.center - camera.eye
@@ -251,7 +253,7 @@ def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightV
         scatter_views=rows,
         gauss=gauss,
         gauss_count=points,
-        scatter_light_count=len(scene.lights),
+        scatter_light_count=len(seen),
     )
 
 

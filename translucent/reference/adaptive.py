@@ -17,6 +17,9 @@ Integrand = Callable[[Integers, Array], Array]
 #: Halvings of an interval, at most: float64 holds no more.
 ROUNDS = 45
 
+#: Intervals of a sum are not halved any more when there are so many: rounding, not the rule, sets the error.
+MOST_INTERVALS = 4096
+
 #: A channel that is dimmer than this share of the brightest one of its sum need not be as accurate.
 DIM = 1e-3
 
@@ -97,15 +100,16 @@ def integrate(
     Returns
     -------
     Integral
-        The error is above the tolerance where the integrand is singular.
+        The error is above the tolerance where the integrand is singular, or rounding makes it rough.
     """
     index, low, high = np.arange(len(start)), start, end
     value, error = _rules(integrand, index, low, high)
     for _ in range(ROUNDS):
         total, doubt = _sums(value, group[index], groups), _sums(error, group[index], groups)
         allowed = tolerance * np.maximum(total, DIM * total.max(axis=1, keepdims=True))
-        share = allowed / np.maximum(np.bincount(group[index], minlength=groups), 1)[:, None]
-        open_groups = (doubt > allowed).any(axis=1)
+        count = np.bincount(group[index], minlength=groups)
+        share = allowed / np.maximum(count, 1)[:, None]
+        open_groups = (doubt > allowed).any(axis=1) & (count < MOST_INTERVALS)
         split = open_groups[group[index]] & (error > share[group[index]]).any(axis=1)
         if not split.any():
             break

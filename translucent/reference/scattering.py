@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from translucent import optics
 from translucent.lights import PointLight
+from translucent.medium import MAX_COEFFICIENT
 from translucent.reference.adaptive import integrate
 from translucent.reference.compositing import _layers
 from translucent.reference.equiangular import equiangular
@@ -41,7 +42,8 @@ class Scattered:
     error : (n, 3) float64
         Estimated error of the radiance.
     valid : (n,) bool
-        The tolerance is met, the ray does not meet a light, and no light came through a hole of a body.
+        The tolerance is met, the ray does not meet a light, and no light came through a hole of a body. Media so deep
+        that light does not get as far as float64 can tell are left out, and invalid.
     """
 
     radiance: Array
@@ -62,13 +64,35 @@ def scattered_once(paths: LightPaths, rays: Rays, segments: Segments, filling: A
     tolerance : float
         Relative to the radiance of each ray.
     """
-    spans = _joined([_spans(paths, number, rays, segments, filling) for number in range(len(paths.lights))])
+    rounding = _rounding(paths, rays, segments)
+    chosen = np.flatnonzero(
+        (segments.t_exit > segments.t_enter)
+        & (filling @ paths.volume.scattering > 0).any(axis=1)
+        & (rounding <= 2.0 * tolerance)[segments.pixel]
+    )
+    spans = _joined([_spans(paths, number, rays, segments, chosen) for number in range(len(paths.lights))])
     work = _InScatter(paths, rays, segments, filling, spans)
     span, start, end = _cut(work)
     group = segments.pixel[spans.segment[span]]
     result = integrate(lambda index, u: work(span[index], u), start, end, group, len(rays), tolerance)
-    met = (result.error <= 2.0 * tolerance * result.value.max(axis=1, keepdims=True)).all(axis=1)
-    return Scattered(result.value, result.error, met & work.sound)
+    with np.errstate(under="ignore", over="ignore"):
+        error = result.error + np.minimum(rounding, 1.0)[:, None] * result.value
+    met = (error <= 2.0 * tolerance * result.value.max(axis=1, keepdims=True)).all(axis=1)
+    return Scattered(result.value, error, met & work.sound & (rounding <= 2.0 * tolerance))
+
+
+@np.errstate(over="ignore", under="ignore")
+def _rounding(paths: LightPaths, rays: Rays, segments: Segments) -> Array:
+    """(n,): relative error of what is scattered, since distances are rounded: deep media show a thinner skin than that.
+
+    Of rays that scatter.
+    """
+    scatters = np.flatnonzero(segments.t_exit > segments.t_enter)
+    reach = segments.t_exit[scatters] + paths.tracer.radius
+    found = np.zeros(len(rays))
+    depth = segments.extinction[scatters].max(axis=1, initial=0.0) * reach * np.finfo(np.float64).eps
+    np.maximum.at(found, segments.pixel[scatters], depth)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +172,10 @@ def light_source(
     arrival = paths.arrival(light, points)
     # The ray runs from the eye, and light to it.
     cosine = -np.einsum("ki,ki->k", arrival.travel, directions)
-    with np.errstate(under="ignore"):
-        return paths.volume.source(weights, cosine) * arrival.irradiance, arrival.sound
+    with np.errstate(under="ignore", over="ignore"):
+        source = paths.volume.source(weights, cosine) * arrival.irradiance
+    # Finite, so that nothing of it is left behind what is opaque.
+    return np.minimum(source, MAX_COEFFICIENT), arrival.sound
 
 
 def light_variable(
@@ -178,10 +204,8 @@ def depths_before(segments: Segments, pixels: int) -> Array:
     return before
 
 
-def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, filling: Array) -> _Spans:
-    """All segments that scatter, cut where the way of a light has kinks."""
-    scatters = (segments.t_exit > segments.t_enter) & (filling @ paths.volume.scattering > 0).any(axis=1)
-    chosen = np.flatnonzero(scatters)
+def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _Spans:
+    """Some segments, cut where the way of a light has kinks."""
     seen = np.unique(segments.pixel[chosen])
     light = paths.lights[number]
     edges = np.concatenate([outline_edges(traced, light) for traced in paths.tracer.objects])

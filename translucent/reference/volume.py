@@ -118,7 +118,8 @@ class _UnitBox:
 
 def places(rays: Rays, chosen: Integers, distance: Array) -> Array:
     """(k, 3): places at distances (k,) on the `chosen` rays (k,), in metres from the eye."""
-    return np.asarray(rays.origins[chosen] + distance[:, None] * rays.directions[chosen])
+    with np.errstate(under="ignore"):
+        return np.asarray(rays.origins[chosen] + distance[:, None] * rays.directions[chosen])
 
 
 def volume_segments(

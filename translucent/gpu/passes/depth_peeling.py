@@ -88,7 +88,15 @@ class DepthPeelingPass:
             for unit, texture in enumerate(job.targets.peel_state((folds - 1) % 2).color_attachments, PEEL_BATCH):
                 texture.use(unit)
         # Crossings that an opaque surface hides have been moved onto it: the walks need not know of it.
-        switches = {**walk_switches(job), "SCATTER": False, **ends, "BEGIN": folds == 0, "END": last, "OPAQUE": False}
+        switches = {
+            **walk_switches(job),
+            "SCATTER": False,
+            "MARCH": False,
+            **ends,
+            "BEGIN": folds == 0,
+            "END": last,
+            "OPAQUE": False,
+        }
         program = self._fold.program(**switches)
         set_uniform(program, "passes", len(batch))
         self._fold.draw_fullscreen(program)

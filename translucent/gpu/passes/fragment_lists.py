@@ -8,8 +8,9 @@ import numpy as np
 from translucent.errors import RenderError
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
-from translucent.gpu.shaders import set_uniform
+from translucent.gpu.shaders import CONSTANTS, set_uniform
 from translucent.render_plan import PassSpec
+from translucent.thickness import RayMarched
 
 #: Bytes of a node: a word and the number of the next node.
 _NODE = 8
@@ -89,7 +90,13 @@ class FragmentListsPass:
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
         _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
-        self._resolve.draw_fullscreen(self._resolve.program(**walk_switches(job), GRADIENT=0, OPAQUE=job.has_opaque))
+        program = self._resolve.program(**walk_switches(job), GRADIENT=0, OPAQUE=job.has_opaque)
+        if isinstance(method := job.plan.method, RayMarched):
+            set_uniform(program, "march_steps", method.steps)
+            set_uniform(program, "march_rule", int(CONSTANTS[f"MARCH_{method.quadrature.upper()}"]))
+            set_uniform(program, "march_seed", method.seed - (1 << 32 if method.seed >= 1 << 31 else 0))
+            set_uniform(program, "march_jitter", int(method.jitter))
+        self._resolve.draw_fullscreen(program)
         # The next lists must not begin before these have been walked along.
         job.gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 

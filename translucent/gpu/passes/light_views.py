@@ -147,6 +147,7 @@ class LightViewsPass:
             **walk_switches(job),
             "EMISSION": False,
             "SCATTER": False,
+            "MARCH": False,
             "OPAQUE": bool(job.scene.opaque),
             "GRADIENT": 1,
         }

@@ -55,7 +55,8 @@ def walk_switches(job: Any) -> dict[str, bool | int]:
         "UNION": job.scene.overlap == "union",
         "PRIORITY": job.scene.overlap == "priority",
         "EMISSION": job.emits,
-        "SCATTER": job.scatters,
+        "SCATTER": job.scatters or job.marches,
+        "MARCH": job.marches,
         # One set of points serves all channels where light fares alike in them.
         "GRAY": all(_is_gray(slot.medium.extinction) for slot in job.slots),
         "SHADOWS": bool(job.scene.opaque),

@@ -1,0 +1,78 @@
+// Ray marching through a segment: a sum over steps of what a source sends from each (Max 1995, section 4). A step from
+// begin to end with its sample at s adds S(s) w e^(-sigma_t (s - begin)), seen through the segment up to its beginning.
+
+#include "volume/in_scatter.glsl"
+
+uniform int march_steps;
+uniform int march_rule;
+uniform int march_seed;
+uniform int march_jitter;
+
+int marched_segments = 0;
+
+// A random number in 0..1 of a pixel, the same on all machines (pcg3d, Jarzynski & Olano 2020).
+float hashed(uint number) {
+    uvec3 v = uvec3(uint(gl_FragCoord.x), uint(frame_size.y - gl_FragCoord.y), number + 2654435769u * uint(march_seed));
+    v = v * 1664525u + 1013904223u;
+    v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
+    v ^= v >> 16u;
+    v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
+    return float(v.x >> 8) / 16777216.0;
+}
+
+// Shares of the segment where a step begins and ends, and where its sample is.
+vec3 step_shares(int i) {
+    float n = float(march_steps);
+    if (march_rule == MARCH_GAUSS) {
+        float begin = 0.0;
+        for (int k = 0; k < i; ++k) { begin += gauss[k].y; }
+        return vec3(begin, begin + gauss[i].y, gauss[i].x);
+    }
+    float offset = march_rule == MARCH_LEFT ? 0.0 : 0.5;
+    if (march_rule == MARCH_JITTERED) { offset = hashed(uint(marched_segments * march_steps + i)); }
+    if (march_jitter == 1) { offset = hashed(0u); }
+    return vec3(float(i), float(i + 1), float(i) + offset) / n;
+}
+
+// Metres along the segment at a share of it, and how many there are to a share there: equal angles for a point light.
+vec2 metres_at_share(float share, int light, ViewRay ray, float metres) {
+    vec4 place = light < 0 ? vec4(0.0) : scatter_light_place[light];
+    if (march_rule != MARCH_EQUIANGULAR || place.w == 0.0) { return vec2(share, 1.0) * metres; }
+    float closest = dot(place.xyz - ray.start, ray.direction);
+    float height = max(length(place.xyz - ray.start - closest * ray.direction), 1e-6 * metres);
+    float first = atan(-closest, height);
+    float angle = atan(metres - closest, height) - first;
+    float tangent = tan(first + angle * share);
+    return vec2(clamp(closest + height * tangent, 0.0, metres), angle * height * (1.0 + tangent * tangent));
+}
+
+// One source: a light, or the emission of the media for -1.
+vec3 march_source(int winding[SLOTS], int light, ViewRay ray, float metres, vec3 sigma, vec3 emission) {
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < march_steps; ++i) {
+        vec3 shares = step_shares(i);
+        float begin = metres_at_share(shares.x, light, ray, metres).x;
+        float end = metres_at_share(shares.y, light, ray, metres).x;
+        vec2 at = metres_at_share(shares.z, light, ray, metres);
+        vec3 source = emission;
+        if (light >= 0) {
+            vec3 tau;
+            vec4 lit = scattered_here(winding, light, ray, at.x, tau);
+            source = lit.a * lit.rgb * transmittance(tau);
+        }
+        vec3 color = march_rule == MARCH_EXPONENTIAL
+            ? emitted_radiance(source, sigma, end - begin)
+            : source * at.y * (shares.y - shares.x) * transmittance(sigma * (at.x - begin));
+        sum += transmittance(sigma * begin) * color;
+    }
+    return sum;
+}
+
+vec3 marched(int winding[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission) {
+    vec3 sum = march_source(winding, -1, ray, metres, sigma, emission);
+    for (int light = 0; light < scatter_light_count; ++light) {
+        sum += march_source(winding, light, ray, metres, sigma, emission);
+    }
+    ++marched_segments;
+    return sum;
+}
