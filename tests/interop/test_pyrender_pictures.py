@@ -281,8 +281,7 @@ def _bodies(scene: tl.Scene) -> tl.Scene:
     return dataclasses.replace(scene, objects=scene.bodies)
 
 
-def test_at_edges_the_environment_is_seen_in_part() -> None:
-    pytest.importorskip("pyrender")
+def test_at_edges_the_environment_is_seen_in_part(pyrender: ModuleType) -> None:
     from translucent.interop._pyrender_pictures import Picture
 
     # One pixel of three is covered by half, by a surface that is encoded as 0.8.
