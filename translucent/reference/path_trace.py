@@ -32,6 +32,9 @@ Integers = npt.NDArray[np.int64]
 #: Paths that are followed together: the working arrays stay below 500 MB.
 BATCH = 1 << 14
 
+#: Largest optical depth of the scene without a limit on events: light is scattered about as often as its square.
+MAX_DEPTH = 1e4
+
 #: Paths that carry less of the light than this end by chance, or go on with this much.
 ROULETTE = 0.1
 
@@ -67,12 +70,18 @@ def path_trace(
     Raises
     ------
     InputError
-        If an argument is not in its range, or a body is open or a sheet.
+        If an argument is not in its range, a body is open or a sheet, or the media are too deep.
     """
     began = time.perf_counter()
     width, height = check_size(size)
     _check(scene, paths, max_events)
     light = LightPaths(scene, (None,) * len(scene.objects))
+    with np.errstate(over="ignore"):
+        depth = 2.0 * light.tracer.radius * float(light.volume.extinction.max())
+    if max_events is None and depth > MAX_DEPTH:
+        raise InputError(
+            "path tracing", f"media up to {depth:.0e} deep, in which light is lost for ages", "give max_events"
+        )
     rays = pixel_rays(scene.camera, (width, height))
     arrays = shade_hits(scene, rays, scene_hits(scene, (width, height)), light.sheets)
     rng = np.random.default_rng(seed)
