@@ -112,7 +112,7 @@ class Medium:
     ) -> Medium:
         """Medium of many small opaque spheres: sigma_t = rho A with their projected area A = pi r^2.
 
-        Max 1995, sections 2 to 4 and 6: of the light that meets a particle it scatters the share `albedo` and absorbs
+        Max 1995, sections 2 to 5: of the light that meets a particle it scatters the share `albedo` and absorbs
         the rest, and it sends out the radiance `glow` where it absorbs, so that q = sigma_a glow.
 
         Parameters

@@ -137,10 +137,11 @@ class RayMarched:
     - ``left``: the source at the beginning of each step, 1 / N (Riemann);
     - ``midpoint``: in its middle, 1 / N^2;
     - ``exponential``: the source in its middle, constant over the step, and its attenuation in closed form, 1 / N^2
-      (Max 1995, eq. 12); exact for homogeneous media without scattering;
+      (Max 1995, section 4); exact for homogeneous media without scattering;
     - ``jittered``: at a random place in each step, N^-1.5 (stratified Monte Carlo, Mitchell 1996);
     - ``equiangular``: steps of equal angles as seen from a point light, and the middle of each (Kulla & Fajardo 2012);
-    - ``gauss``: Gauss-Legendre points, exponential for smooth sources.
+    - ``gauss``: Gauss-Legendre points, beyond any order for smooth sources in homogeneous media; where density varies
+      1 / N^2, since depths are sums over steps.
 
     Parameters
     ----------

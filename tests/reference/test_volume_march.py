@@ -239,6 +239,18 @@ def test_jitter_moves_all_samples_of_a_pixel_alike() -> None:
     np.testing.assert_allclose(frame.radiance[0, 0], by_hand, rtol=1e-13)
 
 
+def test_every_interval_has_random_numbers_of_its_own() -> None:
+    """One step in each of two slabs, by hand."""
+    objects = [Object(Box((-4, -4, z - 1), (4, 4, z)).tessellate(), MEDIUM) for z in (0, -2)]
+    frame = march(Scene(objects, CAMERA, [], DARK), (1, 1), RayMarched(1, "jittered", seed=5))
+    zero, length = np.zeros(1, int), frame.thickness[0, 0] / 2
+    offsets = [hashed(zero, zero, zero + interval, 5)[0] for interval in (0, 1)]
+    depths = MEDIUM.extinction * length
+    first, second = (np.exp(-offset * depths) for offset in offsets)
+    expected = np.asarray(MEDIUM.emission) * length * (first + np.exp(-depths) * second)
+    np.testing.assert_allclose(frame.radiance[0, 0], expected, rtol=1e-12)
+
+
 def test_hashed_numbers() -> None:
     """Values of pcg3d by hand, and a spread as of random numbers."""
     mask = 0xFFFFFFFF

@@ -359,6 +359,19 @@ def test_emission_of_mixtures() -> None:
     np.testing.assert_allclose(middle(scene(*objects, lights=[])), expected, rtol=1e-11)
 
 
+@pytest.mark.parametrize("camera", ["inside", "orthographic"])
+def test_other_views(camera: str) -> None:
+    """From inside the slab, and with parallel rays."""
+    views = {
+        "inside": Camera.look_at((0.3, 0.2, -0.25), (0.1, 0.0, -0.9), fov_y=10),
+        "orthographic": Camera.orthographic(tuple(EYE), (0.1, 0.0, -0.5), height=0.5),
+    }
+    of = replace(slab(lamp := PointLight((0.5, 0.1, -2.0), 2.0)), camera=views[camera])
+    origin, direction = middle_ray(views[camera])
+    span = max(-origin[2] / direction[2], 0.0), (-1 - origin[2]) / direction[2]
+    np.testing.assert_allclose(middle(of), single_scatter(SLAB, MEDIUM, lamp, origin, direction, span), rtol=1e-6)
+
+
 # Several bodies
 
 
@@ -406,6 +419,14 @@ def test_union_tells_media_apart_that_only_scatter_differently() -> None:
     np.testing.assert_allclose(middle(scene(*objects, lights=[SUN], overlap="union")), expected, rtol=1e-6)
 
 
+def test_union_counts_varied_bodies_each() -> None:
+    """A density is a body's own: what it scales is no medium that another brings, too."""
+    lean = DensityGrid([[[0.5]]])
+    objects = [Object(SLAB.tessellate(), MEDIUM, density=density) for density in (lean, lean, None)]
+    found = middle(scene(*objects, lights=[SUN], overlap="union"))
+    np.testing.assert_allclose(found, layers(SUN, (-1.0, 0.0, [MEDIUM, MEDIUM])), rtol=1e-6)
+
+
 def test_a_body_shades_another() -> None:
     filtered = Box((-50, -50, 5), (50, 50, 6))
     objects = Object(SLAB.tessellate(), RED), Object(filtered.tessellate(), Medium(absorption=(0.1, 0.2, 0.3)))
@@ -447,6 +468,27 @@ def test_an_opaque_object_throws_a_shadow() -> None:
     integrals = [integral(lambda t, c=c: integrand(t, c), edge, end) for c in range(3)]
     found = middle(scene(Object(SLAB.tessellate(), MEDIUM), roof, lights=[sun], camera=shadowed))
     np.testing.assert_allclose(found, np.asarray(MEDIUM.scattering) * phase * 2.0 * integrals, rtol=2e-6)
+
+
+@pytest.mark.parametrize("width", [0.1, 1e-3, 1e-5])
+def test_the_shadow_of_a_pole(width: float) -> None:
+    """However narrow, it is not missed: rules of quadrature begin and end at its outline."""
+    pole = Object(Box((0.1, -60, 5), (0.1 + width, 60, 6)).tessellate())
+    sun = DirectionalLight((0, 0, -1), 2.0)
+    camera = Camera.look_at((-2.0, 0.0, 3.0), (0.15, 0.0, -0.5), fov_y=10)
+    origin, direction = middle_ray(camera)
+    ends = (np.array([0.1, 0.1 + width]) - origin[0]) / direction[0] + 3 / direction[2]
+    assert ends.min() > 0
+    # From a depth where the ray has gone so far in the slab.
+    slope = MEDIUM.extinction * (1 - direction[2])
+    phase = optics.henyey_greenstein(direction[2], MEDIUM.anisotropy)
+    source = np.asarray(MEDIUM.scattering) * phase * 2.0
+    missing = source * np.exp(-slope * ends[0]) * -np.expm1(-slope * (ends[1] - ends[0])) / slope
+    plain, found = (
+        middle(scene(Object(SLAB.tessellate(), MEDIUM), *more, lights=[sun], camera=camera), tolerance=1e-9)
+        for more in ([], [pole])
+    )
+    np.testing.assert_allclose(plain - found, missing, rtol=1e-3)
 
 
 def test_an_opaque_object_stops_the_ray() -> None:

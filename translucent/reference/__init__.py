@@ -1,4 +1,4 @@
-"""Ground truth in float64 on the CPU, independent of any GPU: `render`, and the hits and intervals below it."""
+"""Ground truth in float64 on the CPU, independent of any GPU: `render`, `march`, `path_trace` and what is below."""
 
 from translucent.reference.hits import Hits, camera_hits, line_hits
 from translucent.reference.intervals import Intervals

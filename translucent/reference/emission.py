@@ -52,5 +52,8 @@ def emission_of_mixtures(volume: Volume, rays: Rays, segments: Segments, filling
     exact = integrate(emitted, segments.t_enter[found], segments.t_exit[found], one_by_one, len(found), TOLERANCE).value
     length = segments.length[found, None]
     emission = segments.emission.copy()
-    emission[found] = exact / (length * optics.mean_transmittance(segments.extinction[found] * length))
+    with np.errstate(over="ignore", under="ignore"):
+        share = optics.mean_transmittance(segments.extinction[found] * length)
+    # Of a medium so deep that the share vanishes, nothing is seen either.
+    emission[found] = exact / (length * np.maximum(share, np.finfo(np.float64).tiny))
     return replace(segments, emission=emission)

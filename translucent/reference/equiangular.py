@@ -1,4 +1,4 @@
-"""The equiangular variable: equal steps of the angle as seen from a point light (Kulla & Fajardo 2012, section 3)."""
+"""The equiangular variable: equal steps of the angle as seen from a point light (Kulla & Fajardo 2012)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Monte Carlo path tracing through media: light scattered any number of times, with error bars.
 
-Free paths by delta tracking (Woodcock et al. 1965; Novak et al. 2018, section 5.1), each light at each event with its
+Free paths by delta tracking (Woodcock et al. 1965; Novak et al. 2018), each light at each event with its
 exact transmittance, directions by the phase function itself, and Russian roulette (Arvo & Kirk 1990).
 """
 

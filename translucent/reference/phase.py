@@ -29,7 +29,7 @@ def scattered_directions(directions: Array, anisotropy: Array, rng: np.random.Ge
 
 
 def henyey_greenstein_cosine(u: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
-    """Cosine between the directions before and after the event, from `u` in 0 to 1 (Witt 1977, eq. 19).
+    """Cosine between the directions before and after the event, from `u` in 0 to 1 (Witt 1977).
 
     Rearranged so that nothing is divided by g, which may be 0.
     """

@@ -53,8 +53,7 @@ def even_steps(variable: Variable, offset: Array) -> Steps:
     borders, _ = variable(np.broadcast_to(np.arange(count + 1) / count, (len(offset), count + 1)))
     at, stretch = variable((np.arange(count) + offset) / count)
     begin, end = borders[:, :-1], borders[:, 1:]
-    # Rounding may put a sample an ulp outside of its step, and so outside of the body.
-    return Steps(begin, end, np.clip(at, begin, end), stretch / count)
+    return Steps(begin, end, at, stretch / count)
 
 
 def gauss_steps(start: Array, end: Array, count: int) -> Steps:

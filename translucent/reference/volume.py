@@ -189,6 +189,6 @@ def _medium_key(scene: Scene, index: int) -> tuple[object, ...]:
     body = scene.objects[index]
     medium = body.medium
     if medium is None or body.density is not None:
-        return (index,)
+        return (int(index),)
     values = (medium.extinction, medium.scattering, medium.emission)
     return (*(tuple(np.asarray(v).tolist()) for v in values), medium.anisotropy if medium.scatters else 0.0)
