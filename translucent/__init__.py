@@ -24,11 +24,12 @@ from translucent.conversion import (
     extinction_from_colors,
 )
 from translucent.density import DensityGrid, ExponentialDensity, LinearDensity
+from translucent.environment import Environment
 from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
 from translucent.fitting import Fit, fit_medium, fit_wedge
 from translucent.frame import Frame
 from translucent.gltf.load import load_scene
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.lights import DirectionalLight, PointLight
 from translucent.materials import load_medium, text_block
 from translucent.materials.gltf import read_materials
 from translucent.materials.gltf_write import write_medium
@@ -40,6 +41,8 @@ from translucent.presets import Preset, preset, presets
 from translucent.render_plan import Capabilities, RenderPlan
 from translucent.scene import Object, Scene
 from translucent.showcase import showcase
+from translucent.surface import Surface
+from translucent.texture import Texture
 from translucent.thickness import (
     BackFaceDepth,
     DepthPeeling,
@@ -83,6 +86,8 @@ __all__ = [
     "Renderer",
     "Scene",
     "SignedDepth",
+    "Surface",
+    "Texture",
     "ThinLayer",
     "TranslucentError",
     "TranslucentWarning",

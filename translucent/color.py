@@ -14,6 +14,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 
 Array = npt.NDArray[np.float64]
+ColorLike = str | npt.ArrayLike
 
 LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
 

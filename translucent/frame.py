@@ -8,20 +8,27 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.color import linear_to_srgb
+from translucent.color import exposure_scale, linear_to_srgb
 from translucent.errors import InputError, RenderError
 from translucent.render_plan import RenderPlan
+from translucent.tone import tone_curve
 
 #: The arrays of a frame, under the names that .npz files use.
 ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage", "valid")
 
 #: More of them, that frames of ordered methods have.
 LAYER_ARRAYS = ("layers", "truncated")
+
+#: Of files that hold a frame.
+SUFFIXES = (".png", ".exr", ".npz")
+
+#: Stops beyond which radiance would leave what float64 can hold, or be black for sure.
+MAX_EXPOSURE = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +95,26 @@ class Frame:
             found["layers"] = {"max": int(self.layers.max()), "truncated_pixels": int((self.truncated > 0).sum())}
         return found
 
-    def to_srgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
-        """(h, w, 3) uint8: the radiance, `exposure` stops brighter, clamped to 0..1 and sRGB-encoded."""
-        linear = np.clip(np.asarray(self.radiance, dtype=np.float64) * 2.0**exposure, 0.0, 1.0)
-        return np.rint(linear_to_srgb(linear) * 255.0).astype(np.uint8)
+    def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
+        """(h, w, 3) uint8: the radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
-    def save(self, path: str | Path, exposure: float = 0.0) -> None:
+        Parameters
+        ----------
+        exposure : float
+            From -100 to 100.
+        tone : {"none", "neutral", "agx"}
+            ``none`` clamps to 0..1.
+
+        Raises
+        ------
+        InputError
+            If there is no such curve, or the exposure is beyond these.
+        """
+        curve = tone_curve(tone)
+        linear = np.asarray(self.radiance, dtype=np.float64) * exposure_scale(check_exposure(exposure))
+        return np.rint(linear_to_srgb(curve(linear)) * 255.0).astype(np.uint8)
+
+    def save(self, path: str | Path, exposure: float = 0.0, tone: str = "none") -> None:
         """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).
 
         The file appears complete or not at all.
@@ -103,30 +124,56 @@ class Frame:
         path : str or Path
         exposure : float
             Stops that a ``.png`` is brighter; the other files hold what was rendered.
+        tone : {"none", "neutral", "agx"}
+            Tone curve of a ``.png``: clamped to 0..1, Khronos PBR Neutral, or AgX.
 
         Raises
         ------
         InputError
-            If the suffix is none of these.
+            If the suffix is none of these, or there is no such tone curve.
         RenderError
             If the file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
         """
         path = Path(path)
         check_output(path)
-        write_atomically(path, partial(_WRITERS[path.suffix.lower()], self, exposure=exposure))
+        if path.suffix.lower() == ".png":
+            write_atomically(path, partial(write_png, pixels=self.to_srgb8(exposure, tone)))
+        else:
+            write_atomically(path, self._write_exr if path.suffix.lower() == ".exr" else self._write_npz)
 
-    def _write_png(self, path: Path, exposure: float) -> None:
-        from PIL import Image
+    def save_aovs(self, folder: str | Path) -> list[Path]:
+        """Write the quantities as pictures to look at, into a folder that is made if need be.
 
-        Image.fromarray(self.to_srgb8(exposure)).save(path, format="PNG")
+        ``thickness.png`` in false colors with a scale, ``transmittance.png`` (sRGB-encoded), and ``validity.png`` with
+        counts. For numbers, `save` an ``.exr`` or ``.npz``.
 
-    def _write_npz(self, path: Path, exposure: float) -> None:
+        Returns
+        -------
+        list of Path
+            The files.
+
+        Raises
+        ------
+        RenderError
+            If they cannot be written.
+        """
+        from translucent.aovs import aov_pictures
+
+        folder = Path(folder)
+        make_folder(folder)
+        files = []
+        for name, pixels in aov_pictures(self).items():
+            files.append(folder / f"{name}.png")
+            write_atomically(files[-1], partial(write_png, pixels=pixels))
+        return files
+
+    def _write_npz(self, path: Path) -> None:
         with path.open("wb") as stream:
             arrays = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS)}
             arrays = {name: array for name, array in arrays.items() if array is not None}
             np.savez_compressed(stream, allow_pickle=False, **arrays)
 
-    def _write_exr(self, path: Path, exposure: float) -> None:
+    def _write_exr(self, path: Path) -> None:
         import OpenEXR
 
         channels = {"RGB": np.ascontiguousarray(self.radiance, dtype=np.float32)}
@@ -148,23 +195,50 @@ class Frame:
         """The picture, for notebooks."""
         import io
 
-        from PIL import Image
-
         stream = io.BytesIO()
-        Image.fromarray(self.to_srgb8()).save(stream, format="PNG")
+        write_png(stream, self.to_srgb8())
         return stream.getvalue()
 
 
-_WRITERS: dict[str, Callable[..., None]] = {
-    ".png": Frame._write_png,
-    ".exr": Frame._write_exr,
-    ".npz": Frame._write_npz,
-}
+def write_png(file: Path | BinaryIO, pixels: npt.NDArray[np.uint8]) -> None:
+    """Write 8-bit pixels (h, w, 3) or (h, w) as they are."""
+    from PIL import Image
+
+    Image.fromarray(pixels).save(file, format="PNG")
+
+
+def check_exposure(stops: float) -> float:
+    """The exposure, if it is one.
+
+    Raises
+    ------
+    InputError
+        If it is not within 100 stops.
+    """
+    if not abs(stops) <= MAX_EXPOSURE:
+        raise InputError(f"exposure {stops}", f"not within {MAX_EXPOSURE:g} stops", "give for example 1.5")
+    return stops
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises
+    ------
+    RenderError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RenderError(
+            f"folder {str(folder)!r}", f"it cannot be made ({error.strerror})", "check the path"
+        ) from error
 
 
 def check_output(path: Path) -> None:
     """Raise before any work is done where a frame could not be written to `path`."""
-    if path.suffix.lower() not in _WRITERS:
+    if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
     if not os.path.isdir(path.parent):  # False, too, for a name that no folder can have
         raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")

@@ -1,20 +1,16 @@
-"""What shines: point and directional lights, and the environment behind everything."""
+"""What shines from a place or a direction: point and directional lights."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.camera import MAX_COORDINATE
-from translucent.color import parse_color
 from translucent.errors import InputError
 
 Array = npt.NDArray[np.float64]
-ColorLike = str | npt.ArrayLike
-EnvironmentKind = Literal["constant", "gradient", "checkerboard"]
 
 #: Largest radiance, intensity or irradiance: its products with lengths stay within float32.
 MAX_RADIANCE = 1e18
@@ -40,7 +36,7 @@ class PointLight:
         if (farthest := float(np.abs(position).max())) > MAX_COORDINATE:
             raise InputError("light position", f"{farthest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
         object.__setattr__(self, "position", position)
-        object.__setattr__(self, "intensity", _positive("light intensity", self.intensity))
+        object.__setattr__(self, "intensity", positive_triple("light intensity", self.intensity))
 
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
         """Irradiance I cos / r^2 on surfaces that nothing shadows, (..., 3) in W/m^2; at most 1e18, and 0 in the light.
@@ -86,108 +82,13 @@ class DirectionalLight:
         direction = direction / length
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
-        object.__setattr__(self, "irradiance", _positive("light irradiance", self.irradiance))
+        object.__setattr__(self, "irradiance", positive_triple("light irradiance", self.irradiance))
 
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
         """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3) in W/m^2, at any point."""
         with np.errstate(under="ignore"):
             cosine = np.maximum(-np.sum(np.asarray(normals) * np.asarray(self.direction), axis=-1, keepdims=True), 0.0)
             return np.asarray(cosine * np.asarray(self.irradiance))
-
-
-@dataclass(frozen=True, eq=False)
-class Environment:
-    """Radiance from far behind everything. Made by `constant`, `gradient` or `checkerboard`.
-
-    Attributes
-    ----------
-    kind : {"constant", "gradient", "checkerboard"}
-    first, second : (3,)
-        Linear radiance: bottom and top of a gradient, the two squares of a checkerboard.
-    tiles : float
-        Squares of a checkerboard along the height of the picture.
-    """
-
-    kind: EnvironmentKind
-    first: Array
-    second: Array
-    tiles: float = 8.0
-
-    def __post_init__(self) -> None:
-        if self.kind not in get_args(EnvironmentKind):
-            raise InputError(
-                f"environment kind {self.kind!r}", "not known", f"use one of {', '.join(get_args(EnvironmentKind))}"
-            )
-        object.__setattr__(self, "first", _positive("environment radiance", self.first))
-        object.__setattr__(self, "second", _positive("environment radiance", self.second))
-        if not 0 < self.tiles <= 1e6:
-            raise InputError(f"checkerboard of {self.tiles} tiles", "not in 0 to 1e6", "give for example 8")
-
-    @classmethod
-    def constant(cls, radiance: ColorLike) -> Environment:
-        """The same radiance from everywhere."""
-        return cls("constant", _radiance(radiance), _radiance(radiance))
-
-    @classmethod
-    def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
-        """From `bottom` for rays straight down (-Y) to `top` for rays straight up (+Y), linear in the sine between."""
-        return cls("gradient", _radiance(bottom), _radiance(top))
-
-    @classmethod
-    def checkerboard(
-        cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
-    ) -> Environment:
-        """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
-        return cls("checkerboard", _radiance(first), _radiance(second), tiles)
-
-    def radiance(self, directions: npt.ArrayLike, backdrop: npt.ArrayLike) -> Array:
-        """Radiance along rays, (..., 3); the twin of ``shaders/lib/environment.glsl``.
-
-        Parameters
-        ----------
-        directions : array_like (..., 3)
-            Unit vectors.
-        backdrop : array_like (..., 2)
-            Position in the picture, right and down from the top left corner, in heights of the picture.
-        """
-        if self.kind == "checkerboard":
-            share = checkerboard_share(backdrop, self.tiles)
-        elif self.kind == "gradient":
-            share = gradient_share(directions)
-        else:
-            share = np.zeros(np.asarray(directions).shape[:-1])
-        return self.first + (self.second - self.first) * share[..., None]
-
-    def irradiance_on(self, normals: npt.ArrayLike) -> Array:
-        """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3).
-
-        A backdrop fixed to the picture lights like the mean of its squares.
-        """
-        if self.kind == "gradient":
-            share = gradient_irradiance_share(normals)
-        else:
-            share = np.full(np.asarray(normals).shape[:-1], 0.5)
-        with np.errstate(under="ignore"):
-            return np.asarray(np.pi * (self.first + (self.second - self.first) * share[..., None]))
-
-
-def gradient_share(direction: npt.ArrayLike) -> Array:
-    """Share of a gradient's top in direction (..., 3): (1 + y) / 2."""
-    return np.asarray(0.5 + 0.5 * np.asarray(direction, dtype=np.float64)[..., 1])
-
-
-def gradient_irradiance_share(normal: npt.ArrayLike) -> Array:
-    """Share of a gradient's top in what a surface with unit normal (..., 3) receives.
-
-    The cosine-weighted mean of `gradient_share` over the hemisphere: the mean of y there is 2/3 of the normal's y.
-    """
-    return np.asarray(0.5 + np.asarray(normal, dtype=np.float64)[..., 1] / 3.0)
-
-
-def checkerboard_share(backdrop: npt.ArrayLike, tiles: npt.ArrayLike) -> Array:
-    """1 in the second squares of a checkerboard at backdrop (..., 2), else 0; the top left square is a first one."""
-    cell = np.floor(np.asarray(backdrop, dtype=np.float64) * np.asarray(tiles, dtype=np.float64)[..., None])
-    return np.asarray(np.mod(cell[..., 0] + cell[..., 1], 2.0))
 
 
 def _vector(what: str, value: npt.ArrayLike) -> Array:
@@ -201,7 +102,8 @@ def _vector(what: str, value: npt.ArrayLike) -> Array:
     return vector
 
 
-def _positive(what: str, value: npt.ArrayLike) -> Array:
+def positive_triple(what: str, value: npt.ArrayLike) -> Array:
+    """(3,) float64, read-only: one or three numbers in 0 to `MAX_RADIANCE`, else an `InputError` about `what`."""
     try:
         triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,))
     except (TypeError, ValueError):
@@ -212,7 +114,3 @@ def _positive(what: str, value: npt.ArrayLike) -> Array:
             f"{what} {tuple(triple.tolist())}", f"not in 0 to {MAX_RADIANCE:g}", "give values of 0 and above"
         )
     return triple
-
-
-def _radiance(color: ColorLike) -> Array:
-    return _positive("environment radiance", parse_color(color) if isinstance(color, str) else color)

@@ -108,9 +108,11 @@ def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array
     k = ior_squared_minus_1 + c * c
     root = np.sqrt(np.maximum(k, 0.0))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        parallel = ior_squared_minus_1 * (c * c * (n * n + 1.0) - 1.0) / (n * n * c + root) ** 2
-        normal = ior_squared_minus_1 / (c + root) ** 2
-        reflectance = 0.5 * (parallel * parallel + normal * normal)
+        # The squares (n^2 c + root)^2 and (c + root)^2 as sums with k, so that a grazing ray gives exactly 1.
+        twice = 2.0 * c * root
+        parallel = ior_squared_minus_1 * (c * c * (n * n + 1.0) - 1.0) / (n * n * (n * n * c * c + twice) + k)
+        normal = ior_squared_minus_1 / (c * c + twice + k)
+        reflectance = np.minimum(0.5 * (parallel * parallel + normal * normal), 1.0)
     # A boundary between equal media does not exist, also not edge-on, where the formula is 0/0.
     return np.where(ior_squared_minus_1 == 0.0, 0.0, np.where(k <= 0.0, 1.0, reflectance))
 

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable
 
 from translucent.errors import InputError
+from translucent.plan_borders import border_passes, touching_borders
 from translucent.plan_limits import (
     MAX_SCATTER_LIGHTS,
     closed_sheet_limits,
@@ -48,6 +49,8 @@ COSTS = {
     "k_buffer": 8.5,
     "step": 0.1,  # of marching
     "resolve": 0.8,
+    "interfaces": 4.0,
+    "surfaces": 3.0,
 }
 
 #: Layers of a body that is not convex, for want of a better guess: cost estimates are made before anything is drawn.
@@ -130,6 +133,8 @@ def _why_order_matters(scene: Scene, method: Method | None) -> str | None:
     bodies = scene.bodies
     if _media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
         return "emission among several media: what is in front dims what is behind"
+    if method is None and (touching := touching_borders(scene)) is not None:
+        return touching
     # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
     if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
         return None
@@ -356,6 +361,7 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
             "the media end"
         )
         passes = [PassSpec("opaque", reason, opaque, 1, cost=COSTS["opaque"]), *passes]
+    borders = border_passes(scene, COSTS["interfaces"], COSTS["surfaces"])
     media = [body.medium for body in scene.bodies if body.medium is not None]
     emits = any(medium.emits for medium in media)
     if emits and isinstance(method, OrderedMethod):
@@ -364,10 +370,11 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
         reason = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
     else:
         reason = "Beer-Lambert: what is behind, through exp(-optical depth)"
-    passes = [*passes, PassSpec("transmittance", reason, cost=COSTS["resolve"])]
+    passes = [*passes, *borders[:1], PassSpec("transmittance", reason, cost=COSTS["resolve"]), *borders[1:]]
     scatters = any(step.name == "light_views" for step in passes)
     limits = [*limits, *mesh_limits(scene, method)]
-    return RenderPlan(method, tuple(passes), spectral, tuple(limits), unmodelled_effects(scene, scatters=scatters))
+    unmodelled = unmodelled_effects(scene, scatters=scatters, borders=True)
+    return RenderPlan(method, tuple(passes), spectral, tuple(limits), unmodelled)
 
 
 def _media_differ(scene: Scene) -> bool:

@@ -81,8 +81,17 @@ def scattering_limits(scene: Scene) -> list[str]:
     return [f"{names}: scattered light is not exact beyond an optical depth of {DENSE:g}"] if dense else []
 
 
-def unmodelled_effects(scene: Scene, *, scatters: bool) -> tuple[str, ...]:
-    """What the scene asks for and a plan does not render; `scatters`: it has light scattered into the rays."""
+def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -> tuple[str, ...]:
+    """What the scene asks for and a plan does not render.
+
+    Parameters
+    ----------
+    scene : Scene
+    scatters : bool
+        The plan has light scattered into the rays.
+    borders : bool
+        The plan has what the borders of bodies do to light.
+    """
     media = [body.medium for body in scene.bodies if body.medium is not None]
     effects = []
     if scattering := [medium for medium in media if medium.scatters]:
@@ -96,8 +105,14 @@ def unmodelled_effects(scene: Scene, *, scatters: bool) -> tuple[str, ...]:
             effects.append(LIGHTS_LEFT_OUT if scene.lights else "in-scattered light: scattering only removes light")
     elif scene.lights and not scene.opaque:
         effects.append("lights: they shine on nothing, since no medium scatters and nothing is opaque")
-    if any(medium.ior > 1 for medium in media):
-        effects.append("refraction and reflection: rays go straight, though ior is above 1")
+    bent = [body for body in scene.bodies if body.has_interface]
+    if bent and borders:
+        effects.append(
+            "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
+            "and borders mirror the environment only"
+        )
+    elif bent:
+        effects.append("refraction and reflection: rays go straight, though borders bend and mirror them")
     if clear := [body.mesh.name for body in scene.bodies if body.medium is not None and _clear(body.medium)]:
         effects.append(f"{', '.join(map(repr, clear))}: invisible, since nothing in it absorbs, scatters or emits")
     if scene.opaque:

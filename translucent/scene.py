@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.camera import Camera
-from translucent.color import parse_color
+from translucent.color import ColorLike, parse_color
 from translucent.density import Density
+from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import ColorLike, DirectionalLight, Environment, PointLight
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.mesh import MAX_COORDINATE, Mesh
+from translucent.surface import Surface
 
 Array = npt.NDArray[np.float64]
 Overlap = Literal["add", "union", "priority"]
@@ -43,10 +45,13 @@ class Object:
     sheet_thickness : float, optional
         Declares the mesh a thin sheet of this thickness in metres, not the border of a solid.
     color : str or array_like (3,)
-        What an opaque object diffusely reflects, 0 to 1: a color as text, or linear RGB.
+        What an opaque object without a surface diffusely reflects, 0 to 1: a color as text, or linear RGB.
     density : DensityGrid, LinearDensity or ExponentialDensity, optional
         Scales absorption, scattering and emission of the medium from place to place, over the bounds of the mesh in
         object space. Default: homogeneous.
+    surface : Surface, optional
+        What the border does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
+        opaque object reflects diffusely.
     """
 
     mesh: Mesh
@@ -56,6 +61,7 @@ class Object:
     sheet_thickness: float | None = None
     color: ColorLike = OPAQUE_COLOR
     density: Density | None = None
+    surface: Surface | None = None
 
     def __post_init__(self) -> None:
         _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
@@ -89,8 +95,27 @@ class Object:
                 what = "opaque" if self.medium is None else "a sheet, which has no inside"
                 raise InputError(f"density of {self.mesh.name!r}", f"it is {what}", "give it a medium to fill, or none")
 
+        if self.surface is not None:
+            _require_type("surface of an object", self.surface, Surface, "use tl.Surface")
+            if self.mesh.uv is None and any(self.surface.textures):
+                raise InputError(
+                    f"surface of {self.mesh.name!r}", "it has textures, and the mesh no texture coordinates", "unwrap it"
+                )
+
     def __repr__(self) -> str:
         return f"Object({self.mesh!r}, {self.medium!r})"
+
+    @property
+    def base_color(self) -> Array:
+        """(3,): what an opaque object reflects: the color of its surface, if it has one."""
+        return np.asarray(self.color if self.surface is None else self.surface.color)
+
+    @property
+    def has_interface(self) -> bool:
+        """Whether light changes where it crosses the border of the medium: is bent, mirrored, tinted or spread."""
+        return self.medium is not None and (
+            self.medium.ior != 1.0 or (self.surface is not None and not self.surface.plain)
+        )
 
     @property
     def matrix(self) -> Array:

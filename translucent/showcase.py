@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.camera import Camera
-from translucent.lights import Environment
+from translucent.environment import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.scene import Light, Object, Scene

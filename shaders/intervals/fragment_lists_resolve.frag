@@ -14,6 +14,9 @@ void main() {
     for (uint link = list; link != END_OF_LIST; link = next_link(link)) {
         cross_surface(walk, word_at(link), 1, false, metres_per_step);
         layers += 1.0;
+#if BORDERS
+        note_exit(walk);
+#endif
     }
     end_walk(walk, metres_per_step, layers, layers);
 }

@@ -20,6 +20,9 @@ void main() {
     float metres_per_step = metres_of_a_step(ray_advance());
     for (uint i = 1u; i <= kept; ++i) {
         cross_surface(walk, words[base + i], 1, false, metres_per_step);
+#if BORDERS
+        note_exit(walk);
+#endif
     }
     end_walk(walk, metres_per_step, float(counted), float(kept));
 }

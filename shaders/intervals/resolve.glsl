@@ -9,7 +9,23 @@ uniform sampler2D opaque_place;
 
 layout(location = 0) out vec4 out_optical_depth;  // alpha: 1 where the walk ends outside
 layout(location = 1) out vec4 out_emitted;        // alpha: thickness
-layout(location = 2) out vec4 out_layers;         // counted, kept, metres with a negative winding number
+layout(location = 2) out vec4 out_layers;         // counted, kept, metres with a negative winding number, first exit
+
+#if BORDERS
+// Where the ray first leaves all bodies; bodies that touch are one here.
+float first_exit = NOTHING;
+float maybe_exit = NOTHING;
+
+void note_exit(Walk walk) {
+    float place = float(walk.place) / float(place_steps());
+    if (first_exit < NOTHING) { return; }
+    if (maybe_exit < NOTHING && place - maybe_exit > TOUCHING) {
+        first_exit = maybe_exit;
+        return;
+    }
+    maybe_exit = is_outside(walk) ? place : NOTHING;
+}
+#endif
 
 // Metres along this pixel's ray per metre along the camera's forward axis.
 float ray_advance() {
@@ -23,7 +39,11 @@ float ray_advance() {
 void write_walk(Walk walk, bool sound, float counted, float kept) {
     out_optical_depth = vec4(walk.optical_depth, sound ? 1.0 : 0.0);
     out_emitted = vec4(walk.emitted, walk.thickness);
+#if BORDERS
+    out_layers = vec4(counted, kept, walk.inside_out, min(first_exit, maybe_exit));
+#else
     out_layers = vec4(counted, kept, walk.inside_out, 0.0);
+#endif
 }
 
 // The last segment, up to the opaque surface if there is one, and what is left of the walk then.

@@ -1,5 +1,7 @@
-// The procedural environments, as shares between two radiances. Pure.
-// Each function is the float32 twin of the same name in translucent/lights.py.
+// The procedural environments, as shares between two radiances, and places in pictures of all directions. Pure.
+// Each function is the float32 twin of the same name in translucent/environment.py.
+
+#include <constants>
 
 // Share of a gradient's top in a unit direction, +Y up: (1 + y) / 2.
 float gradient_share(vec3 direction) {
@@ -17,4 +19,12 @@ float gradient_irradiance_share(vec3 normal) {
 float checkerboard_share(vec2 backdrop, float tiles) {
     vec2 cell = floor(backdrop * tiles);
     return mod(cell.x + cell.y, 2.0);
+}
+
+// Place of a direction in an equirectangular picture, right and down, 0 to 1; u wraps around. Straight up (+Y) is v = 0,
+// -Z is u = 1/2. turn: of the picture about +Y, as a share of a full turn, counterclockwise as seen from above.
+vec2 equirectangular_uv(vec3 direction, float turn) {
+    float away = length(direction.xz);
+    float longitude = away > 0.0 ? atan(direction.x, -direction.z) : 0.0;
+    return vec2(0.5 + longitude / (2.0 * PI) + turn, atan(away, direction.y) / PI);
 }

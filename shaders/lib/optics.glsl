@@ -74,11 +74,13 @@ float fresnel_dielectric(float cos_incident, float ior) {
     if (ior_squared_minus_1 == 0.0) { return 0.0; }
     if (k <= 0.0) { return 1.0; }  // total internal reflection
     float root = sqrt(k);
-    float parallel_sum = ior * ior * cos_incident + root;
-    float normal_sum = cos_incident + root;
-    float parallel = ior_squared_minus_1 * (cos_incident * cos_incident * (ior * ior + 1.0) - 1.0) / (parallel_sum * parallel_sum);
-    float normal = ior_squared_minus_1 / (normal_sum * normal_sum);
-    return 0.5 * (parallel * parallel + normal * normal);
+    float c_squared = cos_incident * cos_incident;
+    float twice = 2.0 * cos_incident * root;
+    float n_squared = ior * ior;
+    // The squares (n^2 c + root)^2 and (c + root)^2 as sums with k, so that a grazing ray gives exactly 1.
+    float parallel = ior_squared_minus_1 * (c_squared * (n_squared + 1.0) - 1.0) / (n_squared * (n_squared * c_squared + twice) + k);
+    float normal = ior_squared_minus_1 / (c_squared + twice + k);
+    return min(0.5 * (parallel * parallel + normal * normal), 1.0);
 }
 
 // Snell: cosine inside; 0 under total internal reflection.

@@ -5,8 +5,10 @@
 #include <Shade>
 #include <Environment>
 #include "lib/optics.glsl"
-#include "lib/environment.glsl"
 #include "lib/ray.glsl"
+#if !SURFACES
+#include "shade/background.glsl"
+#endif
 
 #if ORDERED
 uniform sampler2D ordered_depth;
@@ -18,10 +20,6 @@ uniform sampler2D accumulated;
 #if SPECTRAL
 uniform sampler2D accumulated_path;
 #endif
-#endif
-#if OPAQUE
-uniform sampler2D opaque_place;
-uniform sampler2D opaque_radiance;
 #endif
 #if FALLBACK
 uniform sampler2D fallback;
@@ -56,21 +54,6 @@ Path read_path(sampler2D sums, ivec2 texel, float advance) {
     return Path(sum.r * advance, sum.r * advance * extinction.rgb, sum.g);
 }
 #endif
-
-vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
-#if OPAQUE
-    if (texelFetch(opaque_place, texel, 0).r < NOTHING) {
-        return texelFetch(opaque_radiance, texel, 0).rgb;
-    }
-#endif
-    float share = 0.0;
-    if (environment_kind == ENVIRONMENT_GRADIENT) {
-        share = gradient_share(normalize(ray));
-    } else if (environment_kind == ENVIRONMENT_CHECKERBOARD) {
-        share = checkerboard_share(pixel / frame_size.y, environment_tiles);
-    }
-    return mix(environment_first.rgb, environment_second.rgb, share);
-}
 
 void main() {
     vec2 pixel = gl_FragCoord.xy + frame_size.zw;
@@ -121,8 +104,12 @@ void main() {
 #if EMISSION
     emitted = emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
 #endif
-    vec3 radiance = background(pixel, ray, texel) * through + emitted;
-    out_radiance = vec4(radiance, 1.0);
+#if SURFACES
+    // What is behind is added where rays are bent.
+    out_radiance = vec4(emitted, 1.0);
+#else
+    out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
+#endif
     out_transmittance = vec4(through, 1.0);
 #if !AVERAGE
     out_optical_depth = vec4(path.optical_depth, 1.0);

@@ -9,14 +9,22 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent import camera, color, lights, optics
+from translucent import camera, color, environment, interface, optics, tone, two_stream
 from translucent.assets import shader_library
 from translucent.gpu.probe import run_function, signatures
 
-MODULES: dict[str, ModuleType] = {"optics": optics, "color": color, "environment": lights, "ray": camera}
+MODULES: dict[str, ModuleType] = {
+    "optics": optics,
+    "interface": interface,
+    "two_stream": two_stream,
+    "color": color,
+    "environment": environment,
+    "ray": camera,
+    "tone": tone,
+}
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
-HOST_ONLY = {"color": {"parse_color", "to_hex"}, "camera": {"check_size"}}
+HOST_ONLY = {"color": {"parse_color", "to_hex"}, "camera": {"check_size"}, "tone": {"tone_curve"}}
 
 DEPTHS = np.concatenate(
     [[0.0], np.geomspace(1e-30, 1e4, 200), [0.5, np.nextafter(0.5, 0), 87.0, 88.8, 104.0, 1e5, 1e30]]
@@ -64,6 +72,40 @@ def _backdrop_arguments() -> list[np.ndarray]:
     return [np.stack([x, y], axis=1), tiles]
 
 
+def _directions_and_normals() -> list[np.ndarray]:
+    """Unit vectors and normals against them, with indices; without those within rounding of total reflection's edge."""
+    normal = np.repeat(_unit_vectors(), 9, axis=0)
+    side = np.cross(normal, np.roll(normal, 1, axis=1))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    cosine = np.resize([0.0, 1e-6, 1e-3, 0.1, 0.5, 0.7, 0.9, 0.9999, 1.0, 0.3], len(normal))[:, None]
+    direction = (np.sqrt(1 - cosine**2) * side - cosine * normal).astype(np.float32)
+    ior = np.resize([0.4, 1 / 1.5, 0.9, 1.0, 1.0001, 1.33, 1.5, 2.4], len(normal)).astype(np.float32)
+    c = (direction.astype(np.float64) * normal).sum(axis=1)
+    clear = np.abs((ior - 1.0) * (ior + 1.0) + c * c) > 1e-5
+    return [direction[clear], normal[clear], ior[clear]]
+
+
+def _slab_arguments() -> list[np.ndarray]:
+    reflectance, depth = _mixed(UNIT, DEPTHS[::7])
+    return [reflectance, _triples(depth)]
+
+
+def _layer_arguments() -> list[np.ndarray]:
+    grid = np.concatenate([[0.0], np.geomspace(1e-30, 1e4, 60), [1e5, 1e15]])
+    k, s = _mixed(grid, grid)
+    return [np.stack([k, np.roll(k, 7), k], axis=1), np.stack([s, np.roll(s, 7), s], axis=1)]
+
+
+def _turned_arguments() -> list[np.ndarray]:
+    directions, turns = _unit_vectors(), np.array([0.0, 0.25, -0.7, 3.0], np.float32)
+    directions = np.concatenate([directions, np.float32([[0, 1, 0], [0, -1, 0], [0, 0, -1], [1, 0, 0], [0, 1, 1e-18]])])
+    return [np.repeat(directions, len(turns), axis=0), np.tile(turns, len(directions))]
+
+
+#: Radiance from below 0 to far above white, where curves bend, and in all mixtures of channels.
+RADIANCE = np.concatenate([[-1.0, 0.0], np.geomspace(1e-6, 1e6, 90), np.linspace(0.01, 1.5, 60)])
+
+
 ARGUMENTS = {
     "transmittance": [_triples(DEPTHS)],
     "opacity": [_triples(DEPTHS)],
@@ -79,6 +121,28 @@ ARGUMENTS = {
     "refracted_cosine": _mixed(UNIT, np.array([1 / 1.5, 1.0, 1.0001, 1.33, 1.5, 2.4])),
     "thin_layer_thickness": _mixed(np.array([1e-6, 1e-3, 1.0]), COSINES, np.array([1.0, 1.33, 1.5])),
     "henyey_greenstein": _mixed(np.clip(COSINES, -1, 1), np.array([-0.99, -0.5, 0, 1e-7, 0.3, 0.9, 0.999])),
+    "reflected_direction": _directions_and_normals()[:2],
+    "refracted_direction": _directions_and_normals(),
+    "channel_iors": _mixed(np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.0, 0.1, 0.36, 1.0, 20.0, 100.0])),
+    "ggx_distribution": _mixed(UNIT, np.array([1e-4, 1e-2, 0.25, 1.0])),
+    "ggx_visibility": _mixed(UNIT[::3], UNIT[::2], np.array([1e-4, 1e-2, 0.25, 1.0])),
+    "slab_transmittance": _slab_arguments(),
+    "slab_reflectance": _slab_arguments(),
+    "refraction_angle_ratio": _mixed(UNIT, np.array([1 / 1.5, 0.9, 1.0, 1.0001, 1.33, 1.5, 2.4])),
+    "wyman_distance": _mixed(UNIT, np.array([1.0, 1.33, 2.4]), np.array([0.0, 1e-3, 2.0]), np.array([0.0, 0.5])),
+    "two_stream_absorption": [_triples(DEPTHS)],
+    "two_stream_scattering": [_triples(DEPTHS), np.resize([-0.9, 0.0, 0.5, 0.99], len(DEPTHS)).astype(np.float32)],
+    **dict.fromkeys(
+        (
+            "two_stream_depth",
+            "two_stream_denominator",
+            "two_stream_reflectance",
+            "two_stream_transmittance",
+            "multiple_reflectance",
+            "multiple_transmittance",
+        ),
+        _layer_arguments(),
+    ),
     "srgb_to_linear": [_triples(np.linspace(-1, 2, 301))],
     "linear_to_srgb": [_triples(np.concatenate([np.linspace(-1, 2, 301), np.geomspace(1e-9, 1, 60)]))],
     "luminance": [_triples(UNIT)],
@@ -86,7 +150,12 @@ ARGUMENTS = {
     "gradient_share": [_unit_vectors()],
     "gradient_irradiance_share": [_unit_vectors()],
     "checkerboard_share": _backdrop_arguments(),
+    "equirectangular_uv": _turned_arguments(),
     "view_ray": _ray_arguments(),
+    "tone_none": [_triples(RADIANCE)],
+    "tone_neutral": [_triples(RADIANCE)],
+    "tone_agx": [_triples(RADIANCE)],
+    "agx_sigmoid": [np.linspace(0, 1, 301, dtype=np.float32)],
 }
 
 #: Relative error in units of float32 rounding (6e-8), and absolute floor, by function. exp(-x) multiplies the rounding
@@ -96,6 +165,10 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "srgb_to_linear": 64.0,  # pow multiplies the error of the logarithm by 2.4 log(x)
     "linear_to_srgb": 64.0,
     "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
+    "refraction_angle_ratio": 4096.0,  # what OpenGL promises of arcs
+    "wyman_distance": 4096.0,
+    "equirectangular_uv": 4096.0,
+    "tone_agx": 64.0,  # powers
 }
 FLOOR = {
     "fresnel_dielectric": 2e-7,
@@ -105,6 +178,14 @@ FLOOR = {
     "view_ray": 1e-7,
     "luminance": 1e-9,
     "extinction_from_color": 0.0,
+    "reflected_direction": 4e-7,  # sums of products of components up to 1
+    "refracted_direction": 4e-7,
+    # Differences of shares up to 1, each good to a few roundings.
+    "tone_neutral": 2e-7,
+    "agx_sigmoid": 4e-7,
+    "tone_agx": 1e-6,
+    "multiple_reflectance": 5e-7,
+    "multiple_transmittance": 5e-7,
 }
 
 
@@ -141,6 +222,9 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     allowed = ROUNDINGS[name] * eps * np.abs(exact) + FLOOR.get(name, 0.0)
     if name == "transmittance":
         allowed = allowed + eps * np.minimum(arguments[0], 200.0) * exact * 4
+    if name == "two_stream_transmittance":
+        depth = two_stream.two_stream_depth(*arguments)
+        allowed = allowed + eps * np.minimum(depth, 200.0) * exact * 4
     if name == "emitted_radiance":
         allowed = allowed + 1e-37
     return allowed + 1.2e-38  # below the smallest normal number everything may flush to 0
@@ -154,13 +238,14 @@ def test_function_equals_its_twin(renderer: tl.Renderer, library: str, name: str
     with renderer.gpu.context.current() as gl:
         found = run_function(gl, f"lib/{library}.glsl", signature, *arguments).astype(np.float64)
     wide = [a.astype(np.float64) for a in arguments]
-    if library == "optics" and signature.returns == "vec3":
+    if (library in {"optics", "two_stream"} or name.startswith("slab_")) and signature.returns == "vec3":
         wide = [a[:, None] if a.ndim == 1 else a for a in wide]
     with np.errstate(under="ignore"):
         exact = np.asarray(getattr(MODULES[library], name)(*wide))
     assert np.isfinite(found).all()
-    allowed = _allowed(name, exact, wide)
-    excess = np.abs(found - exact) / allowed
+    with np.errstate(under="ignore"):
+        allowed = _allowed(name, exact, wide)
+        excess = np.abs(found - exact) / allowed
     worst = np.unravel_index(excess.argmax(), excess.shape)
     row = worst[0]
     assert (excess <= 1).all(), (

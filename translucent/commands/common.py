@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -10,10 +11,13 @@ import click
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
+    from translucent.environment import Environment
     from translucent.frame import Frame
-    from translucent.lights import Environment
     from translucent.medium import Medium
     from translucent.thickness import Method
+
+#: Of tone curves, as in `translucent.tone.TONES`, which only rendering imports.
+TONE_NAMES = ("none", "neutral", "agx")
 
 #: Below this mean share of light a picture shows little but black.
 NEARLY_BLACK = 0.02
@@ -77,15 +81,59 @@ def read_method(name: str | None, thickness: str | None) -> Method | None:
     return ThinLayer(parse_length(thickness))
 
 
-def read_environment(background: str) -> Environment | None:
-    """The background of this name or color; None is the showcase's own."""
-    from translucent.lights import Environment
+def look_options(command: F) -> F:
+    """Options for what lights the model, what is seen behind it, and how bright the picture is."""
+    command = click.option(
+        "--tone",
+        type=click.Choice(TONE_NAMES),
+        default="none",
+        show_default=True,
+        help="Tone curve of a .png: clamped, Khronos PBR Neutral, or AgX.",
+    )(command)
+    command = click.option("--exposure", type=float, default=0.0, metavar="STOPS", help="Makes a .png brighter.")(
+        command
+    )
+    command = click.option(
+        "--background", metavar="E", help="Seen behind the model instead of the environment, and through it; as above."
+    )(command)
+    return click.option(
+        "--environment",
+        metavar="E",
+        help="Lights the model and is mirrored: light-table, studio, checkerboard, a color, or a .hdr, .exr or .png of "
+        "all directions; studio,90 turns it by degrees. Default: light-table.",
+    )(command)
 
-    if background == "studio":
-        return None
-    if background == "checkerboard":
+
+def read_environment(name: str | None, background: str | None) -> Environment | None:
+    """What the options name; None if they name nothing."""
+    from translucent.showcase import LIGHT_TABLE
+
+    if background is None:
+        return None if name is None else _environment(name)
+    return (LIGHT_TABLE if name is None else _environment(name)).with_background(_environment(background))
+
+
+def _environment(text: str) -> Environment:
+    from translucent.environment import Environment
+    from translucent.environment_files import READERS
+    from translucent.showcase import LIGHT_TABLE
+
+    name, rotation = text, 0.0
+    head, comma, tail = text.rpartition(",")
+    if comma and (head == "studio" or Path(head).suffix.lower() in READERS):
+        try:
+            name, rotation = head, float(tail)
+        except ValueError:
+            raise InputError(f"environment {text!r}", f"rotation {tail!r}", "give degrees, as in studio,90") from None
+    if name == "studio":
+        return Environment.studio(rotation)
+    if Path(name).suffix.lower() in READERS:
+        return Environment.image(name, rotation)
+    if name == "light-table":
+        return LIGHT_TABLE
+    if name in ("checkerboard", "checker"):
         return Environment.checkerboard(tiles=12)
-    return Environment.constant(background)
+    return Environment.constant(name)
 
 
 def read_size(text: str) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from translucent.errors import InputError
 
 if TYPE_CHECKING:
     from translucent.camera import Camera
-    from translucent.lights import Environment
+    from translucent.environment import Environment
     from translucent.medium import Medium
     from translucent.mesh import Mesh
     from translucent.scene import Object, Scene

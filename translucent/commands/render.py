@@ -1,14 +1,16 @@
-"""``translucent render``: a picture of a mesh or of a scene."""
+"""``translucent render``: pictures of a mesh or of a scene."""
 
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import click
 
 from translucent.commands.common import (
     common_options,
+    look_options,
     medium_options,
     read_environment,
     read_medium,
@@ -18,11 +20,14 @@ from translucent.commands.common import (
     warn_if_black,
 )
 from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lines, read_scene, require_translucent
+from translucent.commands.pictures import Pictures, picture_options
 
 
 @click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
 @click.argument("model")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="A .png, .exr or .npz file.")
+@click.option(
+    "-o", "--output", required=True, type=click.Path(path_type=Path), help="A .png, .exr or .npz file; see --turntable."
+)
 @medium_options
 @unit_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
@@ -33,7 +38,7 @@ from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lin
 @click.option("--target", metavar="X,Y,Z", help="What the camera looks at. Default: the model's center.")
 @click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
 @click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
-@click.option("--background", default="studio", show_default=True, help="studio, checkerboard, or a color.")
+@look_options
 @click.option(
     "--method",
     "method_name",
@@ -47,6 +52,7 @@ from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lin
     type=click.Choice(["pyrender"]),
     help="Let another renderer draw the opaque objects of a glTF file.",
 )
+@picture_options
 @click.option("--backend", metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
 @common_options
 def render(
@@ -62,11 +68,17 @@ def render(
     target: str | None,
     up: str | None,
     fov: float | None,
-    background: str,
+    environment: str | None,
+    background: str | None,
+    exposure: float,
+    tone: str,
     method_name: str | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
+    turntable: int | None,
+    fps: float,
+    aov: Path | None,
     backend: str | None,
     as_json: bool,
 ) -> None:
@@ -76,23 +88,25 @@ def render(
     replaces them. All other files are one mesh.
     """
     import translucent as tl
-    from translucent.frame import check_output
+    from translucent.turntable import framed_all_around
 
-    check_output(output)
+    pictures = Pictures(output, exposure, tone, turntable, fps, aov)
+    pictures.check()
     pixels = read_size(size)
     medium = read_medium(color, distance, preset_name)
     method = read_method(method_name, thickness)
-    environment = read_environment(background)
-    scene = read_scene(model, unit, medium, View(camera, eye, target, up, fov), pixels, environment)
+    view = View(camera, eye, target, up, fov)
+    scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background))
     require_translucent(model, scene)
+    if turntable is not None and camera is None and eye is None:
+        scene = framed_all_around(scene, pixels)
     with tl.Renderer(backend) as renderer:
-        if opaque_with is None:
-            frame = renderer.render(scene, pixels, method, samples)
-        else:
+        draw = partial(renderer.render, size=pixels, method=method, samples=samples)
+        if opaque_with is not None:
             from translucent.interop.pyrender import render_scene
 
-            frame = render_scene(scene, pixels, method, samples, renderer)
-    frame.save(output)
+            draw = partial(render_scene, size=pixels, method=method, samples=samples, renderer=renderer)
+        frame = pictures.write(scene, draw)
     warn_if_black(frame)
     media = medium_lines(scene)
     if as_json:

@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 import moderngl
 import numpy as np
 
+from translucent.corner_normals import corner_normals
 from translucent.mesh import Mesh
 
 
@@ -22,12 +23,19 @@ class MeshBuffers:
         self.offsets = gl.buffer((mesh.vertices - mesh.center).astype(np.float32))
         self.indices = gl.buffer(mesh.faces)
         self._flat: moderngl.Buffer | None = None
+        self._border: moderngl.Buffer | None = None
         self._arrays: dict[int, moderngl.VertexArray] = {}
 
     def vertex_array(self, program: moderngl.Program, mesh: Mesh) -> moderngl.VertexArray:
-        """The mesh bound to the inputs of `program`: shared vertices, or where it asks for ``normal``, flat faces."""
+        """The mesh bound to the inputs of `program`.
+
+        Shared vertices; or where it asks for ``normal``, flat faces; or for ``corner_normal``, faces that look smooth.
+        """
         if (array := self._arrays.get(program.glo)) is None:
-            if "normal" in program:
+            if "corner_normal" in program:
+                names = ("offset", "corner_normal", "uv")
+                array = self._gl.vertex_array(program, [(self._smooth_faces(mesh), "3f 3f 2f", *names)])
+            elif "normal" in program:
                 array = self._gl.vertex_array(program, [(self._flat_faces(mesh), "3f 3f", "offset", "normal")])
             else:
                 content = [(self.offsets, "3f", "offset")]
@@ -43,9 +51,18 @@ class MeshBuffers:
             self._flat = self._gl.buffer(np.concatenate([corners, normals], axis=2).astype(np.float32))
         return self._flat
 
+    def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
+        """Each face with vertices of its own, which carry smooth normals and texture coordinates."""
+        if self._border is None:
+            corners = (mesh.vertices - mesh.center)[mesh.faces]
+            uv = np.zeros((*mesh.faces.shape, 2)) if mesh.uv is None else mesh.uv[mesh.faces]
+            content = np.concatenate([corners, corner_normals(mesh), uv], axis=2)
+            self._border = self._gl.buffer(content.astype(np.float32))
+        return self._border
+
     def release(self) -> None:
         """Free the OpenGL objects now."""
-        for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat):
+        for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat, self._border):
             if resource is not None:
                 resource.release()
         self._arrays.clear()

@@ -10,9 +10,11 @@ import numpy as np
 from translucent.backdrop import Backdrop
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
-from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, VIEW
+from translucent.gpu.environment_maps import EnvironmentMaps
+from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.targets import Targets
+from translucent.gpu.textures import TextureCache
 from translucent.gpu.uniforms import (
     BodyRole,
     LightViews,
@@ -23,13 +25,14 @@ from translucent.gpu.uniforms import (
     media_uniforms,
     scatter_uniforms,
     shade_uniforms,
+    surface_uniforms,
     view_uniforms,
 )
 from translucent.plan import FALLBACK_SHEET
 from translucent.render_plan import RenderPlan
 from translucent.scene import Object, Scene
 from translucent.slots import medium_slots
-from translucent.thickness import RayMarched, SignedDepth, ThinLayer
+from translucent.thickness import FragmentLists, KBuffer, RayMarched, SignedDepth, ThinLayer
 
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
@@ -50,7 +53,7 @@ class FrameJob:
 
     Parameters
     ----------
-    gl, scene, plan, targets, meshes
+    gl, scene, plan, targets, meshes, environments, textures
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
     """
@@ -62,6 +65,8 @@ class FrameJob:
         plan: RenderPlan,
         targets: Targets,
         meshes: MeshCache,
+        environments: EnvironmentMaps,
+        textures: TextureCache,
         backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> None:
         self.gl = gl
@@ -69,6 +74,8 @@ class FrameJob:
         self.plan = plan
         self.targets = targets
         self.meshes = meshes
+        self.environments = environments
+        self.textures = textures
         self.backdrop = backdrop
         self.averaging = False
         self.light_views: LightViews | None = None
@@ -88,9 +95,12 @@ class FrameJob:
                 )
             ),
             MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self.media_range)),
-            LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque)),
+            LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque or self.has_surfaces)),
             ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
         }
+        if self.has_surfaces:
+            view = View(scene.camera, targets.size)
+            self._constant[SURFACES] = gl.buffer(surface_uniforms(scene, self.media_range, view))
         self._cleared: set[str] = set()
         self.place((0.0, 0.0))
 
@@ -126,6 +136,16 @@ class FrameJob:
         return any(step.name in ("opaque", "backdrop") for step in self.plan.passes)
 
     @property
+    def has_surfaces(self) -> bool:
+        """Whether light changes at the border of a body."""
+        return any(step.name == "surfaces" for step in self.plan.passes)
+
+    @property
+    def finds_exits(self) -> bool:
+        """Whether the intervals tell where each ray first leaves all bodies: borders need it where bodies touch."""
+        return self.has_surfaces and isinstance(self.plan.method, FragmentLists | KBuffer | RayMarched)
+
+    @property
     def scatters(self) -> bool:
         """Whether light from the lights is scattered into the rays."""
         return any(step.name == "light_views" for step in self.plan.passes)
@@ -144,6 +164,15 @@ class FrameJob:
     def emits(self) -> bool:
         """Whether any medium emits light."""
         return any(body.medium is not None and body.medium.emits for body in self.scene.bodies)
+
+    @property
+    def picture(self) -> moderngl.Framebuffer:
+        """Whose first attachment is the frame's radiance."""
+        return self.targets.surfaced() if self.has_surfaces else self.targets.result()
+
+    def is_sheet(self, number: int) -> bool:
+        """Whether an object is drawn as a sheet, without an inside."""
+        return isinstance(self.plan.method, ThinLayer) or self.scene.objects[number].sheet_thickness is not None
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
         """Target in which thickness passes add up, cleared when a frame first asks for it."""
@@ -187,7 +216,7 @@ class FrameJob:
         slot_of = {i: number for number, slot in enumerate(self.slots) for i in slot.objects}
         weights = _count_weights(self.scene)
         return [
-            BodyRole(anchored, self._sheet_thickness(body), weights[i], slot_of.get(i, 0))
+            BodyRole(anchored, self._sheet_thickness(body), weights[i], slot_of.get(i, 0), i)
             for i, body in enumerate(self.scene.objects)
         ]
 

@@ -127,6 +127,7 @@ BODY = UniformBlock(
         ("place_start", "f4", ()),  # place of the anchor
         ("slot", "i4", ()),
         ("starts_unknown", "i4", ()),  # whether the eye is on the surface, so that rays start on either side of it
+        ("object", "i4", ()),  # its number in the scene
     ),
 )
 
@@ -156,15 +157,38 @@ MEDIA = UniformBlock(
     ),
 )
 
-#: Per frame: what is far behind everything.
+#: Per frame: what is far away, as it is seen behind everything, and as it lights.
 ENVIRONMENT = UniformBlock(
     "Environment",
     5,
     (
-        ("environment_first", "f4", (4,)),
-        ("environment_second", "f4", (4,)),
-        ("environment_tiles", "f4", ()),
-        ("environment_kind", "i4", ()),
+        ("seen_first", "f4", (4,)),
+        ("seen_second", "f4", (4,)),
+        ("seen_tiles", "f4", ()),
+        ("seen_turn", "f4", ()),  # of its map about +Y, as a share of a full turn
+        ("seen_scale", "f4", ()),  # exposure, as a factor
+        ("seen_kind", "i4", ()),
+        ("light_first", "f4", (4,)),
+        ("light_second", "f4", (4,)),
+        ("light_turn", "f4", ()),
+        ("light_scale", "f4", ()),
+        ("light_kind", "i4", ()),
+    ),
+)
+
+#: Per frame: where the borders of bodies are. Positions count from the center of the media.
+SURFACES = UniformBlock(
+    "Surfaces",
+    7,
+    (
+        ("surface_right", "f4", (4,)),  # camera's axes, times half the view's extent (at distance 1); w: perspective
+        ("surface_up", "f4", (4,)),
+        ("surface_off_axis", "f4", (4,)),  # from the camera's axis to the center
+        # Metres ahead of the center of place 0, from place 0 to place 1, ahead of the eye of the center, and ahead of
+        # the center of the wall that a checkerboard is.
+        ("surface_ahead", "f4", (4,)),
+        ("surface_reach", "f4", ()),  # metres as far as which bent rays look for opaque surfaces
+        ("surface_eye_place", "f4", ()),
     ),
 )
 
@@ -202,4 +226,4 @@ SCATTER = UniformBlock(
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER)}
+BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, SURFACES)}

@@ -15,10 +15,12 @@ from translucent.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.context import GpuContext, adopt_context, open_context
+from translucent.gpu.environment_maps import EnvironmentMaps
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.targets import Targets
+from translucent.gpu.textures import TextureCache
 from translucent.gpu.timer import PassTimer
 from translucent.render_plan import Capabilities, RenderPlan
 from translucent.sampling import sample_shifts
@@ -55,6 +57,8 @@ class GpuRenderer:
     def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
         self.context: GpuContext = open_context(backend) if context is None else adopt_context(context)
         self._meshes = MeshCache(self.context.gl)
+        self._environments = EnvironmentMaps(self.context.gl)
+        self._textures = TextureCache(self.context.gl)
         with self.context.current():
             self._timer = PassTimer(self.context.gl)
         self._targets: Targets | None = None
@@ -125,7 +129,8 @@ class GpuRenderer:
                 self._targets.release()
                 self._targets = None
             self._targets = Targets(self.context.gl, size)
-        return FrameJob(self.context.gl, scene, plan, self._targets, self._meshes, backdrop)
+        shared = self._meshes, self._environments, self._textures
+        return FrameJob(self.context.gl, scene, plan, self._targets, *shared, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
@@ -145,7 +150,8 @@ class GpuRenderer:
             with np.errstate(under="ignore"):
                 radiance, transmittance = (_read_floats(averages, i, 3) / np.float32(samples) for i in range(2))
         else:
-            radiance, transmittance = (_read_floats(result, i, 3) for i in range(2))
+            transmittance = _read_floats(result, 1, 3)
+            radiance = _read_floats(job.picture, 0, 3)
         flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
         result.read_into(flags, components=1, attachment=4, alignment=1)
         optical_depth, thickness = _read_floats(result, 2, 3), _read_floats(result, 3, 1)
@@ -177,6 +183,8 @@ class GpuRenderer:
         self._closed = True
         with self.context.current():
             self._meshes.release()
+            self._environments.release()
+            self._textures.release()
             if self._targets is not None:
                 self._targets.release()
             self._passes.clear()

@@ -15,6 +15,18 @@ from translucent.errors import RenderError
 from translucent.gpu.layout import BLOCKS
 from translucent.optics import MIN_THIN_LAYER_COSINE
 from translucent.thickness import Quadrature
+from translucent.tone import (
+    AGX_DISPLAY,
+    AGX_MIDDLE_GREY,
+    AGX_MIX,
+    AGX_SHOULDER,
+    AGX_SLOPE,
+    AGX_STOPS,
+    AGX_TOE,
+    NEUTRAL_DESATURATION,
+    NEUTRAL_F90,
+    NEUTRAL_START,
+)
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8
@@ -41,6 +53,20 @@ CONSTANTS: dict[str, str] = {
     "ENVIRONMENT_CONSTANT": "0",
     "ENVIRONMENT_GRADIENT": "1",
     "ENVIRONMENT_CHECKERBOARD": "2",
+    "ENVIRONMENT_IMAGE": "3",
+    "NEUTRAL_F90": repr(NEUTRAL_F90),
+    "NEUTRAL_START": repr(NEUTRAL_START),
+    "NEUTRAL_DESATURATION": repr(NEUTRAL_DESATURATION),
+    "AGX_LOW": repr(AGX_STOPS[0]),
+    "AGX_HIGH": repr(AGX_STOPS[1]),
+    "AGX_MIDDLE_GREY": repr(AGX_MIDDLE_GREY),
+    "AGX_MIX": f"vec3{AGX_MIX}",
+    "AGX_TOE": repr(AGX_TOE),
+    "AGX_SHOULDER": repr(AGX_SHOULDER),
+    "AGX_SLOPE": repr(AGX_SLOPE),
+    "AGX_DISPLAY": repr(AGX_DISPLAY),
+    "TOUCHING": "1e-6",  # places between surfaces that count as one border
+    "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
 }
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')

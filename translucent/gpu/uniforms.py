@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.camera import Camera
+from translucent.environment import Environment
 from translucent.errors import InputError
 from translucent.gpu.layout import (
     BODY,
@@ -19,16 +21,19 @@ from translucent.gpu.layout import (
     MEDIA,
     SCATTER,
     SHADE,
+    SURFACES,
     VIEW,
 )
 from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
 from translucent.gpu.shaders import CONSTANTS
-from translucent.lights import Environment, PointLight
+from translucent.lights import PointLight
 from translucent.medium import Medium
 from translucent.plan_limits import MAX_SCATTER_LIGHTS
 from translucent.reference.sheets import SHEET_ON_OPAQUE
 from translucent.scene import Scene
 from translucent.slots import MAX_SLOTS, Slot
+from translucent.surface import Surface
+from translucent.two_stream import two_stream_absorption, two_stream_scattering
 
 Array = npt.NDArray[np.float64]
 
@@ -71,12 +76,15 @@ class BodyRole:
         What one face adds to the count.
     slot : int
         Whose winding number its crossings change.
+    number : int
+        Its place among the objects of the scene.
     """
 
     anchored: bool
     sheet_thickness: float
     count_weight: float
     slot: int
+    number: int
 
 
 def body_uniforms(placement: Placement, view: View, role: BodyRole, media: AxialRange, diagonal: float) -> bytes:
@@ -104,7 +112,7 @@ def body_uniforms(placement: Placement, view: View, role: BodyRole, media: Axial
         eye_from_offset=eye_from_offset,
         axis=axis,
         extinction=[*bounded_extinction(body.medium, diagonal), 0.0],
-        color=[*np.asarray(body.color), 0.0],
+        color=[*body.base_color, 0.0],
         sheet_thickness=role.sheet_thickness,
         sheet_ior=1.0 if body.medium is None else body.medium.ior,
         sheet_tolerance=SHEET_ON_OPAQUE * diagonal,
@@ -114,6 +122,7 @@ def body_uniforms(placement: Placement, view: View, role: BodyRole, media: Axial
         place_start=(anchor - media.near) / media.length,
         slot=role.slot,
         starts_unknown=placement.on_surface,
+        object=role.number,
     )
 
 
@@ -299,9 +308,57 @@ def shade_uniforms(
 
 def environment_uniforms(environment: Environment) -> bytes:
     """Contents of the Environment block."""
+    seen = environment.seen
     return ENVIRONMENT.pack(
-        environment_first=[*environment.first, 0.0],
-        environment_second=[*environment.second, 0.0],
-        environment_tiles=environment.tiles,
-        environment_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
+        seen_first=[*seen.first, 0.0],
+        seen_second=[*seen.second, 0.0],
+        seen_tiles=seen.tiles,
+        seen_turn=seen.turn,
+        seen_scale=seen.scale,
+        seen_kind=int(CONSTANTS[f"ENVIRONMENT_{seen.kind.upper()}"]),
+        light_first=[*environment.first, 0.0],
+        light_second=[*environment.second, 0.0],
+        light_turn=environment.turn,
+        light_scale=environment.scale,
+        light_kind=int(CONSTANTS[f"ENVIRONMENT_{environment.kind.upper()}"]),
     )
+
+
+def surface_uniforms(scene: Scene, media: AxialRange, view: View) -> bytes:
+    """Contents of the Surfaces block."""
+    camera = view.camera
+    half_width, half_height = camera.half_extent(view.size)
+    boxes = np.stack([body.bounds for body in scene.bodies])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    center = 0.5 * low + 0.5 * high - camera.eye
+    ahead = float(center @ camera.forward)
+    return SURFACES.pack(
+        surface_right=[*(camera.right * half_width), float(camera.fov_y is not None)],
+        surface_up=[*(camera.up * half_height), 0.0],
+        surface_off_axis=[*(center - ahead * camera.forward), 0.0],
+        surface_ahead=[media.near - ahead, media.length, ahead, float(np.linalg.norm(high - low))],
+        surface_reach=scene.diagonal,
+        surface_eye_place=-media.near / media.length,
+    )
+
+
+def surface_table(scene: Scene, sheets: Collection[int]) -> npt.NDArray[np.float32]:
+    """(objects, 5, 4): what ``shaders/shade/surfaces.frag`` reads of each object, besides what textures vary.
+
+    `sheets`: numbers of the objects that are drawn without an inside.
+    """
+    table = np.zeros((len(scene.objects), 5, 4), dtype=np.float32)
+    for i, (row, body) in enumerate(zip(table, scene.objects, strict=True)):
+        if body.medium is None:
+            continue
+        medium, surface = body.medium, body.surface or Surface()
+        stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
+        limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
+        passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
+        much = surface.multiple_scattering and medium.scatters
+        row[0] = medium.ior, surface.dispersion, i in sheets, much
+        row[1, 3] = np.linalg.norm(body.bounds[1] - body.bounds[0])
+        row[2] = *passed, surface.roughness
+        row[3] = *np.minimum(stream[0], limit), surface.transmission
+        row[4, :3] = np.minimum(stream[1], limit)
+    return table

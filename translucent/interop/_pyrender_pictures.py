@@ -12,7 +12,7 @@ import pyrender
 
 from translucent.backdrop import Backdrop
 from translucent.camera import Camera
-from translucent.lights import Environment
+from translucent.environment import Environment
 
 #: pyrender encodes the radiance that it finds as a power, and cuts it off at 1 (its shaders/mesh.frag).
 GAMMA = 2.2

@@ -13,9 +13,10 @@ import numpy.typing as npt
 import pyrender
 
 from translucent.camera import Camera
+from translucent.environment import Environment
 from translucent.errors import InputError, TranslucentWarning
 from translucent.interop._pyrender_pictures import GAMMA
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh, mended
 from translucent.scene import Light, Object, Overlap, Scene

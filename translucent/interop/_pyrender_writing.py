@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 def written(scene: Scene, near: float | None = None) -> Any:
     """See `translucent.interop.pyrender.to_pyrender`; `near` is that of the camera, if something closer is known."""
     environment = scene.environment
-    part = pyrender.Scene(bg_color=np.zeros(4), ambient_light=0.5 * (environment.first + environment.second))
+    part = pyrender.Scene(bg_color=np.zeros(4), ambient_light=environment.mean)
     for item in scene.opaque:
         part.add(pyrender.Mesh([_primitive(item, scene.camera)], name=item.mesh.name))
     _add_lights(part, scene)
@@ -42,7 +42,7 @@ def _primitive(item: Object, camera: Camera) -> Any:
         corners.reshape(-1, 3),
         np.repeat(normals, 3, axis=0),
         material=pyrender.MetallicRoughnessMaterial(
-            baseColorFactor=[*np.asarray(item.color), 1.0], metallicFactor=0.0, roughnessFactor=1.0, doubleSided=True
+            baseColorFactor=[*item.base_color, 1.0], metallicFactor=0.0, roughnessFactor=1.0, doubleSided=True
         ),
     )
 

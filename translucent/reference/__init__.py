@@ -5,6 +5,7 @@ from translucent.reference.intervals import Intervals
 from translucent.reference.march import march
 from translucent.reference.path_trace import path_trace
 from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.refraction import bent_light
 from translucent.reference.render import hit_counts, render, shade_hits
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
 
@@ -13,6 +14,7 @@ __all__ = [
     "Hits",
     "Intervals",
     "Rays",
+    "bent_light",
     "camera_hits",
     "hit_counts",
     "line_hits",

@@ -78,13 +78,18 @@ def _lambert(scene: Scene, body: Object, face: Integers, distance: Array, rays: 
     normals[away] *= -1.0
     # From the eye, as the rays are, so that the way to a light keeps its digits far from the world's origin.
     points = rays.origins + distance[:, None] * rays.directions
+    with np.errstate(under="ignore"):
+        return np.asarray(body.base_color / np.pi * irradiance_at(scene, points, normals))
+
+
+def irradiance_at(scene: Scene, points: Array, normals: Array) -> Array:
+    """Irradiance (k, 3) of environment and lights at points (k, 3), in metres from the eye; nothing shadows them."""
     irradiance = scene.environment.irradiance_on(normals)
     for light in scene.lights:
-        irradiance = irradiance + _seen_from(light, scene.camera.eye).irradiance_on(points, normals)
-    with np.errstate(under="ignore"):
-        return np.asarray(np.asarray(body.color) / np.pi * irradiance)
+        irradiance = irradiance + seen_from(light, scene.camera.eye).irradiance_on(points, normals)
+    return irradiance
 
 
-def _seen_from(light: Light, eye: Array) -> Light:
+def seen_from(light: Light, eye: Array) -> Light:
     """The light with its position, where it has one, relative to the eye."""
     return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light

@@ -219,9 +219,9 @@ class _Paths:
         through = np.ones(len(rays), dtype=bool)
         through[met.path] = False
         behind = seen_behind(self.scene, rays, media.wall)
-        environment = self.scene.environment
-        if scattered and environment.kind == "checkerboard":
-            behind[np.isinf(media.wall.distance)] = 0.5 * (environment.first + environment.second)
+        if scattered:
+            open_to = np.isinf(media.wall.distance)
+            behind[open_to] = self.scene.environment.lighting(rays.directions[open_to])
         self._add(owner[through], behind[through][:, self.channels] * throughput[through, None])
 
     def _add_lights(self, rays: Rays, weights: Array, throughput: Array, owner: Integers) -> None:

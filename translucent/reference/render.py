@@ -23,6 +23,7 @@ from translucent.reference.intervals import scene_intervals
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
 from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.refraction import BOUNCES, PATHS, bends, bent_light
 from translucent.reference.scattering import scattered_once
 from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
@@ -41,12 +42,25 @@ TRACED = Capabilities(shader_storage=False, opengl=False)
 TOLERANCE = 1e-6
 
 
-def render(scene: Scene, size: tuple[int, int], method: Method | None = None, tolerance: float = TOLERANCE) -> Frame:
+def render(
+    scene: Scene,
+    size: tuple[int, int],
+    method: Method | None = None,
+    tolerance: float = TOLERANCE,
+    refraction: bool | None = None,
+    bounces: int = BOUNCES,
+    paths: int = PATHS,
+    seed: int = 0,
+) -> Frame:
     """True thickness, transmittance and radiance of a scene.
 
     Radiance holds what is behind, what media emit, and the light of all lights that solid media scatter once; not what
     they scatter out of the environment, what sheets scatter, or what is scattered twice (`path_trace` has it all).
     Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
+
+    Where light changes at the borders of bodies (`Object.has_interface`), radiance is that of rays that bend and split
+    there; see `translucent.reference.bent`. All else is that of the straight rays, also then. Lights reach media
+    straight on. Of `Surface`, multiple scattering is left to `path_trace`.
 
     Parameters
     ----------
@@ -58,6 +72,14 @@ def render(scene: Scene, size: tuple[int, int], method: Method | None = None, to
         methods are ways to the same true thickness.
     tolerance : float
         Relative error of scattered light, at most, 1e-12 to 1. All else is exact.
+    refraction : bool, optional
+        Whether rays bend. Default: if some object has an interface.
+    bounces : int
+        Borders that a bent ray may meet.
+    paths : int
+        Rays of each pixel if a border is rough; the error falls with their square root.
+    seed : int
+        Of the random numbers for these.
 
     Returns
     -------
@@ -65,12 +87,13 @@ def render(scene: Scene, size: tuple[int, int], method: Method | None = None, to
         Of float64 arrays; `shade_hits` tells what is valid. Also invalid is a pixel whose scattered light misses the
         tolerance, since its ray meets a point light inside a medium, or comes through the hole of a body. With
         scattered light, ``provenance["scattering error"]`` is the largest estimated error of a valid pixel, relative to
-        its brightest channel.
+        its brightest channel. With bent rays, ``provenance["residual"]`` is the largest share of a valid pixel's light
+        that was not followed to its end, and ``provenance["standard error"]`` the largest one of a valid pixel.
 
     Raises
     ------
     InputError
-        If the size is not one, the tolerance not in its range, or the planner refuses the scene.
+        If the size is not one, a number not in its range, a surface has textures, or the planner refuses the scene.
     """
     start = time.perf_counter()
     size = check_size(size)
@@ -80,19 +103,26 @@ def render(scene: Scene, size: tuple[int, int], method: Method | None = None, to
     hits = scene_hits(scene, size)
     crossed = time.perf_counter()
     rays, sheets = pixel_rays(scene.camera, size), sheet_thicknesses(scene, method)
-    paths = LightPaths(scene, sheets) if scene.lights and Volume(scene).scatters else None
+    bent = bends(scene) if refraction is None else refraction
+    scatters = scene.lights and not bent and Volume(scene).scatters
+    light_paths = LightPaths(scene, sheets) if scatters else None
     found = []
     for part in _parts(hits, len(rays)):
         own = rays.where(part), [_along(line, part) for line in hits]
         shaded = shade_hits(scene, *own, sheets)
-        if paths is not None:
-            _add_scattered(shaded, scene, *own, paths, tolerance)
+        if light_paths is not None:
+            _add_scattered(shaded, scene, *own, light_paths, tolerance)
         found.append(shaded)
     arrays = {name: np.concatenate([shaded[name] for shaded in found]) for name in found[0]}
     provenance = {"backend": "reference", "numpy": np.__version__}
-    if paths is not None:
+    if light_paths is not None:
         error = arrays.pop("error")[arrays["valid"]]
         provenance["scattering error"] = f"{error.max(initial=0.0):.1e}"
+    if bent:
+        light, noise = bent_light(scene, size, method, tolerance, bounces, paths, seed)
+        arrays["radiance"], arrays["valid"] = light.radiance, arrays["valid"] & light.valid
+        for name, array in (("residual", light.residual), ("standard error", noise)):
+            provenance[name] = f"{array[arrays['valid']].max(initial=0.0):.1e}"
     end = time.perf_counter()
     return Frame(
         **{name: array.reshape(size[::-1] + array.shape[1:]) for name, array in arrays.items()},

@@ -11,10 +11,12 @@ from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
 from translucent.gpu.passes.backdrop import BackdropPass
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
+from translucent.gpu.passes.interfaces import InterfacesPass
 from translucent.gpu.passes.k_buffer import KBufferPass
 from translucent.gpu.passes.light_views import LightViewsPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
+from translucent.gpu.passes.surfaces import SurfacesPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.render_plan import PassSpec
@@ -42,4 +44,6 @@ PASSES: dict[str, type[Pass]] = {
     "fragment_lists": FragmentListsPass,
     "k_buffer": KBufferPass,
     "transmittance": TransmittancePass,
+    "interfaces": InterfacesPass,
+    "surfaces": SurfacesPass,
 }

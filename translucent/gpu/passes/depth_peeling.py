@@ -92,6 +92,7 @@ class DepthPeelingPass:
             **walk_switches(job),
             "SCATTER": False,
             "MARCH": False,
+            "BORDERS": False,
             **ends,
             "BEGIN": folds == 0,
             "END": last,

@@ -90,7 +90,8 @@ class FragmentListsPass:
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
         _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
-        program = self._resolve.program(**walk_switches(job), GRADIENT=0, OPAQUE=job.has_opaque)
+        switches = {"OPAQUE": job.has_opaque, "BORDERS": job.finds_exits}
+        program = self._resolve.program(**walk_switches(job), GRADIENT=0, **switches)
         if isinstance(method := job.plan.method, RayMarched):
             set_uniform(program, "march_steps", method.steps)
             set_uniform(program, "march_rule", int(CONSTANTS[f"MARCH_{method.quadrature.upper()}"]))

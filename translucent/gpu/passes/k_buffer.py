@@ -36,7 +36,7 @@ class KBufferPass:
         job.draw(program, spec.objects)
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT)
         job.targets.ordered().use()
-        program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque)
+        program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque, BORDERS=job.finds_exits)
         set_uniform(program, "k", k)
         self._resolve.draw_fullscreen(program)
         # The next frame must not clear the words before these have been walked along.

@@ -19,6 +19,6 @@ class PresentPass:
         """Draw the radiance, `stops` brighter."""
         framebuffer.use()
         job.gl.enable_only(moderngl.NOTHING)
-        job.targets.result().color_attachments[0].use(0)
+        job.picture.color_attachments[0].use(0)
         set_uniform(self._program, "stops", stops)
         self._fullscreen.render(moderngl.TRIANGLES, vertices=3)

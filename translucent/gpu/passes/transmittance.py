@@ -18,6 +18,7 @@ _SAMPLERS = (
     "ordered_layers",
     "opaque_place",
     "opaque_radiance",
+    "seen_map",
 )
 
 
@@ -39,7 +40,11 @@ class TransmittancePass:
             "ordered_depth": job.targets.ordered() if plan.ordered else None,
             "opaque_place": job.targets.opaque() if job.has_opaque else None,
         }
-        if job.averaging:
+        seen = job.scene.environment.seen
+        seen_map = seen.kind == "image" and not job.has_surfaces
+        if seen_map:
+            job.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
+        if job.averaging and not job.has_surfaces:
             job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
             gl.blend_equation = moderngl.FUNC_ADD
@@ -54,7 +59,9 @@ class TransmittancePass:
         program = self._variants.program(
             SPECTRAL=plan.spectral,
             FALLBACK=fallback,
-            AVERAGE=job.averaging,
+            AVERAGE=job.averaging and not job.has_surfaces,
+            SURFACES=job.has_surfaces,
+            SEEN_MAP=seen_map,
             EMISSION=job.emits and not plan.ordered,
             ORDERED=plan.ordered,
             ACCUMULATED=accumulated,

@@ -1,0 +1,22 @@
+// Vertices of a body's border: as in body.vert, with what its surface needs.
+
+#include <Body>
+
+in vec3 offset;
+in vec3 corner_normal;  // smooth
+in vec2 uv;
+
+out float axial;
+out vec3 world_normal;
+out vec3 from_eye;  // world axes
+out vec2 surface_uv;
+
+invariant gl_Position;
+
+void main() {
+    gl_Position = clip_from_offset * vec4(offset, 1.0);
+    axial = dot(axis.xyz, offset) + axis.w;
+    world_normal = mat3(world_from_normal) * corner_normal;
+    from_eye = (eye_from_offset * vec4(offset, 1.0)).xyz;
+    surface_uv = uv;
+}

@@ -1,0 +1,68 @@
+// What boundaries between media do with light. Pure: needs only <constants> and the library. Directions are unit vectors
+// of travel; a normal looks to the side that the light comes from; ior is that of the other side relative to this one.
+// Each function is the float32 twin of the same name in translucent/interface.py, where the sources are cited: Snell;
+// Stokes 1862; Walter et al. 2007; Heitz 2014; Wyman 2005; KHR_materials_dispersion. fresnel_dielectric is in optics.glsl.
+
+#include <constants>
+#include "lib/optics.glsl"
+
+vec3 reflected_direction(vec3 direction, vec3 normal) {
+    return direction - 2.0 * dot(direction, normal) * normal;
+}
+
+// Zero under total internal reflection.
+vec3 refracted_direction(vec3 direction, vec3 normal, float ior) {
+    float cos_incident = -dot(direction, normal);
+    float ior_squared_minus_1 = (ior - 1.0) * (ior + 1.0);
+    float k = ior_squared_minus_1 + cos_incident * cos_incident;
+    if (ior_squared_minus_1 == 0.0) { return direction; }
+    if (k <= 0.0) { return vec3(0.0); }
+    // cos - sqrt(k), multiplied out, so that nothing cancels where ior is near 1.
+    return (direction - ior_squared_minus_1 / (cos_incident + sqrt(k)) * normal) / ior;
+}
+
+// Indices for red, green and blue; dispersion is 20 / Abbe number. None is below 1.
+vec3 channel_iors(float ior, float dispersion) {
+    float half_spread = 0.025 * (ior - 1.0) * dispersion;
+    return vec3(max(ior - half_spread, 1.0), ior, ior + half_spread);
+}
+
+// Density of microfacet normals in 1/sr, alpha = roughness^2 > 0. 1 - cos^2 as a product, so that a smooth surface keeps
+// its digits.
+float ggx_distribution(float cos_half, float alpha) {
+    float base = (1.0 - cos_half) * (1.0 + cos_half) + alpha * alpha * cos_half * cos_half;
+    return alpha / base * (alpha / base) / PI;
+}
+
+// Masking and shadowing, height-correlated, divided by 4 cos_light cos_view.
+float ggx_visibility(float cos_light, float cos_view, float alpha) {
+    float slope = alpha * alpha;
+    float light = cos_view * sqrt(cos_light * cos_light + slope * (1.0 - cos_light) * (1.0 + cos_light));
+    float view = cos_light * sqrt(cos_view * cos_view + slope * (1.0 - cos_view) * (1.0 + cos_view));
+    return light + view > 0.0 ? 0.5 / (light + view) : 0.0;
+}
+
+// Thin wall of two parallel boundaries, all reflections between them added up; optical_depth is that of one passage.
+vec3 slab_transmittance(float reflectance, vec3 optical_depth) {
+    vec3 passage = transmittance(optical_depth);
+    if (reflectance >= 1.0) { return vec3(0.0); }
+    // 1 - r a as (1 - r) + r (1 - a), so that nothing cancels near grazing.
+    vec3 kept = (1.0 - reflectance) + reflectance * opacity(optical_depth);
+    return (1.0 - reflectance) / kept * ((1.0 - reflectance) / (1.0 + reflectance * passage)) * passage;
+}
+
+vec3 slab_reflectance(float reflectance, vec3 optical_depth) {
+    return reflectance * (1.0 + transmittance(optical_depth) * slab_transmittance(reflectance, optical_depth));
+}
+
+// Angle of refraction divided by the angle of incidence; 1 / ior at normal incidence.
+float refraction_angle_ratio(float cos_incident, float ior) {
+    float sine = sqrt(max((1.0 - cos_incident) * (1.0 + cos_incident), 0.0));
+    if (sine == 0.0) { return 1.0 / ior; }
+    return atan(min(sine / ior, 1.0), refracted_cosine(cos_incident, ior)) / atan(sine, cos_incident);
+}
+
+// Path inside a body along the refracted ray, guessed from the path straight on and the path against the normal.
+float wyman_distance(float cos_incident, float ior, float view_distance, float normal_distance) {
+    return mix(normal_distance, view_distance, refraction_angle_ratio(cos_incident, ior));
+}

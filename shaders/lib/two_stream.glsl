@@ -1,0 +1,49 @@
+// Light that a layer scatters any number of times, as one diffuse stream forwards and one backwards. Pure. Depths are
+// without unit: coefficients K and S in 1/m times the thickness of the layer. Each function is the float32 twin of the
+// same name in translucent/two_stream.py, where the sources are cited: Schuster 1905; Kubelka & Munk 1931; Gate 1974.
+
+#include <constants>
+#include "lib/optics.glsl"
+
+// K in 1/m: diffuse light travels twice as far as the layer is thick.
+vec3 two_stream_absorption(vec3 absorption) {
+    return 2.0 * absorption;
+}
+
+// S in 1/m.
+vec3 two_stream_scattering(vec3 scattering, float anisotropy) {
+    return 0.75 * (1.0 - anisotropy) * scattering;
+}
+
+// gamma d = sqrt(K (K + 2 S)) d; as two roots, so that no product overflows.
+vec3 two_stream_depth(vec3 absorption_depth, vec3 scattering_depth) {
+    return sqrt(absorption_depth) * sqrt(absorption_depth + 2.0 * scattering_depth);
+}
+
+// What both shares have below: ((K + S) sinh(gamma d) / gamma + cosh(gamma d)) exp(-gamma d), without overflow.
+vec3 two_stream_denominator(vec3 absorption_depth, vec3 scattering_depth) {
+    vec3 both_ways = 2.0 * two_stream_depth(absorption_depth, scattering_depth);
+    return (absorption_depth + scattering_depth) * mean_transmittance(both_ways) + 0.5 * (1.0 + transmittance(both_ways));
+}
+
+vec3 two_stream_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
+    vec3 both_ways = 2.0 * two_stream_depth(absorption_depth, scattering_depth);
+    return scattering_depth * mean_transmittance(both_ways) / two_stream_denominator(absorption_depth, scattering_depth);
+}
+
+vec3 two_stream_transmittance(vec3 absorption_depth, vec3 scattering_depth) {
+    vec3 depth = two_stream_depth(absorption_depth, scattering_depth);
+    return transmittance(depth) / two_stream_denominator(absorption_depth, scattering_depth);
+}
+
+// Without the light that turned around once: S / (2 (K + S)) (1 - exp(-2 (K + S) d)).
+vec3 multiple_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
+    vec3 once = scattering_depth * mean_transmittance(2.0 * (absorption_depth + scattering_depth));
+    return max(two_stream_reflectance(absorption_depth, scattering_depth) - once, vec3(0.0));
+}
+
+// Without the light that never turned around: exp(-(K + S) d).
+vec3 multiple_transmittance(vec3 absorption_depth, vec3 scattering_depth) {
+    vec3 never = transmittance(absorption_depth + scattering_depth);
+    return max(two_stream_transmittance(absorption_depth, scattering_depth) - never, vec3(0.0));
+}

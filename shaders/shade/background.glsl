@@ -1,0 +1,36 @@
+// What is behind the media: opaque surfaces, or the environment. Needs <constants>, <View> and <Environment>.
+
+#include "lib/environment.glsl"
+
+#if OPAQUE
+uniform sampler2D opaque_place;
+uniform sampler2D opaque_radiance;
+#endif
+#if SEEN_MAP
+uniform sampler2D seen_map;
+#endif
+
+// The environment as it is seen. at: place in the picture, right and down, in its heights; ray: unit vector.
+vec3 seen_environment(vec2 at, vec3 ray) {
+#if SEEN_MAP
+    return seen_scale * textureLod(seen_map, equirectangular_uv(ray, seen_turn), 0.0).rgb;
+#else
+    float share = 0.0;
+    if (seen_kind == ENVIRONMENT_GRADIENT) {
+        share = gradient_share(ray);
+    } else if (seen_kind == ENVIRONMENT_CHECKERBOARD) {
+        share = checkerboard_share(at, seen_tiles);
+    }
+    return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
+#endif
+}
+
+// What a straight ray meets.
+vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
+#if OPAQUE
+    if (texelFetch(opaque_place, texel, 0).r < NOTHING) {
+        return texelFetch(opaque_radiance, texel, 0).rgb;
+    }
+#endif
+    return seen_environment(pixel / frame_size.y, normalize(ray));
+}

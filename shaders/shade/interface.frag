@@ -1,0 +1,65 @@
+// The border of a body where a ray first enters it, or first leaves one: its normal, place and material.
+// BACK: where it leaves; BEYOND: farther than what has been entered, or else ahead of the eye; EXITS: where the intervals
+// say that it leaves all bodies.
+
+#include <constants>
+#include <View>
+#include <Body>
+#include "lib/ray.glsl"
+#include "shade/surface_textures.glsl"
+
+#if OPAQUE
+uniform sampler2D opaque_place;
+#endif
+#if BEYOND
+uniform sampler2D entered;
+#endif
+#if EXITS
+uniform sampler2D ordered_layers;  // alpha: place where the ray first leaves all bodies
+#endif
+uniform vec4 surface_color;  // w: transmission
+uniform float surface_roughness;
+
+in float axial;
+in vec3 world_normal;
+in vec3 from_eye;
+in vec2 surface_uv;
+
+layout(location = 0) out vec4 out_normal;  // unit; w: place
+layout(location = 1) out vec4 out_surface;  // object, roughness, transmission
+#if !BACK
+layout(location = 2) out vec4 out_color;
+#endif
+
+void main() {
+    // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
+    vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
+    float roughness = surface_roughness * texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, surface_uv)).g;
+    float transmission = surface_color.w * texture(transmission_texture, picture_place(TRANSMISSION_TEXTURE, surface_uv)).r;
+#if !BACK
+    vec3 tint = surface_color.rgb * texture(color_texture, picture_place(COLOR_TEXTURE, surface_uv)).rgb;
+#endif
+    if (axial < axial_start) { discard; }  // behind an orthographic picture
+    float place = axial * place_scale + place_start;
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+#if OPAQUE
+    if (place > texelFetch(opaque_place, texel, 0).r) { discard; }
+#endif
+#if EXITS
+    if (place < texelFetch(ordered_layers, texel, 0).a - TOUCHING) { discard; }
+#elif BEYOND
+    if (place < texelFetch(entered, texel, 0).w) { discard; }
+#endif
+    gl_FragDepth = clamp(place, 0.0, 1.0);
+    vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
+    vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
+    // Interpolated normals may look away from the eye where the faces do not: then the border is seen edge-on.
+    normal = (gl_FrontFacing ? normal : -normal);
+    float facing = dot(normal, ray);
+    normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
+    out_normal = vec4(normal, place);
+    out_surface = vec4(float(object), clamp(roughness, 0.0, 1.0), transmission, 1.0);
+#if !BACK
+    out_color = vec4(tint, 1.0);
+#endif
+}

@@ -1,0 +1,69 @@
+// What an opaque object with a surface sends to the eye: a metal, or a coat over paint, or between the two (glTF 2.0,
+// Appendix B), lit by the environment (split sum, Karis 2013) and by lights that nothing shadows. Energy that a rough
+// surface loses between its microfacets is given back by a factor (Turquin 2019). Needs <constants> and <Lights>.
+
+#include "lib/interface.glsl"
+#include "shade/environment_light.glsl"
+#include "shade/surface_textures.glsl"
+
+uniform sampler2D reflectance_table;  // scale and bias of the reflectance at normal incidence
+uniform vec4 opaque_finish;           // metallic, roughness, ior, alpha below which there is a hole
+uniform vec4 opaque_passed;           // share of light on the paint that passes to the other side; w: seen from both
+uniform vec3 opaque_emissive;
+
+struct OpaqueFinish {
+    vec3 base;          // albedo of paint, and reflectance of metal
+    float metallic;
+    float roughness;
+    vec3 emitted;
+    vec3 normal;        // unit, towards the side that the mesh calls outside
+    bool is_hole;
+};
+
+// Of a fragment; takes derivatives.
+OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 place, vec2 uv) {
+    vec4 painted = texture(color_texture, picture_place(COLOR_TEXTURE, uv));
+    vec4 rough = texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, uv));
+    vec3 emitted = opaque_emissive * texture(emissive_texture, picture_place(EMISSIVE_TEXTURE, uv)).rgb;
+    return OpaqueFinish(base * painted.rgb, opaque_finish.x * rough.b, clamp(opaque_finish.y * rough.g, 0.0, 1.0), emitted,
+                        mapped_normal(normal, place, uv), painted.a < opaque_finish.w);
+}
+
+// ray: unit, from the eye; normal: to the eye's side; place: from the eye.
+vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) {
+    float ior = opaque_finish.z;
+    float coat = (ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0));
+    vec3 facing = mix(vec3(coat), finish.base, finish.metallic);
+    // Nothing but a border without a step in ior reflects less than 2 % face-on: then it fades at grazing angles, too.
+    vec3 grazing = min(50.0 * facing, vec3(1.0));
+    float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
+    vec2 table = textureLod(reflectance_table, (vec2(cos_view, finish.roughness) * 63.0 + 0.5) / 64.0, 0.0).rg;
+    vec3 regained = 1.0 + facing * (1.0 / max(table.x + table.y, 1e-3) - 1.0);
+    vec3 mirrored = (facing * table.x + grazing * table.y) * regained;
+    float entered = (1.0 - finish.metallic) * (1.0 - max(max(mirrored.r, mirrored.g), mirrored.b));
+    float passed = max(max(opaque_passed.r, opaque_passed.g), opaque_passed.b);
+    vec3 paint = finish.base * (1.0 - passed);
+
+    vec3 sum = mirrored * environment_light(reflected_direction(ray, normal), finish.roughness)
+        + entered * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI;
+    float alpha = max(finish.roughness * finish.roughness, SMALLEST_HIGHLIGHT);
+    for (int light = 0; light < light_count; ++light) {
+        vec4 at = light_place[light];
+        vec3 way = at.xyz - at.w * place;
+        float distance_m = max(length(way), 1e-18);
+        vec3 towards = way / distance_m;
+        vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;
+        float cos_light = dot(normal, towards);
+        if (cos_light <= 0.0) {
+            sum -= entered * opaque_passed.rgb / PI * cos_light * irradiance;
+            continue;
+        }
+        vec3 half_way = normalize(towards - ray);
+        float away = pow(1.0 - clamp(dot(half_way, towards), 0.0, 1.0), 5.0);
+        vec3 fresnel = facing + (grazing - facing) * away;
+        vec3 glint = fresnel * regained * ggx_distribution(min(dot(half_way, normal), 1.0), alpha)
+            * ggx_visibility(cos_light, cos_view, alpha);
+        sum += (glint + entered * paint / PI) * cos_light * irradiance;
+    }
+    return sum + finish.emitted;
+}

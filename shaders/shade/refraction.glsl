@@ -1,0 +1,132 @@
+// Light along rays that bend at the border of a body: through its first interval, and out into what is behind.
+// Positions count from the center of the media, so that float32 resolves them. Needs <View>, <Surfaces> and background.glsl.
+// After Wyman 2005, "An approximate image-space approach for interactive refraction", whose guess of the path's length a
+// search along the bent ray replaces.
+
+uniform sampler2D entered;      // border towards the eye: normal, place
+uniform sampler2D left;         // first border away from it beyond
+
+const int EXIT_STEPS = 16;
+const int EXIT_HALVINGS = 6;
+const int OPAQUE_STEPS = 16;
+
+// Point at a place on the ray through a pixel.
+vec3 point_at(vec2 pixel, float place) {
+    vec2 ndc = 2.0 * pixel / frame_size.xy - 1.0;
+    float ahead = surface_ahead.x + place * surface_ahead.y;
+    float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
+    return ahead * ray_forward.xyz + spread * (ndc.x * surface_right.xyz - ndc.y * surface_up.xyz) - surface_off_axis.xyz;
+}
+
+// Where a point is in the picture: pixels right and down from the top left corner, and place. Behind the eye: no place.
+vec3 seen_at(vec3 point) {
+    float ahead = dot(point, ray_forward.xyz);
+    float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
+    vec3 aside = point + surface_off_axis.xyz;
+    vec2 ndc = vec2(dot(aside, surface_right.xyz) / dot(surface_right.xyz, surface_right.xyz),
+                    -dot(aside, surface_up.xyz) / dot(surface_up.xyz, surface_up.xyz)) / spread;
+    return spread > 0.0 ? vec3(0.5 * (ndc + 1.0) * frame_size.xy, (ahead - surface_ahead.x) / surface_ahead.y)
+                        : vec3(-1.0, -1.0, -NOTHING);
+}
+
+ivec2 texel_of(vec2 pixel) {
+    return ivec2(floor(pixel.x - frame_size.z), floor(pixel.y - frame_size.w));
+}
+
+bool in_picture(vec2 pixel) {
+    return all(greaterThanEqual(pixel, vec2(0.0))) && all(lessThan(pixel, frame_size.xy));
+}
+
+// Texel of textures that are stored with row 0 at the bottom.
+ivec2 stored(ivec2 texel) {
+    return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
+}
+
+bool is_inside(vec3 point) {
+    vec3 seen = seen_at(point);
+    if (!in_picture(seen.xy)) { return false; }
+    ivec2 texel = stored(texel_of(seen.xy));
+    float first = texelFetch(entered, texel, 0).w;
+    float last = texelFetch(left, texel, 0).w;
+    return last < NOTHING && seen.z <= last && (first > last || seen.z >= first);
+}
+
+struct Exit {
+    float path;   // metres inside
+    vec3 normal;  // unit, to the side that the light comes from
+};
+
+// Where a ray inside the body leaves it: the first of equal steps outside, halved down, then where the ray meets the
+// plane of the border seen there.
+Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal) {
+    float inside = 0.0;
+    float outside = longest;
+    for (int i = 1; i <= EXIT_STEPS; ++i) {
+        float path = longest * float(i) / float(EXIT_STEPS);
+        if (!is_inside(origin + path * direction)) {
+            outside = path;
+            break;
+        }
+        inside = path;
+    }
+    float margin = outside - inside;
+    for (int i = 0; i < EXIT_HALVINGS; ++i) {
+        float middle = 0.5 * (inside + outside);
+        if (is_inside(origin + middle * direction)) { inside = middle; } else { outside = middle; }
+    }
+    vec3 seen = seen_at(origin + inside * direction);
+    ivec2 texel = texel_of(seen.xy);
+    vec4 border = texelFetch(left, stored(texel), 0);
+    Exit result = Exit(0.5 * (inside + outside), fallback_normal);
+    if (!in_picture(seen.xy) || border.w >= NOTHING) { return result; }
+    result.normal = dot(border.xyz, direction) > 0.0 ? -border.xyz : border.xyz;
+    vec3 on_border = point_at(vec2(texel) + 0.5 + frame_size.zw, border.w);
+    float path = dot(on_border - origin, border.xyz) / min(dot(direction, result.normal), -1e-3)
+        * sign(dot(border.xyz, result.normal));
+    if (abs(path - inside) < margin && path > 0.0) { result.path = path; }
+    return result;
+}
+
+// The squares of a checkerboard, averaged over a box of this width in squares.
+float blurred_checkerboard_share(vec2 at, float tiles, float width) {
+    vec2 cell = at * tiles;
+    vec2 to_edge = 0.5 - abs(fract(cell) - 0.5);
+    vec2 side = 1.0 - 2.0 * mod(floor(cell), 2.0);
+    vec2 wave = side * clamp(2.0 * to_edge / max(width, 1e-6), 0.0, 1.0) * clamp(2.0 - width, 0.0, 1.0);
+    return 0.5 - 0.5 * wave.x * wave.y;
+}
+
+// The environment along a ray that has left a body. A checkerboard stands behind the bodies as a wall across the view.
+vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
+#if SEEN_LIGHTS
+    return environment_light(direction, roughness);
+#else
+    if (seen_kind != ENVIRONMENT_CHECKERBOARD) { return seen_environment(vec2(0.0), direction); }
+    float towards = dot(direction, ray_forward.xyz);
+    if (towards < 1e-2) { return seen_scale * mix(seen_first.rgb, seen_second.rgb, 0.5); }
+    float path = max(surface_ahead.w - dot(point, ray_forward.xyz), 0.0) / towards;
+    vec3 wall = seen_at(point + path * direction);
+    float heights = roughness * roughness * path / (length(surface_up.xyz) * (surface_right.w == 1.0 ? surface_ahead.w + surface_ahead.z : 1.0));
+    float share = blurred_checkerboard_share(wall.xy / frame_size.y, seen_tiles, heights * seen_tiles);
+    return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
+#endif
+}
+
+// What a ray that has left a body meets: opaque surfaces as far as the picture shows them, else the environment.
+vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
+#if OPAQUE
+    float before = 0.0;
+    for (int i = 1; i <= OPAQUE_STEPS; ++i) {
+        float share = float(i) / float(OPAQUE_STEPS);
+        float path = surface_reach * share * share;
+        vec3 seen = seen_at(point + path * direction);
+        if (!in_picture(seen.xy)) { break; }
+        float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
+        if (place < NOTHING && seen.z >= place && (seen.z - place) * surface_ahead.y <= 2.0 * (path - before)) {
+            return texelFetch(opaque_radiance, stored(texel_of(seen.xy)), 0).rgb;
+        }
+        before = path;
+    }
+#endif
+    return environment_beyond(point, direction, roughness);
+}

@@ -1,0 +1,41 @@
+// Textures of a surface, over the texture coordinates of its mesh. Derivatives are taken: ask before any discard.
+
+uniform sampler2D color_texture;
+uniform sampler2D roughness_texture;
+uniform sampler2D transmission_texture;
+uniform sampler2D normal_texture;
+uniform sampler2D emissive_texture;
+uniform vec3 texture_rows[10];  // two for each, in this order: coordinates in the picture, v upwards, from (u, v, 1)
+
+const int COLOR_TEXTURE = 0;
+const int ROUGHNESS_TEXTURE = 1;
+const int TRANSMISSION_TEXTURE = 2;
+const int NORMAL_TEXTURE = 3;
+const int EMISSIVE_TEXTURE = 4;
+
+vec2 turned_uv(int number, vec2 uv) {
+    return vec2(dot(texture_rows[2 * number], vec3(uv, 1.0)), dot(texture_rows[2 * number + 1], vec3(uv, 1.0)));
+}
+
+// Image row 0 is the top, where v = 1.
+vec2 picture_place(int number, vec2 uv) {
+    vec2 turned = turned_uv(number, uv);
+    return vec2(turned.x, 1.0 - turned.y);
+}
+
+// A normal map's normal, by the directions in which the picture's coordinates grow on the surface (Schueler 2013).
+// normal: unit, to either side; place: of the point, from the eye.
+vec3 mapped_normal(vec3 normal, vec3 place, vec2 uv) {
+    vec3 mapped = texture(normal_texture, picture_place(NORMAL_TEXTURE, uv)).rgb * 2.0 - 1.0;
+    vec2 turned = turned_uv(NORMAL_TEXTURE, uv);
+    vec3 along_x = dFdx(place), along_y = dFdy(place);
+    vec2 uv_x = dFdx(turned), uv_y = dFdy(turned);
+    vec3 across_x = cross(normal, along_x), across_y = cross(along_y, normal);
+    vec3 tangent = across_y * uv_x.x + across_x * uv_y.x;
+    vec3 bitangent = across_y * uv_x.y + across_x * uv_y.y;
+    float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
+    if (!(longest > 0.0)) { return normal; }  // no texture coordinates to speak of
+    // Where the normal looks away from the eye, the two directions on the picture turn around it the other way.
+    float scale = inversesqrt(longest) * (dot(cross(along_x, along_y), normal) < 0.0 ? -1.0 : 1.0);
+    return normalize(tangent * scale * mapped.x + bitangent * scale * mapped.y + normal * max(mapped.z, 1e-3));
+}

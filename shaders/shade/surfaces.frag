@@ -1,0 +1,230 @@
+// Light at the borders of bodies: what they reflect, what enters and bends, and what paint and many scattering events
+// give back. What the media absorb and emit on straight rays has been found; the first interval of a bent ray is as long
+// as it is bent. Row 0 of the output is the top row.
+
+#include <constants>
+#include <View>
+#include <Environment>
+#include <Lights>
+#include <Surfaces>
+#include "lib/interface.glsl"
+#include "lib/optics.glsl"
+#include "lib/ray.glsl"
+#include "lib/two_stream.glsl"
+#include "shade/background.glsl"
+#include "shade/environment_light.glsl"
+#include "shade/refraction.glsl"
+
+uniform sampler2D emitted_radiance_sum;
+uniform sampler2D straight_transmittance;
+uniform sampler2D straight_optical_depth;
+uniform sampler2D straight_thickness;
+uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission
+uniform sampler2D surface_color;
+uniform sampler2D left_finish;       // object of what is left
+uniform sampler2D surface_table;     // a row for each object
+uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
+
+layout(location = 0) out vec4 out_radiance;
+layout(location = 1) out vec4 out_transmittance;
+
+struct Finish {
+    float ior;
+    float dispersion;
+    bool is_sheet;
+    bool scatters_much;   // show what is scattered more than once
+    vec3 diffuse_transmission;
+    vec3 stream_absorption;
+    vec3 stream_scattering;
+    float longest;        // metres across the body
+    float roughness;
+    float transmission;
+    vec3 color;
+};
+
+Finish finish_of(int object) {
+    vec4 a = texelFetch(surface_table, ivec2(0, object), 0);
+    vec4 b = texelFetch(surface_table, ivec2(1, object), 0);
+    vec4 c = texelFetch(surface_table, ivec2(2, object), 0);
+    vec4 d = texelFetch(surface_table, ivec2(3, object), 0);
+    vec4 e = texelFetch(surface_table, ivec2(4, object), 0);
+    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, c.rgb, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
+}
+
+// Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
+float border_reflectance(float cosine, float ior, float roughness) {
+    float polished = fresnel_dielectric(cosine, ior);
+    if (roughness == 0.0 || polished >= 1.0) { return polished; }
+    float facing = fresnel_dielectric(1.0, ior);
+    vec2 rough = texture(reflectance_table, (vec2(cosine, roughness) * 63.0 + 0.5) / 64.0).rg;
+    vec2 smooth_one = texture(reflectance_table, (vec2(cosine, 0.0) * 63.0 + 0.5) / 64.0).rg;
+    return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
+}
+
+// A border that turns microfacets by small angles turns reflections by twice these, and refracted light by (ior - 1)
+// times them at each of two borders.
+float refraction_roughness(float roughness, float ior) {
+    return roughness * sqrt(min(abs(ior - 1.0) * 0.70710678, 1.0));
+}
+
+vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
+    vec4 place = light_place[light];
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    vec3 towards = place.xyz - place.w * from_eye;
+    float distance_m = max(length(towards), 1e-18);
+    irradiance = light_power[light].rgb / (place.w == 0.0 ? 1.0 : distance_m * distance_m);
+    return towards / distance_m;
+}
+
+// Microfacets that mirror the lights; nothing shadows them. A mirror shows a point of light as a small disc.
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float roughness) {
+    vec3 sum = vec3(0.0);
+    float alpha = max(roughness * roughness, SMALLEST_HIGHLIGHT);
+    float cos_view = max(-dot(normal, ray), 1e-3);
+    for (int light = 0; light < light_count; ++light) {
+        vec3 irradiance;
+        vec3 towards = towards_light(light, point, irradiance);
+        float cos_light = dot(normal, towards);
+        if (cos_light <= 0.0) { continue; }
+        vec3 half_way = normalize(towards - ray);
+        float mirrored = fresnel_dielectric(max(dot(half_way, towards), 0.0), ior)
+            * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
+        sum += mirrored * cos_light * irradiance;
+    }
+    return sum;
+}
+
+vec3 irradiance_on(vec3 point, vec3 normal) {
+    vec3 sum = environment_irradiance(normal);
+    for (int light = 0; light < light_count; ++light) {
+        vec3 irradiance;
+        vec3 towards = towards_light(light, point, irradiance);
+        sum += max(dot(normal, towards), 0.0) * irradiance;
+    }
+    return sum;
+}
+
+// Light of lights alone; irradiance_on has the environment's, too.
+vec3 lights_on(vec3 point, vec3 normal) {
+    return irradiance_on(point, normal) - environment_irradiance(normal);
+}
+
+// Diffuse light out of the body: as a layer gives it back, and lets it through from behind. What passes without an event
+// is seen as it is, and left out here.
+vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3 passed) {
+    vec3 absorbed = finish.stream_absorption * thickness;
+    vec3 turned = finish.stream_scattering * thickness;
+    vec3 through = max(two_stream_transmittance(absorbed, turned) - passed, vec3(0.0));
+    vec3 back = two_stream_reflectance(absorbed, turned);
+    vec3 sum = environment_irradiance(normal) * back + environment_irradiance(-normal) * through;
+#if SINGLE_SCATTERING
+    // Light of lights that is scattered once is in the emitted radiance.
+    back = multiple_reflectance(absorbed, turned);
+#endif
+    sum += lights_on(point, normal) * back + lights_on(point, -normal) * through;
+    return sum / PI;
+}
+
+vec3 paint(Finish finish, vec3 point, vec3 normal) {
+    vec3 passed = finish.diffuse_transmission;
+    float share = max(max(passed.r, passed.g), passed.b);
+    return (finish.color * (1.0 - share) * irradiance_on(point, normal) + passed * irradiance_on(point, -normal)) / PI;
+}
+
+struct Crossing {
+    vec3 light;
+    vec3 passed;      // transmittance along the bent ray
+    float thickness;  // metres inside media along it
+};
+
+// The straight ray's path and optical depth.
+struct Straight {
+    float thickness;
+    vec3 optical_depth;
+    float first_interval;
+};
+
+// Light that crosses the first interval along a bent ray; the media there are taken to be mixed as along the straight one.
+Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
+    vec3 inside = enters ? refracted_direction(ray, normal, ior) : ray;
+    Exit leaving = find_exit(point, inside, finish.longest, -inside);
+    vec3 beyond = point + leaving.path * inside;
+    Crossing result;
+    result.thickness = max(straight.thickness + leaving.path - straight.first_interval, 0.0);
+    result.passed = transmittance(straight.optical_depth * (result.thickness / max(straight.thickness, 1e-30)));
+    float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
+    float kept = border_reflectance(cosine, 1.0 / ior, 0.0);
+    float blur = refraction_roughness(finish.roughness, ior);
+    // What the far border keeps inside leaves after more crossings: seen where it is mirrored to.
+    result.light = kept * environment_light(reflected_direction(inside, leaving.normal), blur);
+    vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
+    if (kept < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
+    result.light *= result.passed;
+    return result;
+}
+
+Crossing crossed(Finish finish, vec3 point, vec3 normal, vec3 ray, bool enters, Straight straight) {
+    if (finish.is_sheet || straight.first_interval < 0.0) {
+        vec3 passed = transmittance(straight.optical_depth);
+        float blur = refraction_roughness(finish.roughness, finish.ior);
+        return Crossing(passed * radiance_beyond(point, ray, blur), passed, straight.thickness);
+    }
+    if (finish.dispersion == 0.0) { return refracted(finish, point, normal, ray, finish.ior, enters, straight); }
+    vec3 iors = channel_iors(finish.ior, finish.dispersion);
+    Crossing result = refracted(finish, point, normal, ray, iors.g, enters, straight);
+    result.light.r = refracted(finish, point, normal, ray, iors.r, enters, straight).light.r;
+    result.light.b = refracted(finish, point, normal, ray, iors.b, enters, straight).light.b;
+    return result;
+}
+
+void main() {
+    vec2 pixel = gl_FragCoord.xy + frame_size.zw;
+    ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
+    ivec2 here = ivec2(gl_FragCoord.xy);
+    vec3 forward_ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
+    float advance = length(forward_ray);
+    vec3 ray = forward_ray / advance;
+    vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
+    vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
+    vec3 depth = texelFetch(straight_optical_depth, here, 0).rgb;
+    float thickness = texelFetch(straight_thickness, here, 0).r;
+    vec4 front = texelFetch(entered, texel, 0);
+    vec4 back = texelFetch(left, texel, 0);
+    out_transmittance = vec4(through, 1.0);
+
+    bool starts_inside = back.w < front.w;
+    if (front.w >= NOTHING && !starts_inside) {
+        out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
+        return;
+    }
+    vec4 surface = starts_inside ? texelFetch(left_finish, texel, 0) : texelFetch(surface_finish, texel, 0);
+    Finish finish = finish_of(int(surface.x + 0.5));
+    finish.roughness = surface.y;
+    finish.transmission = surface.z;
+    if (!starts_inside) { finish.color = texelFetch(surface_color, texel, 0).rgb; }
+
+    vec3 normal = front.xyz;
+    float place = starts_inside ? surface_eye_place : front.w;
+    vec3 point = point_at(pixel, place);
+    float cosine = clamp(-dot(normal, ray), 0.0, 1.0);
+    float reflectance = starts_inside ? 0.0 : border_reflectance(cosine, finish.ior, finish.roughness);
+    if (finish.is_sheet) { reflectance = 2.0 * reflectance / (1.0 + reflectance); }
+    vec3 mirrored = vec3(0.0);
+    if (reflectance > 0.0) {
+        mirrored = reflectance * environment_light(reflected_direction(ray, normal), finish.roughness)
+            + highlights(point, normal, ray, finish.ior, finish.roughness) * (finish.is_sheet ? 2.0 : 1.0);
+    }
+
+    vec3 light = vec3(0.0);
+    if (finish.transmission > 0.0) {
+        float first_interval = back.w < NOTHING ? (back.w - place) * surface_ahead.y * advance : -1.0;
+        Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
+        light = crossing.light;
+        if (finish.scatters_much) { light += scattered_out(finish, point, normal, crossing.thickness, crossing.passed); }
+        light *= finish.transmission * finish.color;
+    }
+    if (finish.transmission < 1.0 && !starts_inside) {
+        light += (1.0 - finish.transmission) * paint(finish, point, normal);
+    }
+    out_radiance = vec4(min(mirrored + (1.0 - reflectance) * (light + emitted), vec3(NOTHING)), 1.0);
+}

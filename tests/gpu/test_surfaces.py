@@ -1,0 +1,167 @@
+"""Borders of bodies on the GPU: energy, closed forms, and that they cost nothing where nothing happens at them."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import translucent as tl
+from translucent import interface, optics
+from translucent.assets import mesh_path
+from translucent.solids import Box, Sphere
+
+Array = npt.NDArray[np.float64]
+
+SIZE = (160, 120)
+WHITE = tl.Environment.constant((1.0, 1.0, 1.0))
+SKY = tl.Environment.gradient((0.2, 0.3, 0.4), (1.4, 1.2, 1.0))
+BALL = Sphere().tessellate(300)
+
+
+def shown(mesh: tl.Mesh, medium: tl.Medium, environment: tl.Environment, **options: Any) -> tl.Scene:
+    scene = tl.showcase(mesh, medium, SIZE, environment=environment)
+    return dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], **options)])
+
+
+# Energy: a body that takes nothing looks like nothing where all is equally bright
+
+
+LOSSLESS = {
+    "glass": (tl.Medium(ior=1.5), tl.Surface()),
+    "diamond": (tl.Medium(ior=2.4), tl.Surface(dispersion=1.0)),
+    "frosted": (tl.Medium(ior=1.5), tl.Surface(roughness=0.5)),
+    "matt": (tl.Medium(ior=1.5), tl.Surface(roughness=1.0)),
+    "painted": (tl.Medium(ior=1.5), tl.Surface(transmission=0.4, diffuse_transmission=0.3)),
+    "milk": (tl.Medium(scattering=40.0, ior=1.33), tl.Surface(multiple_scattering=True)),
+    "fog": (tl.Medium(scattering=3.0), tl.Surface(multiple_scattering=True)),
+}
+
+
+@pytest.mark.parametrize("mesh", ["sphere", "knot", "bear"])
+@pytest.mark.parametrize("kind", LOSSLESS)
+def test_white_furnace(renderer: tl.Renderer, kind: str, mesh: str) -> None:
+    medium, surface = LOSSLESS[kind]
+    frame = renderer.render(shown(tl.load_mesh(mesh_path(mesh)), medium, WHITE, surface=surface), SIZE)
+    assert frame.coverage.sum() > 1000
+    np.testing.assert_allclose(frame.radiance, 1.0, atol=1e-5)
+
+
+def test_white_furnace_of_a_sheet_and_from_inside(renderer: tl.Renderer) -> None:
+    sheet = shown(BALL, tl.Medium(ior=1.5), WHITE, sheet_thickness=1e-3)
+    np.testing.assert_allclose(renderer.render(sheet, SIZE).radiance, 1.0, atol=1e-5)
+    inside = tl.Scene(
+        [tl.Object(BALL, tl.Medium(ior=1.5))], tl.Camera.look_at((0, 0, 0.3), (0, 0, -1)), environment=WHITE
+    )
+    np.testing.assert_allclose(renderer.render(inside, SIZE).radiance, 1.0, atol=1e-5)
+
+
+# Closed forms
+
+
+def rays(camera: tl.Camera) -> Array:
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
+    half_width, half_height = camera.half_extent(SIZE)
+    ndc = 2 * x / SIZE[0] - 1, 1 - 2 * y / SIZE[1]
+    ray = camera.forward + ndc[0][..., None] * camera.right * half_width + ndc[1][..., None] * camera.up * half_height
+    return np.asarray(ray / np.linalg.norm(ray, axis=-1, keepdims=True))
+
+
+def ball_radiance(scene: tl.Scene, sigma: Array, ior: float) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """What a ball of radius 1 shows: both borders, and what the far one keeps seen where it is mirrored to."""
+    eye, ray = scene.camera.eye, rays(scene.camera)
+    along = -ray @ eye
+    closest = eye + along[..., None] * ray
+    gap = np.linalg.norm(closest, axis=-1)
+    hit = gap < 0.97
+    point = closest - np.sqrt(np.where(hit, 1 - gap**2, 1.0))[..., None] * ray
+    normal = point / np.linalg.norm(point, axis=-1, keepdims=True)
+    cosine = -np.sum(ray * normal, axis=-1)
+    share = optics.fresnel_dielectric(cosine, ior)[..., None]
+    into = interface.refracted_direction(ray, normal, ior)
+    path = -2 * np.sum(into * normal, axis=-1, keepdims=True)
+    far = point + path * into
+    out = interface.refracted_direction(into, -far, 1 / ior)
+    kept = interface.reflected_direction(into, -far)
+
+    def light(direction: Array) -> Array:
+        return scene.environment.radiance(direction, np.zeros((*direction.shape[:-1], 2)))
+
+    through = np.exp(-sigma * path) * ((1 - share) * light(out) + share * light(kept))
+    return share * light(interface.reflected_direction(ray, normal)) + (1 - share) * through, hit
+
+
+@pytest.mark.parametrize("ior", [1.01, 1.33, 1.5, 2.4])
+@pytest.mark.parametrize("far", [1.0, 1e3])
+def test_a_ball_bends_light_as_its_closed_form(renderer: tl.Renderer, ior: float, far: float) -> None:
+    """The tessellated ball's normals are off by some 1e-4, and normals are looked up at whole pixels at the exit."""
+    sigma = np.array((0.5, 0.1, 0.9))
+    camera = tl.Camera.look_at(np.array((2.0, 1.5, 4.0)) * far, (0, 0, 0), fov_y=30.0 if far == 1 else 30 / far)
+    scene = tl.Scene([tl.Object(BALL, tl.Medium(absorption=sigma, ior=ior))], camera, environment=SKY)
+    frame = renderer.render(scene, SIZE)
+    expected, hit = ball_radiance(scene, sigma, ior)
+    error = np.abs(frame.radiance - expected)[hit]
+    print(f"ior {ior}, {far:g}: median {np.median(error):.1e}, p99 {np.quantile(error, 0.99):.1e}")
+    assert hit.sum() > 3000
+    assert np.median(error) < 2e-3
+    assert np.quantile(error, 0.99) < 2e-2
+
+
+def test_a_pane_shifts_light_and_does_not_turn_it(renderer: tl.Renderer) -> None:
+    """Through parallel faces a ray leaves as it came; its path inside is d / cos of the refracted angle."""
+    sigma, ior = 2.0, 1.5
+    pane = tl.Object(Box((-4.0, -4.0, -0.2), (4.0, 4.0, 0.2)).tessellate(), tl.Medium(absorption=sigma, ior=ior))
+    camera = tl.Camera.look_at((2.0, 0.0, 3.0), (0, 0, 0), fov_y=10)
+    scene = tl.Scene([pane], camera, environment=SKY)
+    frame = renderer.render(scene, SIZE)
+    ray = rays(camera)
+    cosine = -ray[..., 2]
+    share = optics.fresnel_dielectric(cosine, ior)[..., None]
+    path = 0.4 / optics.refracted_cosine(cosine, ior)[..., None]
+    mirrored = ray * (1, 1, -1)
+    sky, back = (SKY.radiance(direction, np.zeros((*ray.shape[:2], 2))) for direction in (ray, mirrored))
+    expected = share * back + (1 - share) * np.exp(-sigma * path) * ((1 - share) * sky + share * back)
+    np.testing.assert_allclose(frame.radiance, expected, rtol=1e-3)
+
+
+def test_straight_quantities_do_not_bend(renderer: tl.Renderer) -> None:
+    """Thickness, optical depth and transmittance stay those of the view ray."""
+    straight = renderer.render(shown(BALL, tl.Medium(absorption=1.0), SKY), SIZE)
+    bent = renderer.render(shown(BALL, tl.Medium(absorption=1.0, ior=1.5), SKY, surface=tl.Surface(0.3)), SIZE)
+    for name in ("thickness", "optical_depth", "transmittance", "coverage", "valid"):
+        np.testing.assert_array_equal(getattr(straight, name), getattr(bent, name))
+    assert np.abs(straight.radiance - bent.radiance).max() > 0.1
+
+
+# Where bodies touch
+
+
+def test_wine_in_a_glass_is_left_at_the_outside_of_the_glass(renderer: tl.Renderer) -> None:
+    """With the same index on both sides their common border is not there: a ball in a shell is one ball."""
+    outer, inner = Sphere(radius=1.0).tessellate(200), Sphere(radius=0.6).tessellate(200)
+    shell = tl.Mesh(
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
+    )
+    glass = tl.Medium(absorption=0.3, ior=1.5)
+    camera = tl.showcase(outer, glass, SIZE).camera
+    nested = tl.Scene([tl.Object(shell, glass), tl.Object(inner, glass)], camera, environment=SKY)
+    whole = tl.Scene([tl.Object(outer, glass)], camera, environment=SKY)
+    plan = renderer.plan(nested)
+    if not plan.ordered:
+        pytest.skip("needs ordered intervals")
+    error = np.abs(renderer.render(nested, SIZE).radiance - renderer.render(whole, SIZE).radiance)
+    assert np.quantile(error, 0.99) < 5e-3
+
+
+# Model only what a scene needs
+
+
+def test_matched_borders_add_no_pass() -> None:
+    scene = shown(BALL, tl.Medium(absorption=1.0), SKY, surface=tl.Surface(roughness=0.7))
+    assert tl.plan(scene).passes == tl.plan(shown(BALL, tl.Medium(absorption=1.0), SKY)).passes
+    assert "surfaces" not in {step.name for step in tl.plan(scene).passes}
+    assert "surfaces" in {step.name for step in tl.plan(shown(BALL, tl.Medium(ior=1.2), SKY)).passes}

@@ -1,0 +1,139 @@
+"""Frames one after the other: animated pictures, films, or numbered files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError, RenderError
+from translucent.frame import make_folder, write_atomically, write_png
+
+Pixels = npt.NDArray[np.uint8]
+
+#: Pictures per second unless told otherwise.
+DEFAULT_FPS = 24.0
+
+
+def check_animation(path: Path, fps: float) -> None:
+    """Raise before any work is done where an animation could not be written to `path`.
+
+    Raises
+    ------
+    InputError
+        If it has a suffix of no animation, there is no folder for it, or the rate is not in 1 to 100.
+    RenderError
+        If a film is asked for without the imageio-ffmpeg package.
+    """
+    if not 1.0 <= fps <= 100.0:
+        raise InputError(f"{fps} pictures per second", "not in 1 to 100", "give for example 24")
+    if path.is_dir() or not path.suffix:
+        return
+    if path.suffix.lower() not in WRITERS:
+        raise InputError(
+            f"animation {str(path)!r}",
+            f"suffix {path.suffix!r}",
+            f"use {', '.join(WRITERS)}, or a folder",
+        )
+    if not path.parent.is_dir():
+        raise InputError(f"animation {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
+    if path.suffix.lower() == ".mp4":
+        try:
+            import imageio_ffmpeg  # noqa: F401
+        except ImportError:
+            raise RenderError(
+                f"animation {str(path)!r}", "the imageio-ffmpeg package is not installed", "pip install imageio-ffmpeg"
+            ) from None
+
+
+def write_animation(path: str | Path, frames: Iterable[Pixels], fps: float = DEFAULT_FPS) -> None:
+    """Write frames as they come: an animated ``.webp`` or ``.gif`` that repeats, an ``.mp4``, or a folder of PNG files.
+
+    A file appears complete or not at all; in a folder each picture does, as 0000.png and so on.
+
+    Parameters
+    ----------
+    path : str or Path
+        Without a suffix, or of a folder that is there: a folder.
+    frames : iterable of (h, w, 3) uint8
+        At least one, sRGB-encoded, all of one size.
+    fps : float
+        Pictures per second, 1 to 100; a folder has none.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another, there is no frame, their sizes differ, or the rate is beyond these.
+    RenderError
+        If a file cannot be written, or ``.mp4`` is asked for without the imageio-ffmpeg package.
+    """
+    path = Path(path)
+    check_animation(path, fps)
+    pictures = _alike(frames)
+    if path.is_dir() or not path.suffix:
+        make_folder(path)
+        for i, picture in enumerate(pictures):
+            write_atomically(path / f"{i:04}.png", partial(write_png, pixels=picture))
+        return
+    write_atomically(path, partial(WRITERS[path.suffix.lower()], pictures=pictures, fps=fps))
+
+
+def _alike(frames: Iterable[Pixels]) -> Iterator[Pixels]:
+    pictures = iter(frames)
+    first = next(pictures, None)
+    if first is None:
+        raise InputError("animation", "it has no frames", "give at least one")
+
+    def checked() -> Iterator[Pixels]:
+        for i, picture in enumerate(chain([first], pictures)):
+            if picture.shape != first.shape or picture.dtype != np.uint8 or picture.shape[2:] != (3,):
+                found = f"shape {picture.shape} and type {picture.dtype}"
+                raise InputError(f"frame {i} of an animation", found, "give (h, w, 3) uint8, all of one size")
+            yield picture
+
+    return checked()
+
+
+def _write_gif(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
+    _write_with_pillow(path, pictures, fps, format="GIF")
+
+
+def _write_webp(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
+    _write_with_pillow(path, pictures, fps, format="WEBP", quality=90, method=4)
+
+
+def _write_with_pillow(path: Path, pictures: Iterator[Pixels], fps: float, **options: Any) -> None:
+    from PIL import Image
+
+    images = (Image.fromarray(picture) for picture in pictures)
+    first = next(images)
+    first.save(path, save_all=True, append_images=images, duration=round(1000.0 / fps), loop=0, **options)
+
+
+def _write_mp4(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
+    import imageio_ffmpeg
+
+    first = _even(next(pictures))
+    size = first.shape[1], first.shape[0]
+    writer = imageio_ffmpeg.write_frames(
+        str(path), size, fps=fps, codec="libx264", quality=8, macro_block_size=2, ffmpeg_log_level="error"
+    )
+    with closing(writer):
+        writer.send(None)  # starts it
+        for picture in chain([first], pictures):
+            writer.send(np.ascontiguousarray(_even(picture)))
+
+
+def _even(picture: Pixels) -> Pixels:
+    """The picture with its last row and column twice where their number is odd: color is stored for 2 by 2 pixels."""
+    height, width = picture.shape[:2]
+    return np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+
+
+WRITERS: dict[str, Callable[..., None]] = {".webp": _write_webp, ".gif": _write_gif, ".mp4": _write_mp4}

@@ -1,0 +1,86 @@
+"""Where the frames of ``translucent render`` go: one file, pictures of the quantities, or a turntable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from translucent.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from translucent.frame import Frame
+    from translucent.scene import Scene
+
+
+class Pictures(NamedTuple):
+    """The options that say what is written, as they were given."""
+
+    output: Path
+    exposure: float
+    tone: str
+    turntable: int | None
+    fps: float
+    aov: Path | None
+
+    def check(self) -> None:
+        """Raise before any work is done where they could not be written."""
+        from translucent.animation import check_animation
+        from translucent.frame import check_exposure, check_output
+
+        check_exposure(self.exposure)
+        if self.turntable is None:
+            check_output(self.output)
+            return
+        check_animation(self.output, self.fps)
+        if self.aov is not None:
+            raise InputError(f"--turntable {self.turntable}", "--aov is given, too", "render one picture for it")
+
+    def write(self, scene: Scene, draw: Callable[[Scene], Frame]) -> Frame:
+        """Draw and write all of them; the first frame."""
+        if self.turntable is not None:
+            return self._write_turntable(scene, draw, self.turntable)
+        frame = draw(scene)
+        frame.save(self.output, self.exposure, self.tone)
+        if self.aov is not None:
+            frame.save_aovs(self.aov)
+        return frame
+
+    def _write_turntable(self, scene: Scene, draw: Callable[[Scene], Frame], count: int) -> Frame:
+        from translucent.animation import write_animation
+        from translucent.turntable import turntable
+
+        views = turntable(scene, count)
+        first = draw(next(views))
+
+        def pictures() -> Iterator[npt.NDArray[np.uint8]]:
+            for frame in chain([first], map(draw, views)):
+                yield frame.to_srgb8(self.exposure, self.tone)
+
+        write_animation(self.output, pictures(), self.fps)
+        return first
+
+
+def picture_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options that choose what is written besides one picture."""
+    command = click.option(
+        "--aov",
+        type=click.Path(path_type=Path, file_okay=False),
+        metavar="DIR",
+        help="Also write pictures of thickness, transmittance and validity into this folder.",
+    )(command)
+    command = click.option(
+        "--fps", type=float, default=24.0, show_default=True, help="Pictures per second of a --turntable."
+    )(command)
+    return click.option(
+        "--turntable",
+        type=click.IntRange(2, 3600),
+        metavar="N",
+        help="N pictures from all around, into a .webp, .gif, .mp4, or a folder of numbered .png files.",
+    )(command)

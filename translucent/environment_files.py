@@ -1,0 +1,82 @@
+"""Environments from picture files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.color import srgb_to_linear
+from translucent.environment_map import EnvironmentMap
+from translucent.errors import InputError, RenderError
+from translucent.radiance_hdr import read_radiance
+
+Pixels = npt.NDArray[Any]
+
+
+def read_environment_map(path: str | Path) -> EnvironmentMap:
+    """The pixels of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.hdr`` or ``.pic`` (Radiance), ``.exr`` (linear Rec.709), or ``.png`` or ``.jpg`` (sRGB, in which no light is
+        brighter than white paper).
+
+    Raises
+    ------
+    InputError
+        If the file has another suffix, cannot be read, or holds no picture.
+    RenderError
+        If the OpenEXR package is needed and not installed.
+    """
+    path = Path(path)
+    read = READERS.get(path.suffix.lower())
+    if read is None:
+        raise InputError(f"environment {str(path)!r}", f"suffix {path.suffix!r}", f"use one of {', '.join(READERS)}")
+    if not path.is_file():
+        raise InputError(f"environment {str(path)!r}", "no such file", "check the path")
+    return EnvironmentMap(read(path))
+
+
+def _read_exr(path: Path) -> Pixels:
+    try:
+        import OpenEXR
+    except ImportError:
+        raise RenderError(
+            f"environment {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
+        ) from None
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(f"environment {str(path)!r}", f"not an OpenEXR file ({error})", "check the file") from None
+    for names in ("RGB", "YYY"):
+        if set(names) <= channels.keys():
+            return np.stack([channels[name] for name in names], axis=-1)
+    raise InputError(f"environment {str(path)!r}", f"channels {', '.join(channels)}", "give channels R, G and B")
+
+
+def _read_encoded(path: Path) -> Pixels:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            encoded = np.asarray(image.convert("RGB"))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        found = getattr(error, "strerror", None) or "not an image that can be read"
+        raise InputError(f"environment {str(path)!r}", found, "check the file") from None
+    return np.asarray(srgb_to_linear(np.arange(256) / 255.0)[encoded])
+
+
+READERS: dict[str, Callable[[Path], Pixels]] = {
+    ".hdr": read_radiance,
+    ".pic": read_radiance,
+    ".exr": _read_exr,
+    ".png": _read_encoded,
+    ".jpg": _read_encoded,
+    ".jpeg": _read_encoded,
+}

@@ -1,0 +1,61 @@
+"""Borders of bodies: where each ray first enters one, and first leaves one beyond."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.textures import texture_units
+from translucent.render_plan import PassSpec
+from translucent.scene import Object
+from translucent.surface import Surface
+
+_FIRST_TEXTURE = 3
+_UNITS = {"opaque_place": 0, "entered": 1, "ordered_layers": 2} | texture_units(_FIRST_TEXTURE)
+
+
+class InterfacesPass:
+    """Nearest border towards the eye, then the nearest away from it; see ``shaders/shade/interface.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._variants = Variants(gl, "geometry/border.vert", "shade/interface.frag", **_UNITS)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Draw the bodies twice, with the depth test on; sheets have one border, seen from either side."""
+        nothing = float(CONSTANTS["NOTHING"])
+        sheets = tuple(i for i in spec.objects if job.is_sheet(i))
+        solids = tuple(i for i in spec.objects if i not in sheets)
+        for back, framebuffer in ((False, job.targets.entered()), (True, job.targets.left())):
+            framebuffer.use()
+            framebuffer.clear(0.0, 0.0, 0.0, nothing, depth=1.0)
+            job.gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            job.gl.depth_func = "<="
+            job.gl.cull_face = "front" if back else "back"
+            job.bind_opaque(_UNITS["opaque_place"])
+            exits = back and job.finds_exits
+            beyond = back and not exits and not job.starts_inside
+            if beyond:
+                job.targets.entered().color_attachments[0].use(_UNITS["entered"])
+            if exits:
+                job.targets.ordered().color_attachments[2].use(_UNITS["ordered_layers"])
+            program = self._variants.program(BACK=back, BEYOND=beyond, EXITS=exits, OPAQUE=job.has_opaque)
+            self._draw(job, program, solids)
+            if not back:
+                job.gl.enable_only(moderngl.DEPTH_TEST)
+                self._draw(job, program, sheets)
+        job.gl.cull_face = "back"
+        job.gl.depth_func = "<"
+
+    def _draw(self, job: FrameJob, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+        for i in objects:
+            self._set_finish(job, program, job.scene.objects[i])
+            job.draw(program, (i,))
+
+    def _set_finish(self, job: FrameJob, program: moderngl.Program, body: Object) -> None:
+        surface = body.surface or Surface()
+        job.textures.bind(surface, program, _FIRST_TEXTURE)
+        set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
+        set_uniform(program, "surface_roughness", surface.roughness)

@@ -1,0 +1,70 @@
+"""Light at the borders of bodies, over the whole picture."""
+
+from __future__ import annotations
+
+import moderngl
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.variants import Variants
+from translucent.gpu.textures import reflectance_table
+from translucent.gpu.uniforms import surface_table
+from translucent.render_plan import PassSpec
+
+_SAMPLERS = (
+    "emitted_radiance_sum",
+    "straight_transmittance",
+    "straight_optical_depth",
+    "straight_thickness",
+    "entered",
+    "surface_finish",
+    "surface_color",
+    "left",
+    "left_finish",
+    "opaque_place",
+    "opaque_radiance",
+    "surface_table",
+    "reflectance_table",
+    "light_map",
+    "light_levels",
+    "light_irradiance",
+    "seen_map",
+)
+
+
+class SurfacesPass:
+    """Reflection, refraction, paint and diffuse light; see ``shaders/shade/surfaces.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        units = {name: unit for unit, name in enumerate(_SAMPLERS)}
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/surfaces.frag", **units)
+        self._reflectance = reflectance_table(gl)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
+        gl, environment = job.gl, job.scene.environment
+        (job.targets.average() if job.averaging else job.targets.surfaced()).use()
+        gl.enable_only(moderngl.BLEND if job.averaging else moderngl.NOTHING)
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        seen_map = environment.seen.kind == "image"
+        seen_lights = seen_map and environment.seen is environment
+        textures = [*job.targets.result().color_attachments[:4], *job.targets.entered().color_attachments]
+        textures += job.targets.left().color_attachments
+        for unit, texture in enumerate(textures):
+            texture.use(unit)
+        if job.has_opaque:
+            for unit, texture in enumerate(job.targets.opaque().color_attachments, _SAMPLERS.index("opaque_place")):
+                texture.use(unit)
+        maps = job.environments.light(environment)
+        table = surface_table(job.scene, [i for i in range(len(job.scene.objects)) if job.is_sheet(i)])
+        finishes = gl.texture(table.shape[1::-1], 4, table, dtype="f4")
+        rest = (finishes, self._reflectance, job.environments.sharp(environment), maps.levels, maps.irradiance)
+        for unit, item in enumerate(rest, _SAMPLERS.index("surface_table")):
+            item.use(unit)
+        if seen_map:
+            job.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
+        program = self._variants.program(
+            OPAQUE=job.has_opaque, SEEN_MAP=seen_map, SEEN_LIGHTS=seen_lights, SINGLE_SCATTERING=job.scatters
+        )
+        self._variants.draw_fullscreen(program)
+        finishes.release()

@@ -1,0 +1,76 @@
+"""Textures on the GPU: uploaded once, shared by all passes, gone when the texture is."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import moderngl
+import numpy as np
+
+from translucent.brdf_table import brdf_table
+from translucent.errors import RenderError
+from translucent.gpu.shaders import set_uniform
+from translucent.surface import Surface
+from translucent.texture import Texture
+
+#: Fields of `Surface`, in the order of ``shaders/shade/surface_textures.glsl``.
+TEXTURE_FIELDS = ("color_texture", "roughness_texture", "transmission_texture", "normal_texture", "emissive_texture")
+
+#: In place of a texture: all values as they are, and a normal straight out.
+_WHITE, _STRAIGHT = Texture(np.ones((1, 1, 3))), Texture(np.full((1, 1, 3), (0.5, 0.5, 1.0)))
+
+
+def texture_units(first: int) -> dict[str, int]:
+    """Units of a surface's textures by the names of their samplers."""
+    return {name: unit for unit, name in enumerate(TEXTURE_FIELDS, first)}
+
+
+def reflectance_table(gl: moderngl.Context) -> moderngl.Texture:
+    """`brdf_table` on the GPU."""
+    table = brdf_table()
+    texture = gl.texture(table.shape[1::-1], 2, table, dtype="f4")
+    texture.filter = moderngl.LINEAR, moderngl.LINEAR
+    texture.repeat_x = texture.repeat_y = False
+    return texture
+
+
+class TextureCache:
+    """Each texture that has been drawn and is still alive, with mipmaps.
+
+    Half floats hold 11 bits, more than pictures have, in half the room.
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._textures: WeakKeyDictionary[Texture, moderngl.Texture] = WeakKeyDictionary()
+
+    def bind(self, surface: Surface, program: moderngl.Program, first_unit: int) -> None:
+        """Give a surface's textures to a program that includes ``shade/surface_textures.glsl``."""
+        rows = []
+        for unit, name in enumerate(TEXTURE_FIELDS, first_unit):
+            texture = getattr(surface, name) or (_STRAIGHT if name == "normal_texture" else _WHITE)
+            self[texture].use(unit)
+            rows += [tuple(row) for row in texture.rows]
+        # Compilers cut an array off behind the last element that a program uses.
+        set_uniform(program, "texture_rows", rows[: program["texture_rows"].array_length])
+
+    def __getitem__(self, texture: Texture) -> moderngl.Texture:
+        if (found := self._textures.get(texture)) is None:
+            height, width, channels = texture.pixels.shape
+            if max(width, height) > (limit := int(self._gl.info["GL_MAX_TEXTURE_SIZE"])):
+                raise RenderError(f"{texture!r}", f"this OpenGL ends at {limit}", "give a smaller picture")
+            content = np.ones((height, width, 4), dtype=np.float16)
+            with np.errstate(under="ignore"):
+                content[..., :channels] = texture.pixels
+            found = self._gl.texture((width, height), 4, content, dtype="f2")
+            found.build_mipmaps()
+            found.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+            found.repeat_x, found.repeat_y = (wrap == "repeat" for wrap in texture.wrap)
+            self._textures[texture] = found
+        return found
+
+    def release(self) -> None:
+        """Free all textures."""
+        for texture in self._textures.values():
+            texture.release()
+        self._textures.clear()

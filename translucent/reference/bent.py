@@ -1,0 +1,218 @@
+"""Radiance along rays that bend and split at the borders of media: exact Fresnel and Snell, in float64.
+
+At every border a ray becomes two, reflected and refracted, until they carry less than `FAINTEST` or have met as many
+borders as asked for; what is dropped is counted. With rough borders one of the two is chosen by chance, so that the
+radiance has noise. Between borders media absorb and emit as they do along straight rays.
+
+All radiance is basic radiance L / n^2, which does not change where light enters a denser medium; emission counts as it
+would in a medium that is index-matched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.reference.borders import Borders, Optics
+from translucent.reference.boxes import Lines
+from translucent.reference.compositing import composite
+from translucent.reference.emission import emission_of_mixtures
+from translucent.reference.hits import Hits
+from translucent.reference.intervals import Intervals, body_intervals, merge, unbalanced
+from translucent.reference.legs import Legs, joined
+from translucent.reference.light_paths import LightPaths
+from translucent.reference.meetings import Meetings
+from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
+from translucent.reference.rays import Rays
+from translucent.reference.scattering import scattered_once
+from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
+from translucent.reference.tracer import Tracer
+from translucent.reference.volume import Volume, volume_segments
+from translucent.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Rays that carry less than this of each color are not followed.
+FAINTEST = 1e-5
+
+#: Rays of the picture that are followed together: the working arrays stay below 500 MB.
+BATCH = 1 << 13
+
+#: Rays that run as much across the view as this cosine tells never meet the backdrop.
+ACROSS = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class BentLight:
+    """What bent rays see.
+
+    Attributes
+    ----------
+    radiance : (n, 3) float64
+    residual : (n, 3) float64
+        Share of each ray not not followed to its end; times the largest radiance in the scene it bounds the error.
+    valid : (n,) bool
+        No part of the ray went through a hole of a body, or missed the tolerance of scattered light.
+    """
+
+    radiance: Array
+    residual: Array
+    valid: Mask
+
+
+class BentRays:
+    """Rays of the scene's camera that bend at borders.
+
+    Parameters
+    ----------
+    scene : Scene
+        No surface in it has textures.
+    sheets : sequence of float or None
+        As `sheet_thicknesses` gives them.
+    aspect : float
+        Width of the picture divided by its height.
+    bounces : int
+        Borders that a ray may meet.
+    paths : LightPaths, optional
+        To add light that media scatter once, to `tolerance`. Lights reach into media straight on.
+    rng : Generator, optional
+        Chooses between reflection and refraction. Without it both are followed, and all borders are polished.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        sheets: Sequence[float | None],
+        aspect: float,
+        bounces: int,
+        paths: LightPaths | None = None,
+        tolerance: float = 1e-6,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        self.scene, self.sheets, self.aspect, self.bounces = scene, sheets, aspect, bounces
+        self.paths, self.tolerance, self.rng = paths, tolerance, rng
+        self.tracer, self.volume = Tracer(scene), Volume(scene)
+        dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
+        self.channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
+
+    def see(self, rays: Rays) -> BentLight:
+        """What rays of the camera see."""
+        found = BentLight(np.zeros((len(rays), 3)), np.zeros((len(rays), 3)), np.ones(len(rays), dtype=bool))
+        for channel, own in enumerate(self.channels):
+            carried = np.eye(3)[channel] if len(self.channels) > 1 else np.ones(3)
+            for begin in range(0, len(rays), BATCH):
+                owner = np.arange(begin, min(begin + BATCH, len(rays)))
+                _Tree(self, own, found).grow(rays.where(owner), owner, carried)
+        return found
+
+    def on_backdrop(self, rays: Rays) -> tuple[Array, Mask]:
+        """Where rays meet a backdrop that stands across the view behind all objects (`Rays.backdrop`), and whether."""
+        camera = self.scene.camera
+        low, high = self.scene.bounds - camera.eye
+        farthest = float(np.maximum(low * camera.forward, high * camera.forward).sum())
+        towards = rays.directions @ camera.forward
+        ahead = towards > ACROSS
+        path = np.maximum(farthest - rays.origins @ camera.forward, 0.0) / np.where(ahead, towards, 1.0)
+        points = rays.origins + path[:, None] * rays.directions
+        depth = points @ camera.forward if camera.fov_y is not None else np.ones(len(points))
+        ahead &= depth > 0
+        heights = 2.0 * camera.half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
+        across = np.stack([points @ camera.right, -(points @ camera.up)], axis=1) / heights[:, None]
+        return across + (0.5 * self.aspect, 0.5), ahead
+
+
+class _Tree:
+    """Follows rays from border to border, for light of which all has the same indices of refraction."""
+
+    def __init__(self, bent: BentRays, own: Optics, found: BentLight) -> None:
+        self.bent, self.own, self.found, self.scene = bent, own, found, bent.scene
+
+    def grow(self, rays: Rays, owner: Integers, carried: Array) -> None:
+        """Follow rays of the camera to all ends of theirs; each starts with the light `carried` (3,)."""
+        everywhere = np.full(len(rays), np.inf)
+        behind = self.bent.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, np.zeros(len(rays))))
+        never = np.zeros(len(rays), dtype=bool)
+        inside = self.own.at_origins(behind, len(rays))
+        legs = Legs(rays, owner, np.tile(carried, (len(rays), 1)), inside, never, never)
+        for level in range(self.bent.bounces + 1):
+            legs, borders = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
+            if not len(legs):
+                return
+            outcome = Meetings(self.own, legs, borders, self.bent.rng).outcome()
+            self._add(legs, outcome.radiance)
+            legs = joined(outcome.branches)
+            lost = np.asarray((legs.throughput < FAINTEST).all(axis=1) | ~legs.rays.directions.any(axis=1))
+            self._drop(legs.where(lost))
+            legs = legs.where(~lost)
+        self._drop(legs)
+
+    def _drop(self, legs: Legs) -> None:
+        np.add.at(self.found.residual, legs.owner, legs.throughput)
+
+    def _add(self, legs: Legs, radiance: Array) -> None:
+        with np.errstate(under="ignore"):
+            np.add.at(self.found.radiance, legs.owner, legs.throughput * radiance)
+
+    def _fly(self, legs: Legs, start: float) -> tuple[Legs, Borders]:
+        """Add what legs see on their way and at its end. Those that end at borders instead, there, and these."""
+        rays = legs.rays
+        reach = np.full(len(legs), start), np.full(len(legs), np.inf)
+        hits = self.bent.tracer.hits(Lines(rays.origins, rays.directions, *reach))
+        wall = nearest_opaque(self.scene, hits, len(legs))
+        borders = self.own.first_borders([line.before(wall.distance) for line in hits], legs.inside)
+        legs = self._through_media(legs, hits, borders.distance, wall.distance)
+        ends = np.isinf(borders.distance)
+        self._add(legs.where(ends), self._at_end(legs.where(ends), wall, np.flatnonzero(ends)))
+        met = np.flatnonzero(~ends)
+        borders, legs = borders.where(met), legs.where(met)
+        with np.errstate(under="ignore"):
+            points = legs.rays.origins + borders.distance[:, None] * legs.rays.directions
+        return replace(legs, rays=replace(legs.rays, origins=points)), borders
+
+    def _through_media(self, legs: Legs, hits: Sequence[Hits], border: Array, wall: Array) -> Legs:
+        """Legs with what media leave of them where they end; adds what these emit and scatter."""
+        scene, volume, rays = self.scene, self.bent.volume, legs.rays
+        end = np.minimum(border, wall)
+        none = np.empty(0, np.int64)
+        parts = [Intervals(none, np.empty(0), np.empty(0), none, none)]
+        for i in self.own.solids:
+            origin, ahead = legs.inside.windings[:, i].astype(np.int64), hits[i].before(end)
+            parts.append(body_intervals(ahead, origin, end, i))
+            self.found.valid[legs.owner[unbalanced(ahead, origin, end)]] = False
+        sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.bent.sheets)]
+        # A sheet that lies on a border is met on one side of it only.
+        until = np.where(border < wall, border - SHEET_ON_OPAQUE * scene.diagonal, wall)
+        crossings = scene_crossings(scene, rays, hits, sheets, until)
+        segments, filling = volume_segments(scene, volume, rays, merge(parts), crossings)
+        segments = emission_of_mixtures(volume, rays, segments, filling)
+        emitted, depth = composite(segments, len(legs))
+        if self.bent.paths is not None:
+            light = scattered_once(self.bent.paths, rays, segments, filling, self.bent.tolerance)
+            emitted = emitted + light.radiance
+            self.found.valid[legs.owner[~light.valid]] = False
+        self._add(legs, emitted)
+        with np.errstate(under="ignore"):
+            return replace(legs, throughput=legs.throughput * optics.transmittance(depth))
+
+    def _at_end(self, legs: Legs, wall: OpaqueHits, chosen: Integers) -> Array:
+        """(k, 3): radiance at the ends of legs, the `chosen` ones of all that met `wall`: opaque, or environment."""
+        own = OpaqueHits(wall.distance[chosen], wall.item[chosen], wall.face[chosen])
+        seen = reflected_radiance(self.scene, legs.rays, own)
+        free = np.flatnonzero(np.isinf(own.distance))
+        seen[free] = self._environment(legs.where(free))
+        return seen
+
+    def _environment(self, legs: Legs) -> Array:
+        """(k, 3): what legs see that nothing stops: in reflections what lights the scene, else its background."""
+        environment, rays = self.scene.environment, legs.rays
+        place, ahead = self.bent.on_backdrop(rays)
+        seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], place, rays.backdrop))
+        if environment.seen.kind == "checkerboard":
+            seen[legs.bent & ~ahead] = environment.seen.mean
+        return np.where(legs.reflected[:, None], environment.lighting(rays.directions), seen)

@@ -1,0 +1,301 @@
+"""Where light is bent or reflected: the first border on each ray at which what it is in changes.
+
+Of several bodies at one place, the one of the highest priority decides what light is in; of equal ones, the one that
+the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries a record of
+the bodies that it is in, so that the walls of two bodies at one place are one border.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.corner_normals import corner_normals
+from translucent.interface import channel_iors
+from translucent.reference.compositing import _layers
+from translucent.reference.hits import Hits, world_normals
+from translucent.scene import Scene
+from translucent.surface import Surface
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Walls closer together than this share of the scene's diagonal are at one place.
+TOGETHER = 1e-9
+
+#: Least cosine between a border's normal and a ray that meets it.
+EDGE_ON = 1e-3
+
+#: Of what is in no body.
+AIR = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """Which bodies rays are in.
+
+    Attributes
+    ----------
+    windings : (n, objects) int32
+        How often each body contains the place.
+    since : (n, objects) int64
+        When it was entered last, by a count of each ray's crossings.
+    """
+
+    windings: npt.NDArray[np.int32]
+    since: Integers
+
+    def where(self, chosen: Integers | Mask) -> Inside:
+        """Those of the rays that indices or a mask choose."""
+        return Inside(self.windings[chosen], self.since[chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class Borders:
+    """The first border on each ray; all arrays (n,).
+
+    Attributes
+    ----------
+    distance : float64
+        In metres along the ray; inf where there is none.
+    item : int64
+        Of `Scene.objects`, whose border it is; of no meaning without one.
+    face : int64
+        Of its mesh.
+    barycentric : (n, 3) float64
+    before, after : int64
+        Object that light is in on this side and on the other; `AIR` where in none. Equal for a sheet.
+    here, there : Inside
+        On this side, and on the other.
+    """
+
+    distance: Array
+    item: Integers
+    face: Integers
+    barycentric: Array
+    before: Integers
+    after: Integers
+    here: Inside
+    there: Inside
+
+    def where(self, chosen: Integers) -> Borders:
+        """Those of the rays that indices choose."""
+        return Borders(
+            self.distance[chosen],
+            self.item[chosen],
+            self.face[chosen],
+            self.barycentric[chosen],
+            self.before[chosen],
+            self.after[chosen],
+            self.here.where(chosen),
+            self.there.where(chosen),
+        )
+
+
+class Optics:
+    """What light meets at the borders of a scene, for one color of light or for all alike.
+
+    Parameters
+    ----------
+    scene : Scene
+    sheets : sequence of float or None
+        Thickness in metres of the sheet that each object is, or None.
+    channel : int, optional
+        Color of light whose indices of refraction count; None where all are alike.
+    """
+
+    def __init__(self, scene: Scene, sheets: Sequence[float | None], channel: int | None = None) -> None:
+        self.scene, self.sheets = scene, sheets
+        self.surfaces = [body.surface or Surface() for body in scene.objects]
+        media = [body.medium.ior if body.medium else 1.0 for body in scene.objects]
+        iors = channel_iors(media, [surface.dispersion for surface in self.surfaces])
+        #: (objects + 1,): the last is that of `AIR`, index -1.
+        self.iors = np.append(iors[:, 1 if channel is None else channel], 1.0)
+        solid = [body.medium is not None and metres is None for body, metres in zip(scene.objects, sheets, strict=True)]
+        self.solids = [i for i, is_solid in enumerate(solid) if is_solid]
+        counts = [body.has_interface or scene.overlap == "priority" for body in scene.objects]
+        #: (objects,): bodies that decide what light is in.
+        self.decides = np.array(solid) & np.array(counts)
+        #: Sheets that do more than a path through them tells.
+        self.walls = [i for i, body in enumerate(scene.objects) if sheets[i] is not None and body.has_interface]
+        _, self._rank = np.unique([body.priority for body in scene.objects], return_inverse=True)
+        self._corner_normals: dict[int, Array] = {}
+
+    def corner_normals(self, item: int) -> Array:
+        """(m, 3, 3): normals of an object's surface at the corners of its faces, as they are drawn."""
+        if item not in self._corner_normals:
+            self._corner_normals[item] = corner_normals(self.scene.objects[item].mesh)
+        return self._corner_normals[item]
+
+    @property
+    def tolerance(self) -> float:
+        """Distance in metres within which walls are at one place."""
+        return TOGETHER * self.scene.diagonal
+
+    def dominant(self, inside: Inside) -> Integers:
+        """(n,): object that light is in, or `AIR`."""
+        present = (inside.windings > 0) & self.decides
+        key = np.where(present, self._rank * (1 << 40) + inside.since, -1)
+        best = key.argmax(axis=1)
+        return np.where(present.any(axis=1), best, AIR)
+
+    def matters(self, before: Integers, after: Integers) -> Mask:
+        """(n,): whether light notices that what it is in changes."""
+        plain = np.array([surface.plain for surface in self.surfaces] + [True])
+        changes = (self.iors[before] != self.iors[after]) | ~plain[before] | ~plain[after]
+        return np.asarray((before != after) & changes)
+
+    def outside(self, count: int) -> Inside:
+        """Of rays that are in no body."""
+        shape = (count, len(self.scene.objects))
+        return Inside(np.zeros(shape, np.int32), np.zeros(shape, np.int64))
+
+    def at_origins(self, hits: Sequence[Hits], count: int) -> Inside:
+        """Which bodies the origins of rays are in, from all surfaces behind them."""
+        behind = [line.where(line.distance < 0) for line in hits]
+        return _Walk(self, behind, self.outside(count)).through()
+
+    def first_borders(self, hits: Sequence[Hits], inside: Inside) -> Borders:
+        """The first borders among surfaces ahead, those of each object, on rays that start `inside` bodies."""
+        return _Walk(self, hits, inside).to_borders()
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Surfaces of all objects on rays, in order."""
+
+    pixel: Integers
+    distance: Array
+    item: Integers
+    sign: npt.NDArray[np.int8]
+    face: Integers
+    barycentric: Array
+
+    @classmethod
+    def of(cls, hits: Sequence[Hits], items: Sequence[int]) -> _Crossings:
+        none = np.empty(0, np.int64)
+        parts = [(none, np.empty(0), none, np.empty(0, np.int8), none, np.empty((0, 3)))]
+        parts += [
+            (line.pixel, line.distance, np.full(len(line.pixel), i), line.sign, line.face, line.barycentric)
+            for i, line in ((i, hits[i]) for i in items)
+        ]
+        columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        order = np.lexsort((columns[1], columns[0]))
+        return cls(*(column[order] for column in columns))
+
+    def where(self, chosen: Integers) -> _Crossings:
+        return _Crossings(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+
+class _Walk:
+    """Rays that go from surface to surface, all at once, until what they are in changes."""
+
+    def __init__(self, optics: Optics, hits: Sequence[Hits], inside: Inside) -> None:
+        self.optics = optics
+        self.crossings = _Crossings.of(hits, [*optics.solids, *optics.walls])
+        self.inside = Inside(inside.windings.copy(), inside.since.copy())
+        count, objects = inside.windings.shape
+        self.face = np.full((count, objects), -1)
+        self.barycentric = np.zeros((count, objects, 3))
+        self.time = inside.since.max(axis=1, initial=0)
+
+    def through(self) -> Inside:
+        """What rays are in behind all surfaces."""
+        for layer in _layers(self.crossings.pixel):
+            self._cross(self.crossings.where(layer))
+        return self.inside
+
+    def to_borders(self) -> Borders:
+        """The first border of each ray."""
+        count = len(self.time)
+        self.here = Inside(self.inside.windings.copy(), self.inside.since.copy())
+        self.before = self.optics.dominant(self.inside)
+        self.place = np.full(count, -np.inf)
+        self.sheet = np.full(count, -1)
+        stopped = np.zeros(count, dtype=bool)
+        is_wall = np.isin(np.arange(len(self.optics.surfaces)), self.optics.walls)
+        for layer in _layers(self.crossings.pixel):
+            crossings = self.crossings.where(layer[~stopped[self.crossings.pixel[layer]]])
+            ray = crossings.pixel
+            apart = crossings.distance > self.place[ray] + self.optics.tolerance
+            stopped[ray[apart]] = self._changed(ray[apart])
+            going = np.flatnonzero(~stopped[ray])
+            self._begin_place(crossings.where(going[apart[going]]))
+            crossings = crossings.where(going)
+            sheet = is_wall[crossings.item]
+            self._cross(crossings.where(np.flatnonzero(~sheet)))
+            self._meet_sheet(crossings.where(np.flatnonzero(sheet)))
+            stopped[crossings.pixel[sheet]] = True
+        return self._borders()
+
+    def _cross(self, crossings: _Crossings) -> None:
+        ray, item = crossings.pixel, crossings.item
+        self.time[ray] += 1
+        self.inside.windings[ray, item] += crossings.sign
+        entered = (crossings.sign > 0) & (self.inside.windings[ray, item] == 1)
+        self.inside.since[ray[entered], item[entered]] = self.time[ray[entered]]
+        self.face[ray, item] = crossings.face
+        self.barycentric[ray, item] = crossings.barycentric
+
+    def _begin_place(self, crossings: _Crossings) -> None:
+        ray = crossings.pixel
+        self.place[ray] = crossings.distance
+        self.before[ray] = self.optics.dominant(self.inside.where(ray))
+        self.here.windings[ray], self.here.since[ray] = self.inside.windings[ray], self.inside.since[ray]
+        self.face[ray] = -1
+
+    def _meet_sheet(self, crossings: _Crossings) -> None:
+        ray = crossings.pixel
+        # With a wall of a body at the same place, the wall goes first.
+        free = ~self._changed(ray)
+        self.sheet[ray[free]] = crossings.item[free]
+        self.face[ray[free], crossings.item[free]] = crossings.face[free]
+        self.barycentric[ray[free], crossings.item[free]] = crossings.barycentric[free]
+
+    def _changed(self, ray: Integers) -> Mask:
+        return self.optics.matters(self.before[ray], self.optics.dominant(self.inside.where(ray)))
+
+    def _borders(self) -> Borders:
+        rays = np.arange(len(self.time))
+        after = self.optics.dominant(self.inside)
+        is_sheet = self.sheet >= 0
+        found = is_sheet | self.optics.matters(self.before, after)
+        # The border is that of the body that is entered; where the ray only leaves one, of that.
+        entered = (after != AIR) & (self.face[rays, after] >= 0)
+        item = np.where(is_sheet, self.sheet, np.where(entered, after, self.before))
+        return Borders(
+            np.where(found, self.place, np.inf),
+            item,
+            self.face[rays, item],
+            self.barycentric[rays, item],
+            self.before,
+            np.where(is_sheet, self.before, after),
+            self.here,
+            self.inside,
+        )
+
+
+def border_normals(own: Optics, borders: Borders, directions: Array) -> tuple[Array, Array]:
+    """Unit normals (n, 3) of borders, to the side that rays (n, 3) come from: of smooth surfaces, and of their faces.
+
+    Smooth normals may look away from a ray that their face looks at: it meets the border edge-on.
+    """
+    smooth, flat = np.zeros((2, len(directions), 3))
+    for i in np.unique(borders.item):
+        own_rays = np.flatnonzero(borders.item == i)
+        body, face = own.scene.objects[i], borders.face[own_rays]
+        flat[own_rays] = world_normals(body, face)
+        corners = np.einsum("kij,ki->kj", own.corner_normals(int(i))[face], borders.barycentric[own_rays])
+        smooth[own_rays] = corners @ np.linalg.inv(body.matrix[:3, :3])
+    away = np.einsum("ki,ki->k", flat, directions) > 0
+    flat[away] *= -1.0
+    smooth[away] *= -1.0
+    smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    facing = np.einsum("ki,ki->k", smooth, directions)
+    edge_on = facing > -EDGE_ON
+    smooth[edge_on] -= (facing[edge_on] + EDGE_ON)[:, None] * directions[edge_on]
+    return smooth / np.linalg.norm(smooth, axis=1, keepdims=True), flat

@@ -1,0 +1,226 @@
+"""What becomes of light at borders: how much is reflected and refracted, where to, and what paint sends back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.interface import (
+    ggx_distribution,
+    ggx_visibility,
+    reflected_direction,
+    refracted_direction,
+    slab_reflectance,
+    slab_transmittance,
+)
+from translucent.lights import PointLight
+from translucent.reference.borders import Borders, Optics, border_normals
+from translucent.reference.legs import Legs
+from translucent.reference.microfacets import scattered_at_border
+from translucent.reference.opaque import irradiance_at, seen_from
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Passages of light through a rough sheet after which it counts as lost.
+MOST_PASSAGES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What comes of light at borders.
+
+    Attributes
+    ----------
+    branches : tuple of Legs
+        In which it goes on.
+    radiance : (k, 3) float64
+        That the borders add themselves.
+    """
+
+    branches: tuple[Legs, ...]
+    radiance: Array
+
+
+class Meetings:
+    """Legs that end at borders, and go on from there.
+
+    Parameters
+    ----------
+    own : Optics
+    legs : Legs
+        With their origins moved to the borders.
+    borders : Borders
+    rng : Generator, optional
+        Chooses between reflection and refraction; without it both are followed.
+    """
+
+    def __init__(self, own: Optics, legs: Legs, borders: Borders, rng: np.random.Generator | None) -> None:
+        self.own, self.legs, self.borders, self.rng = own, legs, borders, rng
+        self.normals, self.faces = border_normals(own, borders, legs.rays.directions)
+        self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
+        self.is_sheet = borders.before == borders.after
+        beyond = np.where(self.is_sheet, borders.item, borders.after)
+        self.ior = own.iors[beyond] / own.iors[borders.before]
+        self.alpha = self._table("roughness") ** 2
+        self.transmission = self._table("transmission")[:, None]
+        self.color = self._table("color")
+        self.reflectance = optics.fresnel_dielectric(self.cosine, self.ior)
+
+    def outcome(self) -> Outcome:
+        """What comes of all of them."""
+        rough = (self.alpha > 0) & (self.ior != 1.0)
+        ways = (
+            (~self.is_sheet & (~rough if self.rng is None else np.ones_like(rough)), self._at_borders),
+            (self.is_sheet & ~rough, self._at_sheets),
+            (self.is_sheet & rough, self._at_rough_sheets),
+        )
+        self.radiance = np.zeros((len(self.legs), 3))
+        self._add_highlights(np.flatnonzero(rough))
+        branches: list[Legs] = []
+        for mask, method in ways:
+            chosen = np.flatnonzero(mask)
+            if chosen.size:
+                found, passed = method(chosen)
+                branches.extend(found)
+                self._add_paint(chosen, passed)
+        return Outcome(tuple(branches), self.radiance)
+
+    def _table(self, name: str) -> Array:
+        return np.array([getattr(surface, name) for surface in self.own.surfaces], dtype=np.float64)[self.borders.item]
+
+    def _passing(self, chosen: Integers) -> Array:
+        """(k, 3): share of the light past the border that goes on through it: the color tints what enters a body."""
+        enters = self.is_sheet[chosen] | (self.borders.item[chosen] == self.borders.after[chosen])
+        return self.transmission[chosen] * np.where(enters[:, None], self.color[chosen], 1.0)
+
+    def _at_borders(self, chosen: Integers) -> tuple[list[Legs], Array]:
+        """Branches, and the share (k, 1) of the light that passes."""
+        legs, here, there = self.legs.where(chosen), self.borders.here, self.borders.there
+        directions, normals = legs.rays.directions, self.normals[chosen]
+        back_way = reflected_direction(directions, normals)
+        on_way = refracted_direction(directions, normals, self.ior[chosen])
+        share_back = self.reflectance[chosen, None]
+        share_on = 1.0 - share_back
+        if self.rng is not None:
+            passed = self.rng.random(len(chosen)) >= share_back[:, 0]
+            rough = np.flatnonzero((self.alpha[chosen] > 0) & (self.ior[chosen] != 1.0))
+            back_way[rough], passed[rough] = scattered_at_border(
+                directions[rough], normals[rough], self.ior[chosen[rough]], self.alpha[chosen[rough]], self.rng
+            )
+            on_way[rough] = back_way[rough]
+            share_on = passed[:, None].astype(np.float64)
+            share_back = 1.0 - share_on
+        back, on = np.flatnonzero(share_back[:, 0] > 0.0), np.flatnonzero(share_on[:, 0] > 0.0)
+        passing = (share_on * self._passing(chosen))[on]
+        back_way, on_way = _towards(back_way, self.faces[chosen]), _towards(on_way, -self.faces[chosen])
+        reflected = legs.where(back).turned(
+            back_way[back], share_back[back], here.where(chosen[back]), bent=True, reflected=True
+        )
+        refracted = legs.where(on).turned(on_way[on], passing, there.where(chosen[on]), bent=True, reflected=False)
+        return [reflected, refracted], share_on
+
+    def _at_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
+        """As `_at_borders`, for polished sheets: both sides of each at once."""
+        legs, inside = self.legs.where(chosen), self.borders.here.where(chosen)
+        metres, extinction, emission = self._matter(chosen)
+        share, ior = self.reflectance[chosen], self.ior[chosen]
+        path = optics.thin_layer_thickness(metres, self.cosine[chosen], ior)[:, None]
+        with np.errstate(over="ignore", under="ignore"):
+            depth = extinction * path
+            back, on = slab_reflectance(share[:, None], depth), slab_transmittance(share[:, None], depth)
+            kept = 1.0 - share[:, None] * optics.transmittance(depth)
+            # What a sheet emits goes back and forth in it, too.
+            leaving = np.where(kept > 0.0, (1.0 - share[:, None]) / np.where(kept > 0.0, kept, 1.0), 0.0)
+            self.radiance[chosen] += leaving * optics.emitted_radiance(emission, extinction, path)
+        mirrored = _towards(reflected_direction(legs.rays.directions, self.normals[chosen]), self.faces[chosen])
+        branches = [
+            legs.turned(mirrored, back, inside, bent=True, reflected=True),
+            legs.turned(legs.rays.directions, on * self._passing(chosen), inside, bent=False, reflected=False),
+        ]
+        return branches, on
+
+    def _at_rough_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
+        """As `_at_borders`, for rough sheets: light goes from one side to the other until it leaves."""
+        assert self.rng is not None
+        legs, inside, normals = self.legs.where(chosen), self.borders.here.where(chosen), self.normals[chosen]
+        metres, extinction, emission = self._matter(chosen)
+        ior, alpha = self.ior[chosen], self.alpha[chosen]
+        way, entered = scattered_at_border(legs.rays.directions, normals, ior, alpha, self.rng)
+        weight, emitted = np.ones((len(chosen), 3)), np.zeros((len(chosen), 3))
+        within = np.flatnonzero(entered)
+        for _ in range(MOST_PASSAGES):
+            if not within.size:
+                break
+            across = np.einsum("ki,ki->k", way[within], normals[within])
+            path = (metres[within] / np.maximum(np.abs(across), optics.MIN_THIN_LAYER_COSINE))[:, None]
+            with np.errstate(over="ignore", under="ignore"):
+                emitted[within] += weight[within] * optics.emitted_radiance(emission[within], extinction[within], path)
+                weight[within] *= optics.transmittance(extinction[within] * path)
+            facing = np.where(across[:, None] < 0, normals[within], -normals[within])
+            way[within], leaves = scattered_at_border(way[within], facing, 1.0 / ior[within], alpha[within], self.rng)
+            within = within[~leaves & way[within].any(axis=1)]
+        way[within] = 0.0
+        self.radiance[chosen] += emitted
+        passed = np.einsum("ki,ki->k", way, normals) < 0
+        way = _towards(way, np.where(passed[:, None], -1.0, 1.0) * self.faces[chosen])
+        with np.errstate(under="ignore"):
+            share = weight * np.where(passed[:, None], self._passing(chosen), 1.0)
+        return [legs.turned(way, share, inside, bent=True, reflected=~passed)], weight * passed[:, None]
+
+    def _matter(self, chosen: Integers) -> tuple[Array, Array, Array]:
+        """Thickness (k,) in metres, extinction and emission (k, 3) of sheets."""
+        own, item = self.own, self.borders.item[chosen]
+        media = [body.medium for body in own.scene.objects]
+        metres = np.array([thickness or 0.0 for thickness in own.sheets])
+        rows = np.array([(m.extinction, m.emission) if m is not None else np.zeros((2, 3)) for m in media])
+        return metres[item], rows[item, 0], rows[item, 1]
+
+    def _add_paint(self, chosen: Integers, passed: Array) -> None:
+        """Light that paint sends back diffusely of the share `passed` (k, 1 or 3) that meets it."""
+        share = passed * (1.0 - self.transmission[chosen])
+        painted = np.flatnonzero((share > 0.0).any(axis=1))
+        chosen, share = chosen[painted], share[painted]
+        if not chosen.size:
+            return
+        points, normals = self.legs.rays.origins[chosen], self.normals[chosen]
+        through = self._table("diffuse_transmission")[chosen, None]
+        front, back = (irradiance_at(self.own.scene, points, side * normals) for side in (1.0, -1.0))
+        behind = through * self._table("diffuse_transmission_color")[chosen] * back
+        with np.errstate(under="ignore"):
+            self.radiance[chosen] += share * self.color[chosen] / np.pi * ((1.0 - through) * front + behind)
+
+    def _add_highlights(self, rough: Integers) -> None:
+        """Point and directional lights in rough borders, reflected by one microfacet; nothing shadows them."""
+        scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
+        to_eye = -self.legs.rays.directions[rough]
+        for light in scene.lights if rough.size else ():
+            light = seen_from(light, scene.camera.eye)
+            if isinstance(light, PointLight):
+                to_light = np.asarray(light.position) - points
+                to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+            else:
+                to_light = np.broadcast_to(-np.asarray(light.direction), points.shape)
+            half = to_eye + to_light
+            half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+            cos_half, cos_light = (np.clip(np.einsum("ki,ki->k", normals, way), 0.0, 1.0) for way in (half, to_light))
+            cos_facet = np.clip(np.einsum("ki,ki->k", half, to_eye), 0.0, 1.0)
+            share = optics.fresnel_dielectric(cos_facet, self.ior[rough])[:, None] * np.ones(3)
+            sheet = np.flatnonzero(self.is_sheet[rough])
+            metres, extinction, _ = self._matter(rough[sheet])
+            path = optics.thin_layer_thickness(metres, cos_facet[sheet], self.ior[rough[sheet]])[:, None]
+            share[sheet] = slab_reflectance(share[sheet], extinction * path)
+            density = ggx_distribution(cos_half, self.alpha[rough])
+            visible = ggx_visibility(cos_light, self.cosine[rough], self.alpha[rough])
+            with np.errstate(under="ignore"):
+                self.radiance[rough] += share * (density * visible)[:, None] * light.irradiance_on(points, normals)
+
+
+def _towards(directions: Array, side: Array) -> Array:
+    """Directions (k, 3), mirrored where they do not lead to the `side` (k, 3) of a face: smooth normals may mislead."""
+    across = np.einsum("ki,ki->k", directions, side)
+    return np.where((across < 0)[:, None], directions - 2.0 * across[:, None] * side, directions)

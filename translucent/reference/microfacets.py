@@ -1,0 +1,126 @@
+"""Rough borders: light that wanders among the microfacets of a GGX surface until it leaves them (Heitz et al. 2016).
+
+"Multiple-scattering microfacet BSDFs with the Smith model": heights of the microfacets are not correlated, each one
+reflects or refracts by Fresnel and Snell, and no light is lost. Normals as they are visible are sampled as in Heitz
+2018, "Sampling the GGX distribution of visible normals".
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent import optics
+from translucent.interface import reflected_direction, refracted_direction
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Meetings with microfacets after which light counts as lost; at a roughness of 1 one in a million gets as far.
+MOST_MEETINGS = 100
+
+#: Directions as close to the surface's plane as this stay at their height.
+LEVEL = 1e-6
+
+
+def scattered_at_border(
+    directions: Array, normals: Array, ior: Array, alpha: Array, rng: np.random.Generator
+) -> tuple[Array, Mask]:
+    """Directions (n, 3) in which light leaves a rough border, and whether it has passed it (n,).
+
+    Parameters
+    ----------
+    directions : (n, 3) float64
+        In which it arrives; unit vectors.
+    normals : (n, 3) float64
+        Unit, to the side that it comes from.
+    ior : (n,) float64
+        Of the other side relative to this one.
+    alpha : (n,) float64
+        Square of the roughness, above 0.
+
+    Returns
+    -------
+    directions : (n, 3) float64
+        Zero where light is lost.
+    passed : (n,) bool
+    """
+    axes = _axes(normals)
+    found = np.zeros_like(directions)
+    above = np.ones(len(directions), dtype=bool)
+    ray = np.arange(len(directions))
+    way = np.einsum("kij,kj->ki", axes, directions)
+    height = np.ones(len(directions))
+    for _ in range(MOST_MEETINGS):
+        # Below the surface everything is as above it, turned upside down.
+        side = np.where(above[ray], 1.0, -1.0)[:, None]
+        height, leaves = _next_height(side * way, height, alpha[ray], rng)
+        found[ray[leaves]] = way[leaves]
+        ray, way, height, side = ray[~leaves], way[~leaves], height[~leaves], side[~leaves]
+        if not ray.size:
+            break
+        facet = side * _visible_normals(-side * way, alpha[ray], rng)
+        way, passed = _meet(way, facet, np.where(above[ray], ior[ray], 1.0 / ior[ray]), rng)
+        above[ray] ^= passed
+        # Heights count upwards on either side.
+        height = np.where(passed, 1.0 - height, height)
+    return np.einsum("kji,kj->ki", axes, found), ~above
+
+
+def _meet(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
+    """Directions (n, 3) after meeting microfacets (n, 3), and whether they have passed them."""
+    cosine = np.clip(-np.einsum("ki,ki->k", way, facet), 0.0, 1.0)
+    passed = rng.random(len(way)) >= optics.fresnel_dielectric(cosine, ior)
+    turned = np.where(passed[:, None], refracted_direction(way, facet, ior), reflected_direction(way, facet))
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True), passed
+
+
+@np.errstate(under="ignore", over="ignore", divide="ignore")
+def _next_height(way: Array, height: Array, alpha: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
+    """Heights (n,) of the next microfacets that light meets, and whether it leaves instead.
+
+    Heights are evenly spread from 0 to 1: of all facets, the share `height` is lower.
+    """
+    chance = 1.0 - rng.random(len(way))
+    slope = _lambda(way[:, 2], alpha)
+    level = np.abs(way[:, 2]) < LEVEL
+    upwards = (way[:, 2] > 0) & ~level
+    leaves = upwards & (chance <= height**slope)
+    # G1 = C1(h)^Lambda: the share of light still under way at height h', C1(h)^Lambda / C1(h')^Lambda, is `chance`.
+    moved = height * chance ** (-1.0 / np.where(slope == 0.0, 1.0, slope))
+    return np.where(level, height, np.clip(moved, 0.0, 1.0)), leaves
+
+
+def _lambda(z: Array, alpha: Array) -> Array:
+    """Smith's Lambda of GGX, (n,): (sqrt(1 + alpha^2 tan^2) - 1) / 2 upwards, (-sqrt(...) - 1) / 2 downwards."""
+    up = np.clip(np.abs(z), LEVEL, 1.0)
+    sine = alpha * alpha * (1.0 - up) * (1.0 + up)
+    upwards = 0.5 * sine / (up * (np.sqrt(up * up + sine) + up))
+    return np.asarray(np.where(z > 0, upwards, -1.0 - upwards))
+
+
+def _visible_normals(towards: Array, alpha: Array, rng: np.random.Generator) -> Array:
+    """Microfacet normals (n, 3) as they are seen from unit directions (n, 3), from above or from below."""
+    stretched = towards * np.stack([alpha, alpha, np.ones_like(alpha)], axis=1)
+    stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)
+    first, second, _ = np.moveaxis(_axes(stretched), 1, 0)
+    radius, angle = np.sqrt(rng.random(len(towards))), 2.0 * np.pi * rng.random(len(towards))
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    share = 0.5 * (1.0 + stretched[:, 2])
+    y = (1.0 - share) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + share * y
+    z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    on_sphere = x[:, None] * first + y[:, None] * second + z[:, None] * stretched
+    normals = on_sphere * np.stack([alpha, alpha, np.ones_like(alpha)], axis=1)
+    normals[:, 2] = np.maximum(normals[:, 2], 0.0)
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def _axes(upwards: Array) -> Array:
+    """(n, 3, 3): rows are a right-handed frame whose last axis is `upwards` (n, 3) and whose first is level."""
+    x, y = upwards[:, 0], upwards[:, 1]
+    across = np.hypot(x, y)
+    flat = across < 1e-12
+    first = np.stack([np.where(flat, 1.0, -y), np.where(flat, 0.0, x), np.zeros_like(x)], axis=1)
+    first /= np.where(flat, 1.0, across)[:, None]
+    return np.stack([first, np.cross(upwards, first), upwards], axis=1)

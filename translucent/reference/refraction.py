@@ -1,0 +1,105 @@
+"""Pictures along bent rays: all pixels of `BentRays`, and where borders are rough, many rays for each."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.reference.bent import BentLight, BentRays
+from translucent.reference.light_paths import LightPaths
+from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.sheets import sheet_thicknesses
+from translucent.reference.volume import Volume
+from translucent.scene import Scene
+from translucent.thickness import Method
+
+Array = npt.NDArray[np.float64]
+
+#: Borders that a ray may meet, unless told otherwise.
+BOUNCES = 8
+
+#: Rays of each pixel before rough borders, unless told otherwise.
+PATHS = 64
+
+#: Rays that are averaged together: the working arrays stay below 500 MB.
+BATCH = 1 << 16
+
+
+def bends(scene: Scene) -> bool:
+    """Whether light changes at some border of the scene, so that its rays are not all straight."""
+    return any(body.has_interface for body in scene.bodies)
+
+
+def bent_light(
+    scene: Scene,
+    size: tuple[int, int],
+    method: Method | None = None,
+    tolerance: float = 1e-6,
+    bounces: int = BOUNCES,
+    paths: int = PATHS,
+    seed: int = 0,
+) -> tuple[BentLight, Array]:
+    """What the pixels of a picture see along bent rays, row by row from the top left.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : (width, height)
+        In pixels.
+    method : Method, optional
+        As for `render`.
+    tolerance : float
+        Relative error of light that media scatter once.
+    bounces : int
+        Borders that a ray may meet, from 0.
+    paths : int
+        Rays of each pixel, from 2, if some border is rough; else one sees all.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    light : BentLight
+    standard_error : (n, 3) float64
+        Of the radiance; 0 if all borders are polished.
+
+    Raises
+    ------
+    InputError
+        If an argument is not in its range, or a surface has textures.
+    """
+    _check(scene, bounces, paths)
+    sheets, rays = sheet_thicknesses(scene, method), pixel_rays(scene.camera, size)
+    light_paths = LightPaths(scene, sheets) if scene.lights and Volume(scene).scatters else None
+    rough = any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
+    rng = np.random.default_rng(seed) if rough else None
+    bent = BentRays(scene, sheets, size[0] / size[1], bounces, light_paths, tolerance, rng)
+    return _mean(bent, rays, paths) if rough else (bent.see(rays), np.zeros((len(rays), 3)))
+
+
+def _mean(bent: BentRays, rays: Rays, paths: int) -> tuple[BentLight, Array]:
+    """Mean over several rays for each of `rays`, and its standard error."""
+    each = max(BATCH // paths, 1)
+    parts, spreads = [], []
+    for begin in range(0, len(rays), each):
+        some = np.arange(begin, min(begin + each, len(rays)))
+        found = bent.see(rays.where(np.repeat(some, paths)))
+        radiance, residual = (array.reshape(len(some), paths, 3) for array in (found.radiance, found.residual))
+        valid = found.valid.reshape(len(some), paths).all(axis=1)
+        parts.append((radiance.mean(axis=1), residual.mean(axis=1), valid))
+        with np.errstate(under="ignore"):
+            spreads.append(radiance.std(axis=1, ddof=1))
+    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return BentLight(*columns), np.concatenate(spreads) / np.sqrt(paths)
+
+
+def _check(scene: Scene, bounces: int, paths: int) -> None:
+    if bounces < 0:
+        raise InputError(f"{bounces} bounces", "below 0", "use for example 8")
+    if paths < 2:
+        raise InputError(f"{paths} paths through rough borders", "no spread without two", "use for example 64")
+    for body in scene.bodies:
+        if body.surface is not None and any(texture is not None for texture in body.surface.textures):
+            what = f"reference of {body.mesh.name!r}"
+            raise InputError(what, "its surface has textures", "give it a surface without, or use refraction=False")

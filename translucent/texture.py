@@ -1,0 +1,94 @@
+"""Pictures that vary a surface over the texture coordinates of its mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+
+Wrap = Literal["repeat", "clamp"]
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Numbers over texture coordinates 0 to 1, with bilinear interpolation.
+
+    The coordinates of the mesh are multiplied by `scale`, turned by `rotation` about (0, 0), then moved by `offset`.
+
+    Parameters
+    ----------
+    pixels : array_like (h, w, 3) or (h, w, 4)
+        0 to 1, linear (an sRGB picture has to be decoded first); row 0 is the top, where v = 1. The fourth channel is
+        opacity, 1 where there is none.
+    scale, offset : array_like (2,)
+    rotation : float
+        Degrees, counterclockwise as v counts upwards.
+    wrap : ({"repeat", "clamp"}, {"repeat", "clamp"})
+        What is beyond 0 to 1 in u and in v: the picture again, or its border.
+
+    Raises
+    ------
+    InputError
+        If the pixels are no picture, or not in 0 to 1.
+    """
+
+    pixels: npt.NDArray[np.float32]
+    scale: npt.ArrayLike = (1.0, 1.0)
+    offset: npt.ArrayLike = (0.0, 0.0)
+    rotation: float = 0.0
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+
+    def __post_init__(self) -> None:
+        try:
+            pixels = np.array(self.pixels, dtype=np.float32, order="C")
+        except (TypeError, ValueError):
+            raise InputError("texture", "its pixels are not numbers", "give an array (h, w, 3)") from None
+        if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.size == 0:
+            raise InputError("texture", f"pixels of shape {pixels.shape}", "give an array (h, w, 3) or (h, w, 4)")
+        if wrong := np.count_nonzero(~((pixels >= 0) & (pixels <= 1))):
+            raise InputError("texture", f"{wrong} numbers are not in 0 to 1", "give linear values in that range")
+        self._freeze("pixels", pixels)
+        for field in ("scale", "offset"):
+            pair = np.array(getattr(self, field), dtype=np.float64)
+            if pair.shape != (2,) or not np.isfinite(pair).all():
+                raise InputError(f"texture {field} {getattr(self, field)!r}", "not two finite numbers", "give (u, v)")
+            self._freeze(field, pair)
+        if not np.isfinite(self.rotation):
+            raise InputError(f"texture rotation {self.rotation!r}", "not finite", "give degrees")
+        if len(self.wrap) != 2 or not set(self.wrap) <= set(get_args(Wrap)):
+            raise InputError(f"texture wrap {self.wrap!r}", "not two of repeat and clamp", 'give ("repeat", "repeat")')
+
+    def __repr__(self) -> str:
+        return f"Texture({self.pixels.shape[1]}x{self.pixels.shape[0]})"
+
+    @property
+    def rows(self) -> npt.NDArray[np.float64]:
+        """(2, 3): the picture's own coordinates, v upwards, are this times (u, v, 1) of the mesh."""
+        c, s = np.cos(np.radians(self.rotation)), np.sin(np.radians(self.rotation))
+        turned = np.array([[c, -s], [s, c]]) * np.asarray(self.scale)
+        return np.column_stack([turned, np.asarray(self.offset)])
+
+    def sample(self, uv: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """(..., 3) or (..., 4): bilinear values at texture coordinates (..., 2), v upwards."""
+        height, width = self.pixels.shape[:2]
+        at = np.asarray(uv, dtype=np.float64) @ self.rows[:, :2].T + self.rows[:, 2]
+        column, row = at[..., 0] * width - 0.5, (1.0 - at[..., 1]) * height - 0.5
+        left, top = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
+        right_share, low_share = (column - left)[..., None], (row - top)[..., None]
+        columns = [_wrapped(left + i, width, self.wrap[0]) for i in (0, 1)]
+        rows = [_wrapped(top + i, height, self.wrap[1]) for i in (0, 1)]
+        upper = self.pixels[rows[0], columns[0]] * (1 - right_share) + self.pixels[rows[0], columns[1]] * right_share
+        lower = self.pixels[rows[1], columns[0]] * (1 - right_share) + self.pixels[rows[1], columns[1]] * right_share
+        return np.asarray(upper * (1 - low_share) + lower * low_share)
+
+    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
+        array.setflags(write=False)
+        object.__setattr__(self, field, array)
+
+
+def _wrapped(index: npt.NDArray[np.int64], size: int, wrap: Wrap) -> npt.NDArray[np.int64]:
+    return np.clip(index, 0, size - 1) if wrap == "clamp" else index % size
