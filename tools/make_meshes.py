@@ -233,6 +233,55 @@ def bangle() -> Mesh:
     return standing(Mesh(*revolve(section, 176, closed=True)))
 
 
+#: Radius of a candle and height of its rim, in centimetres.
+CANDLE_RADIUS, CANDLE_RIM = 2.4, 7.0
+
+
+def arc(center: tuple[float, float], radius: float, start: float, end: float, points: int) -> Array:
+    """(points, 2): part of a circle, angles in degrees from the axis of the radius."""
+    angle = np.radians(np.linspace(start, end, points))
+    return np.asarray(center) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def candle() -> Mesh:
+    """A pillar candle that has burnt for a while: a round foot, an upright side, a soft rim, and a hollow in the top."""
+    foot, rim = 0.25, 0.35
+    side = np.linspace(foot, CANDLE_RIM - rim, 24)[1:-1]
+    hollow = np.linspace(CANDLE_RADIUS - 2 * rim, 0.0, 18)[1:]
+    depth = 0.8 * (1.0 - (hollow / (CANDLE_RADIUS - 2 * rim)) ** 2) ** 1.5
+    profile = [
+        np.stack([np.linspace(0.0, CANDLE_RADIUS - foot, 10)[:-1], np.zeros(9)], axis=1),
+        arc((CANDLE_RADIUS - foot, foot), foot, -90, 0, 8),
+        np.stack([np.full(len(side), CANDLE_RADIUS), side], axis=1),
+        arc((CANDLE_RADIUS - rim, CANDLE_RIM - rim), rim, 0, 180, 16),
+        np.stack([hollow, CANDLE_RIM - rim - depth], axis=1),
+    ]
+    return turned(np.concatenate(profile), 96)
+
+
+def wick() -> Mesh:
+    """The wick of the candle, from within the wax to the flame."""
+    return turned(np.array([(0.0, 5.7), (0.08, 5.75), (0.08, 6.85), (0.06, 6.95), (0.0, 7.0)]), 16)
+
+
+def flame() -> Mesh:
+    """A drop around the top of the wick, pointed upwards."""
+    share = np.linspace(0.0, 1.0, 40)
+    radius = 0.46 * np.sin(np.pi * share) ** 0.9 * (1.0 - share) ** 0.45 * 1.35
+    radius[[0, -1]] = 0.0
+    return turned(np.stack([radius, 6.6 + 2.7 * share], axis=1), 40)
+
+
+def amber() -> Mesh:
+    """A polished pebble: an ellipsoid that three waves have dented."""
+
+    def field(p: Array) -> Array:
+        waves = np.sin(1.1 * p[..., 0] + 0.6) * np.sin(1.3 * p[..., 1] + 1.1) * np.sin(1.2 * p[..., 2] - 0.4)
+        return ellipsoid((0, 0, 0), (2.6, 1.5, 1.9))(p) + 0.16 * waves
+
+    return standing(implicit_surface(field, (-3.0, -2.0, -2.4), (3.0, 2.0, 2.4), 0.088))
+
+
 #: Radius and height in centimetres of the bowl's inner wall, from its lowest point to the rim.
 BOWL = np.array([
     (0, 9.3), (1.1, 9.5), (2.3, 10.25), (3.35, 11.55), (3.93, 13.2), (3.98, 14.8), (3.72, 16.8), (3.35, 18.7),
@@ -328,6 +377,10 @@ def shapes() -> dict[str, Shape]:
         "goblet.ply": Shape("Wine glass, 1.5 mm wall", "spline profile, revolved", goblet()),
         "wine.ply": Shape("The wine in goblet.ply", "the goblet's inner wall and a level top", wine()),
         "bangle.ply": Shape("Jade bangle", "D-shaped section, revolved", bangle()),
+        "candle.ply": Shape("Pillar candle", "rounded profile, revolved", candle()),
+        "wick.ply": Shape("The wick of candle.ply", "profile, revolved", wick()),
+        "flame.ply": Shape("The flame of candle.ply", "drop, revolved", flame()),
+        "amber.ply": Shape("Polished pebble", "dented ellipsoid, marching cubes", amber()),
         "leaf.ply": Shape("Leaf with texture coordinates, one sheet", "outline, fold and arch on a grid", leaf()),
     }  # fmt: skip
 
@@ -366,8 +419,8 @@ def readme(made: dict[str, Shape]) -> str:
 Small meshes for examples and tests, all made by `tools/make_meshes.py`, which also writes this page: edit that file and
 run it again. They are part of the project and under its MIT licence.
 
-Unit: metre. y is up; each stands on y = 0, but for the wine, which stands in its glass. Binary PLY, positions in
-float32, faces counter-clockwise seen from outside.
+Unit: metre. y is up; each stands on y = 0, but for the wine, which stands in its glass, and for wick and flame, which
+are on their candle. Binary PLY, positions in float32, faces counter-clockwise seen from outside.
 
 | file | what | how made | size in cm (x × y × z) | triangles | closed |
 |---|---|---|---|---|---|

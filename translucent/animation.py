@@ -113,7 +113,8 @@ def _write_with_pillow(path: Path, pictures: Iterator[Pixels], fps: float, **opt
 
     images = (Image.fromarray(picture) for picture in pictures)
     first = next(images)
-    first.save(path, save_all=True, append_images=images, duration=round(1000.0 / fps), loop=0, **options)
+    with path.open("wb") as stream:
+        first.save(stream, save_all=True, append_images=images, duration=round(1000.0 / fps), loop=0, **options)
 
 
 def _write_mp4(path: Path, pictures: Iterator[Pixels], fps: float) -> None:

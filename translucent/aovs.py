@@ -63,7 +63,9 @@ def validity_picture(frame: Frame) -> Pixels:
     pixels = np.zeros((*frame.valid.shape, 3), dtype=np.uint8)
     for color, _, where in classes:
         pixels[where] = color
-    return _with_legend(pixels, [(color, f"{name}: {np.count_nonzero(where)} pixels") for color, name, where in classes])
+    return _with_legend(
+        pixels, [(color, f"{name}: {np.count_nonzero(where)} pixels") for color, name, where in classes]
+    )
 
 
 @lru_cache(maxsize=1)

@@ -70,7 +70,8 @@ def filtered(environment: Environment) -> FilteredEnvironment:
 def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
     """Irradiance by normal as a picture: the integral over all directions of radiance times cosine; made once.
 
-    Its lookups between pixels differ from the integral by less than a thousandth.
+    Its lookups differ from the integral by a thousandth of the contrast, and within 1.4 degrees of a pole, where all
+    that is known are the pixels around it, by a hundredth.
     """
     lobe = np.maximum(_cosines(*IRRADIANCE_SIZE), 0.0)
     return EnvironmentMap(np.pi * _convolved(_sized(source, IRRADIANCE_SIZE), lobe))
@@ -80,10 +81,9 @@ def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
 def _filtered(source: EnvironmentMap) -> FilteredEnvironment:
     pixels, cosines = _sized(source, LEVEL_SIZE), _cosines(*LEVEL_SIZE)
     roughness = np.arange(1, LEVELS + 1) / LEVELS
-    levels = np.stack([_convolved(pixels, ggx_lobe(cosines, alpha)) for alpha in roughness**2])
-    return FilteredEnvironment(
-        source, levels.astype(np.float32), roughness, irradiance_map(source).pixels.astype(np.float32)
-    )
+    with np.errstate(under="ignore"):
+        levels = np.stack([_convolved(pixels, ggx_lobe(cosines, alpha)) for alpha in roughness**2]).astype(np.float32)
+    return FilteredEnvironment(source, levels, roughness, irradiance_map(source).pixels.astype(np.float32))
 
 
 def ggx_lobe(cosine: npt.ArrayLike, alpha: float) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_array
 
 from translucent.errors import InputError, TranslucentWarning
 from translucent.lights import MAX_RADIANCE
@@ -46,13 +47,15 @@ class EnvironmentMap:
             raise InputError("environment image", "its pixels are not numbers", "give an array of floats") from None
         if given.ndim != 3 or given.shape[2] != 3 or given.size == 0:
             raise InputError("environment image", f"shape {given.shape}", "give linear radiance of shape (h, w, 3)")
+        usable, doubts = _usable(given)
+        if usable.shape[1] != 2 * usable.shape[0]:
+            size = f"{usable.shape[1]}x{usable.shape[0]} pixels"
+            doubts.append(f"{size}: a picture of all directions is twice as wide as high, so this one is stretched")
+        for doubt in doubts:
+            # The caller of tl.Environment.image, past this function, the constructor and `image`.
+            warnings.warn(f"environment image: {doubt}", TranslucentWarning, stacklevel=4)
         with np.errstate(under="ignore"):
-            pixels = np.ascontiguousarray(_usable(given), dtype=np.float32)
-        if pixels.shape[1] != 2 * pixels.shape[0]:
-            _warn(
-                f"environment image of {pixels.shape[1]}x{pixels.shape[0]} pixels: an equirectangular picture of all "
-                "directions is twice as wide as high; it is stretched over them"
-            )
+            pixels = np.ascontiguousarray(usable, dtype=np.float32)
         pixels.setflags(write=False)
         object.__setattr__(self, "pixels", pixels)
 
@@ -94,11 +97,13 @@ class EnvironmentMap:
 
         The integral over all directions stays what it is.
         """
-        rows = _overlaps(-np.cos(np.linspace(0, np.pi, self.size[1] + 1)), -np.cos(np.linspace(0, np.pi, height + 1)))
-        columns = _overlaps(np.linspace(0, 1, self.size[0] + 1), np.linspace(0, 1, width + 1))
+        own_height, own_width = self.pixels.shape[:2]
+        rows = _overlaps(-np.cos(np.linspace(0, np.pi, own_height + 1)), -np.cos(np.linspace(0, np.pi, height + 1)))
+        columns = _overlaps(np.linspace(0, 1, own_width + 1), np.linspace(0, 1, width + 1))
         with np.errstate(under="ignore"):
-            narrowed = np.einsum("xj,ijc->ixc", columns, self.pixels, optimize=True)
-            return np.asarray(np.einsum("yi,ixc->yxc", rows, narrowed, optimize=True))
+            # Most of these shares are 0, and in a large picture rows are by far the most work.
+            lower = (csr_array(rows) @ self.pixels.reshape(own_height, -1)).reshape(height, own_width, 3)
+            return np.asarray(np.einsum("xj,yjc->yxc", columns, lower, optimize=True))
 
 
 def row_solid_angles(height: int, width: int) -> Array:
@@ -133,24 +138,18 @@ def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], share: Array) -> Arr
     return np.asarray(first * (1.0 - share) + second * share)
 
 
-def _usable(given: Array) -> Array:
-    unknown, negative = ~np.isfinite(given), given < 0
+def _usable(given: Array) -> tuple[Array, list[str]]:
+    """The pixels with all that is no radiance replaced, and what was replaced, in words."""
+    unknown, negative, high = ~np.isfinite(given), given < 0, given > MAX_RADIANCE
     wrong = unknown | negative
     if wrong.all():
         raise InputError("environment image", "no pixel holds a finite radiance of 0 or above", "check how it was made")
-    high = (given > MAX_RADIANCE) & ~unknown
+    count, doubts = given.shape[0] * given.shape[1], []
     for what, where, become in (
         ("not finite", unknown, "0"),
         ("below 0", negative & ~unknown, "0"),
-        (f"above {MAX_RADIANCE:g}", high, "that"),
+        (f"above {MAX_RADIANCE:g}", high & ~unknown, "that"),
     ):
-        if count := int(np.count_nonzero(where.any(axis=2))):
-            _warn(
-                f"environment image: {count} of {given.shape[0] * given.shape[1]} pixels are {what}, taken as {become}"
-            )
-    return np.minimum(np.where(wrong, 0.0, given), MAX_RADIANCE)
-
-
-def _warn(message: str) -> None:
-    # The caller of tl.Environment.image: past this function, __post_init__, __init__ and the constructor.
-    warnings.warn(message, TranslucentWarning, stacklevel=5)
+        if found := int(np.count_nonzero(where.any(axis=2))):
+            doubts.append(f"{found} of {count} pixels are {what}, taken as {become}")
+    return np.minimum(np.where(wrong, 0.0, given), MAX_RADIANCE), doubts

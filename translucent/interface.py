@@ -157,6 +157,7 @@ def refraction_angle_ratio(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> A
     return np.where(sine > 0.0, inside / np.where(sine > 0.0, np.arctan2(sine, c), 1.0), 1.0 / n)
 
 
+@np.errstate(under="ignore")
 def wyman_distance(
     cos_incident: npt.ArrayLike, ior: npt.ArrayLike, view_distance: npt.ArrayLike, normal_distance: npt.ArrayLike
 ) -> Array:

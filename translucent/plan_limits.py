@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.medium import Medium
 from translucent.scene import Object, Scene
 from translucent.thickness import Method, ThinLayer
 
@@ -90,7 +89,7 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
     scatters : bool
         The plan has light scattered into the rays.
     borders : bool
-        The plan has what the borders of bodies do to light.
+        The plan has what the borders of bodies and the surfaces of opaque objects do to light.
     """
     media = [body.medium for body in scene.bodies if body.medium is not None]
     effects = []
@@ -113,8 +112,11 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
         )
     elif bent:
         effects.append("refraction and reflection: rays go straight, though borders bend and mirror them")
-    if clear := [body.mesh.name for body in scene.bodies if body.medium is not None and _clear(body.medium)]:
+    if clear := [body.mesh.name for body in scene.bodies if _is_invisible(body)]:
         effects.append(f"{', '.join(map(repr, clear))}: invisible, since nothing in it absorbs, scatters or emits")
+    if not borders and (finished := [item.mesh.name for item in scene.opaque if item.surface is not None]):
+        names = ", ".join(map(repr, finished))
+        effects.append(f"surfaces of opaque objects: {names} reflect diffusely, in one color each")
     if scene.opaque:
         effects.append("shadows: light reaches opaque objects through everything")
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
@@ -122,8 +124,9 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
     return tuple(effects)
 
 
-def _clear(medium: Medium) -> bool:
-    return not (medium.extinction > 0).any() and not medium.emits
+def _is_invisible(body: Object) -> bool:
+    medium = body.medium
+    return medium is not None and not body.has_interface and not (medium.extinction > 0).any() and not medium.emits
 
 
 def _is_sheet(body: Object, method: Method) -> bool:

@@ -42,7 +42,7 @@ void main() {
     if (axial < axial_start) { discard; }  // behind an orthographic picture
     float place = axial * place_scale + place_start;
     ivec2 texel = ivec2(gl_FragCoord.xy);
-#if OPAQUE
+#if OPAQUE && !BACK
     if (place > texelFetch(opaque_place, texel, 0).r) { discard; }
 #endif
 #if EXITS

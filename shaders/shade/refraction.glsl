@@ -9,6 +9,7 @@ uniform sampler2D left;         // first border away from it beyond
 const int EXIT_STEPS = 16;
 const int EXIT_HALVINGS = 6;
 const int OPAQUE_STEPS = 16;
+const int OPAQUE_HALVINGS = 5;
 
 // Point at a place on the ray through a pixel.
 vec3 point_at(vec2 pixel, float place) {
@@ -42,18 +43,30 @@ ivec2 stored(ivec2 texel) {
     return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
 }
 
+// Place where the first interval of a pixel ends: on the far border, or on an opaque surface inside.
+float end_of_interval(ivec2 texel) {
+    float last = texelFetch(left, texel, 0).w;
+#if OPAQUE
+    return min(last, texelFetch(opaque_place, texel, 0).r);
+#else
+    return last;
+#endif
+}
+
 bool is_inside(vec3 point) {
     vec3 seen = seen_at(point);
     if (!in_picture(seen.xy)) { return false; }
     ivec2 texel = stored(texel_of(seen.xy));
     float first = texelFetch(entered, texel, 0).w;
-    float last = texelFetch(left, texel, 0).w;
+    float last = end_of_interval(texel);
     return last < NOTHING && seen.z <= last && (first > last || seen.z >= first);
 }
 
 struct Exit {
-    float path;   // metres inside
-    vec3 normal;  // unit, to the side that the light comes from
+    float path;    // metres inside
+    vec3 normal;   // unit, to the side that the light comes from
+    bool stopped;  // on an opaque surface,
+    vec3 stop;     // whose radiance is this
 };
 
 // Where a ray inside the body leaves it: the first of equal steps outside, halved down, then where the ray meets the
@@ -77,7 +90,14 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
     vec3 seen = seen_at(origin + inside * direction);
     ivec2 texel = texel_of(seen.xy);
     vec4 border = texelFetch(left, stored(texel), 0);
-    Exit result = Exit(0.5 * (inside + outside), fallback_normal);
+    Exit result = Exit(0.5 * (inside + outside), fallback_normal, false, vec3(0.0));
+#if OPAQUE
+    result.stopped = in_picture(seen.xy) && end_of_interval(stored(texel)) < border.w;
+    if (result.stopped) {
+        result.stop = texelFetch(opaque_radiance, stored(texel), 0).rgb;
+        return result;
+    }
+#endif
     if (!in_picture(seen.xy) || border.w >= NOTHING) { return result; }
     result.normal = dot(border.xyz, direction) > 0.0 ? -border.xyz : border.xyz;
     vec3 on_border = point_at(vec2(texel) + 0.5 + frame_size.zw, border.w);
@@ -112,7 +132,27 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
 #endif
 }
 
+#if OPAQUE
+// Opaque surfaces around a point of the picture, and how much of it they fill. width: of the blur, in pixels.
+vec4 blurred_opaque(vec2 pixel, float width) {
+    vec2 at = (pixel - frame_size.zw) / frame_size.xy;
+    at.y = 1.0 - at.y;  // stored with row 0 at the bottom
+    // Four squares of half the width, so that the steps between the texels of a coarse level do not show.
+    vec2 aside = 0.25 * width / frame_size.xy;
+    float level = max(log2(0.5 * width), 0.0);
+    return 0.25 * (textureLod(opaque_radiance, at + aside, level) + textureLod(opaque_radiance, at - aside, level)
+        + textureLod(opaque_radiance, at + vec2(aside.x, -aside.y), level)
+        + textureLod(opaque_radiance, at + vec2(-aside.x, aside.y), level));
+}
+
+bool is_behind_opaque(vec3 seen) {
+    float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
+    return place < NOTHING && seen.z >= place;
+}
+#endif
+
 // What a ray that has left a body meets: opaque surfaces as far as the picture shows them, else the environment.
+// roughness: that of a mirror with the same blur.
 vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
 #if OPAQUE
     float before = 0.0;
@@ -123,7 +163,17 @@ vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
         if (!in_picture(seen.xy)) { break; }
         float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
         if (place < NOTHING && seen.z >= place && (seen.z - place) * surface_ahead.y <= 2.0 * (path - before)) {
-            return texelFetch(opaque_radiance, stored(texel_of(seen.xy)), 0).rgb;
+            for (int half_way = 0; half_way < OPAQUE_HALVINGS; ++half_way) {
+                float middle = 0.5 * (before + path);
+                if (is_behind_opaque(seen_at(point + middle * direction))) { path = middle; } else { before = middle; }
+            }
+            seen = seen_at(point + path * direction);
+            if (roughness == 0.0) { return texelFetch(opaque_radiance, stored(texel_of(seen.xy)), 0).rgb; }
+            // Half of the light is within twice the angle of a microfacet, whose tangent is the roughness squared.
+            float spread = surface_right.w == 1.0 ? dot(point + path * direction, ray_forward.xyz) + surface_ahead.z : 1.0;
+            float pixel = 2.0 * length(surface_up.xyz) * spread / frame_size.y;
+            vec4 blurred = blurred_opaque(seen.xy, 4.0 * roughness * roughness * path / max(pixel, 1e-30));
+            return blurred.rgb + (1.0 - blurred.a) * environment_beyond(point, direction, roughness);
         }
         before = path;
     }

@@ -33,6 +33,7 @@ struct Finish {
     float dispersion;
     bool is_sheet;
     bool scatters_much;   // show what is scattered more than once
+    vec3 sheet_depth;     // optical depth straight through a sheet
     vec3 diffuse_transmission;
     vec3 stream_absorption;
     vec3 stream_scattering;
@@ -48,7 +49,7 @@ Finish finish_of(int object) {
     vec4 c = texelFetch(surface_table, ivec2(2, object), 0);
     vec4 d = texelFetch(surface_table, ivec2(3, object), 0);
     vec4 e = texelFetch(surface_table, ivec2(4, object), 0);
-    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, c.rgb, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
+    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
 }
 
 // Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -152,11 +153,15 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     Crossing result;
     result.thickness = max(straight.thickness + leaving.path - straight.first_interval, 0.0);
     result.passed = transmittance(straight.optical_depth * (result.thickness / max(straight.thickness, 1e-30)));
+    if (leaving.stopped) {
+        result.light = leaving.stop * result.passed;
+        return result;
+    }
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
     float kept = border_reflectance(cosine, 1.0 / ior, 0.0);
     float blur = refraction_roughness(finish.roughness, ior);
-    // What the far border keeps inside leaves after more crossings: seen where it is mirrored to.
-    result.light = kept * environment_light(reflected_direction(inside, leaving.normal), blur);
+    // What the far border keeps inside leaves after at least one more crossing: seen where it is mirrored to.
+    result.light = kept * result.passed * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
     if (kept < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
     result.light *= result.passed;
@@ -208,16 +213,24 @@ void main() {
     vec3 point = point_at(pixel, place);
     float cosine = clamp(-dot(normal, ray), 0.0, 1.0);
     float reflectance = starts_inside ? 0.0 : border_reflectance(cosine, finish.ior, finish.roughness);
-    if (finish.is_sheet) { reflectance = 2.0 * reflectance / (1.0 + reflectance); }
+    vec3 mirrored_share = vec3(reflectance);
+    vec3 entered_share = vec3(1.0 - reflectance);
+    if (finish.is_sheet) {
+        // All reflections between its two sides; what one passage absorbs is in the optical depth already.
+        vec3 passage = finish.sheet_depth / max(refracted_cosine(cosine, finish.ior), MIN_THIN_LAYER_COSINE);
+        vec3 back_and_forth = reflectance * transmittance(passage);
+        mirrored_share = slab_reflectance(reflectance, passage);
+        entered_share = (1.0 - reflectance) * (1.0 - reflectance) / max(1.0 - back_and_forth * back_and_forth, 1e-6);
+    }
     vec3 mirrored = vec3(0.0);
     if (reflectance > 0.0) {
-        mirrored = reflectance * environment_light(reflected_direction(ray, normal), finish.roughness)
+        mirrored = mirrored_share * environment_light(reflected_direction(ray, normal), finish.roughness)
             + highlights(point, normal, ray, finish.ior, finish.roughness) * (finish.is_sheet ? 2.0 : 1.0);
     }
 
     vec3 light = vec3(0.0);
     if (finish.transmission > 0.0) {
-        float first_interval = back.w < NOTHING ? (back.w - place) * surface_ahead.y * advance : -1.0;
+        float first_interval = back.w < NOTHING ? (end_of_interval(texel) - place) * surface_ahead.y * advance : -1.0;
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;
         if (finish.scatters_much) { light += scattered_out(finish, point, normal, crossing.thickness, crossing.passed); }
@@ -226,5 +239,5 @@ void main() {
     if (finish.transmission < 1.0 && !starts_inside) {
         light += (1.0 - finish.transmission) * paint(finish, point, normal);
     }
-    out_radiance = vec4(min(mirrored + (1.0 - reflectance) * (light + emitted), vec3(NOTHING)), 1.0);
+    out_radiance = vec4(min(mirrored + entered_share * (light + emitted), vec3(NOTHING)), 1.0);
 }

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 
 from translucent.camera import Camera
-from translucent.lights import Environment
+from translucent.environment import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.reference import render

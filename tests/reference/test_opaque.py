@@ -10,7 +10,8 @@ import numpy.typing as npt
 import pytest
 
 from translucent.camera import Camera
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.environment import Environment
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.reference import SHEET_ON_OPAQUE, hit_counts, render

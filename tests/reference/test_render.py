@@ -11,9 +11,9 @@ import pytest
 
 from translucent import optics
 from translucent.camera import Camera
+from translucent.environment import Environment
 from translucent.errors import InputError
 from translucent.frame import ARRAYS
-from translucent.lights import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.reference import hit_counts, line_hits, pixel_rays, render, shade_hits

@@ -13,8 +13,9 @@ import pytest
 from translucent import optics
 from translucent.camera import Camera
 from translucent.density import Density, DensityGrid, ExponentialDensity, LinearDensity
+from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.reference import blending, march, render
 from translucent.reference.equiangular import equiangular

@@ -14,7 +14,8 @@ import pytest
 import trimesh
 
 from translucent.camera import Camera
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.environment import Environment
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.reference import path_trace, render

@@ -12,8 +12,9 @@ import pytest
 from translucent import optics
 from translucent.camera import Camera
 from translucent.density import Density, DensityGrid, LinearDensity
+from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.reference import path_trace, render

@@ -53,6 +53,7 @@ def test_lookups_hit_pixel_centers_wrap_around_and_stop_at_the_poles() -> None:
     np.testing.assert_allclose(environment.lighting(texel_directions(8, 16)), pixels, rtol=1e-12)
     half_way = environment.map.at((0.0, 3.5 / 8))  # the seam is half way between the last column and the first
     assert half_way == pytest.approx(0.5 * (pixels[3, 0].astype(float) + pixels[3, 15]), rel=1e-12)
+    assert environment.map.at((1.0, 3.5 / 8)) == pytest.approx(half_way, rel=1e-12)
     at_pole = environment.map.at(((2 + 0.5) / 16, 0.0))
     assert at_pole == pytest.approx(pixels[0, 2], rel=1e-12)
 
@@ -129,7 +130,7 @@ def test_a_picture_too_bright_is_limited() -> None:
 
 
 def test_a_picture_of_another_shape_is_stretched_with_a_warning() -> None:
-    with pytest.warns(tl.TranslucentWarning, match="environment image of 8x8 pixels: .* twice as wide as high"):
+    with pytest.warns(tl.TranslucentWarning, match="environment image: 8x8 pixels: .* twice as wide as high"):
         tl.Environment.image(np.ones((8, 8, 3)))
 
 

@@ -71,7 +71,9 @@ def test_rows_by_channel(tmp_path: Path) -> None:
 
 def test_literal_bytes_by_channel(tmp_path: Path) -> None:
     pixels = stored(1, 9)
-    data = bytes((2, 2, 0, 9)) + b"".join(bytes((4,)) + c[:4].tobytes() + b"\x05" + c[4:].tobytes() for c in pixels[0].T)
+    data = bytes((2, 2, 0, 9)) + b"".join(
+        bytes((4,)) + c[:4].tobytes() + b"\x05" + c[4:].tobytes() for c in pixels[0].T
+    )
     np.testing.assert_array_equal(read(tmp_path, HEAD + size(1, 9) + data), exact(pixels))
 
 
@@ -121,7 +123,7 @@ BROKEN = {
     "few pixels": (HEAD + size(2, 4) + stored(1, 4).tobytes(), "it ends after 4 of 8 pixels"),
     "a repetition first": (HEAD + size(1, 4) + bytes((1, 1, 1, 4)), "it repeats a pixel that it does not have"),
     "a missing row": (HEAD + size(4, 9) + by_channel(stored(3, 9)), "row 3 of 4 is missing"),
-    "half a row": (HEAD + size(3, 9) + by_channel(stored(3, 9))[:-3], "it ends or is broken in row 2 of 3"),
+    "half a row": (HEAD + size(3, 9) + by_channel(stored(3, 9))[:-3], "it ends in row 2 of 3"),
     "half a run": (HEAD + size(1, 9) + bytes((2, 2, 0, 9, 137)), "it ends in row 0 of 1"),
     "too long a run": (HEAD + size(1, 9) + bytes((2, 2, 0, 9)) + bytes((200, 7)) * 9, "row 0 of 1 is too long"),
     "an empty literal": (HEAD + size(1, 9) + bytes((2, 2, 0, 9, 0, 0, 0)), "it ends or is broken in row 0"),

@@ -49,6 +49,22 @@ def number(file: GltfFile, where: str, holder: Json, key: str, default: float | 
     return float(value)
 
 
+def share(file: GltfFile, where: str, holder: Json, key: str, default: float) -> float:
+    """A number of `holder` in 0..1; raises `InputError` if it is none."""
+    value = number(file, where, holder, key, default)
+    if not 0 <= value <= 1:
+        raise refused(file, f"{where}: {key} {value:g} is not in 0..1", "mend the file")
+    return value
+
+
+def shares(file: GltfFile, where: str, holder: Json, key: str, default: tuple[float, ...]) -> Array:
+    """As many numbers in 0..1 as the default has; raises `InputError` if they are others."""
+    values = numbers(file, where, holder, key, default)
+    if not ((values >= 0) & (values <= 1)).all():
+        raise refused(file, f"{where}: {key} {values.tolist()} is not in 0..1", "mend the file")
+    return values
+
+
 def whole(file: GltfFile, where: str, holder: Json, key: str, default: int | None = None) -> int:
     """A whole number of 0 or more of `holder`; raises `InputError` if it is none."""
     value = holder.get(key, default)

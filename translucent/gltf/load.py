@@ -10,15 +10,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from translucent.environment import Environment
 from translucent.errors import InputError, TranslucentWarning
 from translucent.gltf.cameras import scene_camera
 from translucent.gltf.fields import label, refused
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.lights import LIGHTS, scene_lights
 from translucent.gltf.objects import scene_objects
-from translucent.materials.gltf import EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
+from translucent.gltf.surfaces import DIFFUSE_TRANSMISSION, UNLIT
+from translucent.materials.gltf import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
 from translucent.materials.gltf_file import GltfFile, read_gltf
 from translucent.materials.gltf_scene import node_transforms
+from translucent.materials.gltf_texture import TEXTURE_TRANSFORM
 from translucent.mesh import MAX_COORDINATE
 from translucent.scene import Scene
 from translucent.showcase import LIGHT_TABLE, framing
@@ -29,7 +32,18 @@ Array = npt.NDArray[np.float64]
 SUFFIXES = (".glb", ".gltf")
 
 #: Extensions that are read; what of them a scene cannot hold is told one by one.
-_READ = (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, LIGHTS, "KHR_mesh_quantization")
+_READ = (
+    TRANSMISSION,
+    VOLUME,
+    IOR,
+    DISPERSION,
+    DIFFUSE_TRANSMISSION,
+    EMISSIVE_STRENGTH,
+    UNLIT,
+    TEXTURE_TRANSFORM,
+    LIGHTS,
+    "KHR_mesh_quantization",
+)
 #: A file that requires these can be read without them: they change how surfaces and textures look.
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_")
 _COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -69,7 +83,8 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
     GltfScene
         One object per node and primitive. Nodes that share a mesh share it here, too; a mesh has its node's name, and a
         shared one its own. Meshes are welded and wound as by `load_mesh`. What materials make of objects says
-        `translucent.gltf.surfaces`; the environment, which glTF does not have, is that of `showcase`.
+        `translucent.gltf.surfaces`. The environment, which glTF does not have, is `Environment.studio`, or that of
+        `showcase` in a file without materials.
         `left_out` lists what the scene does not hold, and a `TranslucentWarning` tells it.
 
     Raises
@@ -92,7 +107,10 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
             left_out.add(key, f"{len(file.items(key))}")
     if lost := left_out.lines():
         warnings.warn(f"scene {file.path.name!r}: left out: {'; '.join(lost)}", TranslucentWarning, stacklevel=2)
-    return GltfScene(objects, view, lights, LIGHT_TABLE, left_out=lost)
+    # Surfaces mirror what is around them: that should be more than a gradient.
+    polished = any(item.surface is not None for item in objects)
+    environment = Environment.studio() if polished else LIGHT_TABLE
+    return GltfScene(objects, view, lights, environment, left_out=lost)
 
 
 def _read(path: str | Path) -> GltfFile:

@@ -12,16 +12,20 @@ from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import label, refused
 from translucent.gltf.geometry import primitive_mesh
 from translucent.gltf.left_out import LeftOut
-from translucent.gltf.surfaces import Surface, surface_reader
+from translucent.gltf.surfaces import Finish, finish_reader
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.materials.gltf_scene import primitives
 from translucent.mesh import MIN_DIAGONAL, Mesh
 from translucent.scene import Object
+from translucent.surface import Surface
 
 Array = npt.NDArray[np.float64]
 
 #: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
 WALL_SHARE = 1e-5
+
+#: Share of metal in a texture beyond which it is no noise.
+_METAL = 0.1
 
 
 def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Object]:
@@ -42,26 +46,54 @@ def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, l
     InputError
         If there is no object, or something about one is wrong.
     """
-    surface_of = surface_reader(file, metres, left_out)
+    finish_of = finish_reader(file, metres, left_out)
     scale = np.diag([metres, metres, metres, 1.0])
     objects: list[Object] = []
-    surfaces: list[Surface] = []
+    finishes: list[Finish] = []
     for mesh, material, node in _placed_meshes(file, transforms, left_out):
-        surface = surface_of(material)
-        objects.append(Object(mesh, None, scale @ transforms[node], color=surface.color))
-        surfaces.append(surface)
+        finish = finish_of(material)
+        if finish.hidden:
+            left_out.add("objects hidden by their alpha", repr(mesh.name))
+            continue
+        surface = _fitting(finish.surface, mesh, left_out)
+        if surface is not None and finish.translucent and _has_metal(surface, mesh):
+            left_out.add("metal parts of translucent objects", repr(mesh.name))
+        objects.append(Object(mesh, None, scale @ transforms[node], color=finish.color, surface=surface))
+        finishes.append(finish)
     if not objects:
         raise refused(file, "its scene has no triangles", "give a file with a mesh")
     boxes = np.stack([item.bounds for item in objects])
     diagonal = float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
     wall = max(WALL_SHARE * diagonal, MIN_DIAGONAL)
-    return [_with_medium(item, surface, wall) for item, surface in zip(objects, surfaces, strict=True)]
+    return [_with_medium(item, finish, wall) for item, finish in zip(objects, finishes, strict=True)]
 
 
-def _with_medium(item: Object, surface: Surface, wall: float) -> Object:
-    if surface.wall_ior is not None:
-        return dataclasses.replace(item, medium=surface.wall_medium(wall), sheet_thickness=wall)
-    return dataclasses.replace(item, medium=surface.medium)
+def _with_medium(item: Object, finish: Finish, wall: float) -> Object:
+    if finish.wall_ior is not None:
+        return dataclasses.replace(item, medium=finish.wall_medium(wall), sheet_thickness=wall)
+    return dataclasses.replace(item, medium=finish.medium)
+
+
+def _fitting(surface: Surface | None, mesh: Mesh, left_out: LeftOut) -> Surface | None:
+    """The surface, without its textures if the mesh has no coordinates for them."""
+    if surface is None or mesh.uv is not None or not any(surface.textures):
+        return surface
+    left_out.add("textures of meshes without TEXCOORD_0", repr(mesh.name))
+    return dataclasses.replace(
+        surface,
+        color_texture=None,
+        roughness_texture=None,
+        transmission_texture=None,
+        normal_texture=None,
+        emissive_texture=None,
+    )
+
+
+def _has_metal(surface: Surface, mesh: Mesh) -> bool:
+    """Whether a vertex is on metal. A metallicFactor alone is not looked at: its default is 1, and glass is no metal."""
+    if surface.metallic == 0 or surface.roughness_texture is None or mesh.uv is None:
+        return False
+    return bool((surface.roughness_texture.sample(mesh.uv)[:, 2] > _METAL).any())
 
 
 def _placed_meshes(

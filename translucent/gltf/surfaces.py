@@ -5,19 +5,26 @@ material                                           object
 =================================================  ==================================================================
 transmissionFactor > 0 and thicknessFactor > 0     body: the medium of attenuationColor at attenuationDistance, and
                                                    the ior; its thickness is the true one of the mesh, along each
-                                                   ray, and thicknessFactor and thicknessTexture are not needed
+                                                   ray, and thicknessFactor and thicknessTexture are not needed. Its
+                                                   surface is tinted by baseColorFactor, once
+diffuseTransmissionFactor > 0 and a volume         body, too: what is not transmitted is paint that light passes
 transmissionFactor > 0, no volume or thickness 0   thin wall: a sheet without an inside, which light crosses once per
                                                    face, tinted by baseColorFactor. It is infinitely thin by the
-                                                   specification; here a sheet that hardly adds to the thickness
-everything else                                    opaque: reflects baseColorFactor diffusely. A volume alone, or with
-                                                   transmissionFactor 0, lets no light in
+                                                   specification; here a pane that hardly adds to the thickness
+everything else                                    opaque: metal, or a coat over paint, that may glow, may have holes,
+                                                   and may let light of the other side through. A volume alone, or
+                                                   with transmissionFactor 0, lets no light in
+KHR_materials_unlit                                opaque: has its base color everywhere, and mirrors nothing
 =================================================  ==================================================================
 
 The tint of a wall is that of a straight view. A slanted view has it deeper, as in a pane with the wall's ior: at most
-by the 1.34th power with the ior of 1.5 that materials have by default.
+by the 1.34th power with the ior of 1.5 that materials have by default. A wall that transmits only a share of the light
+has its tint whatever the view, like its paint.
 
-Metal, roughness, normal maps and occlusion are not read: surfaces do not reflect or blur here.
-Source: glTF 2.0, section 3.9, KHR_materials_transmission (infinitely thin) and KHR_materials_volume.
+Of all that, textures are read as far as `translucent.gltf.images` does; normals are those of the mesh, smooth but at
+creases, and not the file's. What of a material has no meaning here is told by `LeftOut`.
+Source: glTF 2.0, section 3.9, and the extensions KHR_materials_transmission (infinitely thin), _volume, _ior,
+_dispersion, _diffuse_transmission, _emissive_strength and _unlit.
 """
 
 from __future__ import annotations
@@ -29,22 +36,24 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from translucent.gltf.fields import extension, label, number, numbers, refused, section
+from translucent.gltf.fields import extension, label, number, refused, section, share, shares
+from translucent.gltf.images import Textures
 from translucent.gltf.left_out import LeftOut
 from translucent.materials.color_distance import extinction_at
 from translucent.materials.gltf import DEFAULT_IOR, TRANSMISSION, GltfMaterial, materials_of
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.medium import Medium
 from translucent.scene import OPAQUE_COLOR
+from translucent.surface import MAX_DISPERSION, Surface
 
 Array = npt.NDArray[np.float64]
 
-#: Lets light into a volume, too, spread by the surface; here it passes straight.
-_DIFFUSE = "KHR_materials_diffuse_transmission"
+DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
+UNLIT = "KHR_materials_unlit"
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Finish:
     """What an object of a material is.
 
     Attributes
@@ -55,19 +64,32 @@ class Surface:
         What fills a body.
     wall_ior : float or None
         Index of refraction of a thin wall; None if it is none.
+    surface : Surface or None
+        What its border does to light; None for an object without a material.
+    hidden : bool
+        Whether its alpha makes it one hole.
     """
 
     color: npt.ArrayLike = OPAQUE_COLOR
     medium: Medium | None = None
     wall_ior: float | None = None
+    surface: Surface | None = None
+    hidden: bool = False
+
+    @property
+    def translucent(self) -> bool:
+        """Whether light passes it."""
+        return self.medium is not None or self.wall_ior is not None
 
     def wall_medium(self, thickness: float) -> Medium:
         """The medium that tints like the wall when it fills a sheet of this thickness in metres."""
-        return Medium(absorption=extinction_at(self.color, thickness), ior=self.wall_ior or DEFAULT_IOR)
+        tints = self.surface is None or (np.asarray(self.surface.color) == 1).all()
+        color = self.color if tints else np.ones(3)
+        return Medium(absorption=extinction_at(color, thickness), ior=self.wall_ior or DEFAULT_IOR)
 
 
-def surface_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[[int | None], Surface]:
-    """A function from the index of a material to its surface, each read once; None is that of no material.
+def finish_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[[int | None], Finish]:
+    """A function from the index of a material to what its objects are, each read once; None is that of no material.
 
     Parameters
     ----------
@@ -75,50 +97,127 @@ def surface_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable
     metres : float
         Per unit of the file, in which attenuation distances are.
     left_out : LeftOut
-        Gets what the surfaces do not hold.
+        Gets what the objects do not hold.
     """
     materials, entries = materials_of(file), file.items("materials")
+    textures = Textures(file, left_out)
 
     @cache
-    def read(index: int | None) -> Surface:
+    def read(index: int | None) -> Finish:
         if index is None:
-            return Surface()
+            return Finish()
         name = label(entries, index)
-        surface = _surface(file, f"material {name}", materials[index], entries[index], metres)
-        _note_losses(file, name, surface, materials[index], entries[index], left_out)
-        return surface
+        return _Reader(file, name, materials[index], entries[index], textures, left_out).finish(metres)
 
     return read
 
 
-def _surface(file: GltfFile, where: str, material: GltfMaterial, entry: Json, metres: float) -> Surface:
-    color = numbers(file, where, _base(file, where, entry), "baseColorFactor", (1.0, 1.0, 1.0, 1.0))[:3]
-    if not ((color >= 0) & (color <= 1)).all():
-        raise refused(file, f"{where}: baseColorFactor {color.tolist()} is not in 0..1", "mend the file")
-    diffuse = number(file, where, extension(file, where, entry, _DIFFUSE), "diffuseTransmissionFactor", 0.0)
-    if (medium := material.medium()) is not None and (material.transmission > 0 or diffuse > 0):
-        return Surface(color, Medium(absorption=medium.extinction / metres, ior=medium.ior))
-    return Surface(color, wall_ior=(material.ior or DEFAULT_IOR) if material.transmission > 0 else None)
+class _Reader:
+    """One material, as its file has it."""
 
+    def __init__(
+        self, file: GltfFile, name: str, material: GltfMaterial, entry: Json, textures: Textures, left_out: LeftOut
+    ) -> None:
+        self.file, self.name, self.material, self.entry = file, name, material, entry
+        self.textures, self.left_out = textures, left_out
+        self.where = f"material {name}"
+        self.base = section(file, self.where, entry, "pbrMetallicRoughness")
+        self.base_color = shares(file, self.where, self.base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
 
-def _base(file: GltfFile, where: str, entry: Json) -> Json:
-    return section(file, where, entry, "pbrMetallicRoughness")
+    def finish(self, metres: float) -> Finish:
+        """What its objects are; `metres` are per unit of the file."""
+        color, diffuse = self.base_color[:3], self._extension(DIFFUSE_TRANSMISSION)
+        passes = share(self.file, self.where, diffuse, "diffuseTransmissionFactor", 0.0) > 0
+        medium, transmission = self.material.medium(), self.material.transmission
+        if UNLIT in section(self.file, self.where, self.entry, "extensions"):
+            return Finish(color, surface=self._unlit(), hidden=self._hidden())
+        self._note("occlusionTexture", "occlusion textures")
+        if medium is not None and (transmission > 0 or passes):
+            medium = Medium(absorption=medium.extinction / metres, ior=medium.ior)
+            return Finish(color, medium, surface=self._translucent(color))
+        if transmission > 0:
+            whole = transmission == 1 and "transmissionTexture" not in self._extension(TRANSMISSION)
+            surface = self._translucent(np.ones(3) if whole else color)
+            return Finish(color, wall_ior=self.material.ior or DEFAULT_IOR, surface=surface)
+        return Finish(color, surface=self._opaque(), hidden=self._hidden())
 
+    def _opaque(self) -> Surface:
+        return Surface(
+            metallic=self._metallic(),
+            color=self.base_color[:3],
+            ior=self.material.ior or DEFAULT_IOR,
+            emissive=self.material.emissive,
+            emissive_texture=self.textures.read(self.name, self.entry, "emissiveTexture", srgb=True),
+            **self._common(),
+            **self._sides(),
+        )
 
-def _note_losses(
-    file: GltfFile, name: str, surface: Surface, material: GltfMaterial, entry: Json, left_out: LeftOut
-) -> None:
-    if "baseColorTexture" in _base(file, name, entry):
-        left_out.add("base color textures", name)
-    if any(material.emissive):
-        left_out.add("glowing surfaces", name)
-    if (mode := entry.get("alphaMode", "OPAQUE")) != "OPAQUE":
-        left_out.add(f"transparency by alphaMode {mode}", name)
-    if surface.medium is not None and (np.asarray(surface.color) != 1).any():
-        left_out.add("tints of the surfaces of bodies (baseColorFactor)", name)
-    if surface.medium is not None and material.transmission == 0:
-        left_out.add("diffuse transmission, drawn as clear", name)
-    if 0 < material.transmission < 1:
-        left_out.add("transmissionFactor below 1, drawn as 1", name)
-    if material.transmission > 0 and "transmissionTexture" in extension(file, name, entry, TRANSMISSION):
-        left_out.add("transmission textures", name)
+    def _unlit(self) -> Surface:
+        texture = self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
+        color = self.base_color[:3]
+        return Surface(
+            color=(0.0, 0.0, 0.0), ior=1.0, emissive=color, emissive_texture=texture, color_texture=texture, **self._sides()
+        )
+
+    def _translucent(self, color: Array) -> Surface:
+        if (mode := self.entry.get("alphaMode", "OPAQUE")) != "OPAQUE":
+            self.left_out.add(f"transparency by alphaMode {mode}", self.name)
+        if any(self.material.emissive):
+            self.left_out.add("glowing surfaces of translucent objects", self.name)
+        if (dispersion := self.material.dispersion) > MAX_DISPERSION:
+            self.left_out.add(f"dispersion above {MAX_DISPERSION:g}", self.name)
+        return Surface(
+            color=color,
+            transmission=self.material.transmission,
+            transmission_texture=self.textures.read(self.name, self._extension(TRANSMISSION), "transmissionTexture"),
+            dispersion=min(dispersion, MAX_DISPERSION),
+            metallic=self._metallic(),
+            **self._common(),
+        )
+
+    def _metallic(self) -> float:
+        return share(self.file, self.where, self.base, "metallicFactor", 1.0)
+
+    def _common(self) -> dict[str, object]:
+        """What surfaces of any kind of object have."""
+        file, where, diffuse = self.file, self.where, self._extension(DIFFUSE_TRANSMISSION)
+        for key in ("diffuseTransmissionTexture", "diffuseTransmissionColorTexture"):
+            if key in diffuse:
+                self.left_out.add("textures of diffuse transmission", self.name)
+        map_of_normals = section(file, where, self.entry, "normalTexture")
+        steep = number(file, where, map_of_normals, "scale", 1.0)
+        return {
+            "roughness": share(file, where, self.base, "roughnessFactor", 1.0),
+            "diffuse_transmission": share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
+            "diffuse_transmission_color": shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
+            "color_texture": self.textures.read(self.name, self.base, "baseColorTexture", srgb=True),
+            "roughness_texture": self.textures.read(self.name, self.base, "metallicRoughnessTexture"),
+            "normal_texture": self.textures.read(self.name, self.entry, "normalTexture", normal_scale=steep),
+        }
+
+    def _sides(self) -> dict[str, object]:
+        """What is seen of an opaque object: both sides, and where its alpha makes no holes."""
+        double_sided = self.entry.get("doubleSided", False)
+        if not isinstance(double_sided, bool):
+            raise refused(self.file, f"{self.where}: doubleSided is {double_sided!r}, not true or false")
+        mode, opacity, cutoff = self.entry.get("alphaMode", "OPAQUE"), self.base_color[3], 0.0
+        if mode == "MASK":
+            cutoff = min(number(self.file, self.where, self.entry, "alphaCutoff", 0.5) / max(opacity, 1e-9), 1.0)
+        elif mode == "BLEND":
+            cutoff = 0.5
+            self.left_out.add("blending by alphaMode BLEND, drawn as holes where a texture's opacity is below 0.5", self.name)
+        elif mode != "OPAQUE":
+            raise refused(self.file, f"{self.where}: alphaMode {mode!r} is none of glTF 2.0")
+        return {"double_sided": double_sided, "alpha_cutoff": max(cutoff, 0.0)}
+
+    def _hidden(self) -> bool:
+        if self.entry.get("alphaMode") != "MASK":
+            return False
+        return bool(self.base_color[3] < number(self.file, self.where, self.entry, "alphaCutoff", 0.5))
+
+    def _extension(self, name: str) -> Json:
+        return extension(self.file, self.where, self.entry, name)
+
+    def _note(self, key: str, what: str) -> None:
+        if key in self.entry:
+            self.left_out.add(what, self.name)

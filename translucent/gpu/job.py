@@ -170,9 +170,15 @@ class FrameJob:
         """Whose first attachment is the frame's radiance."""
         return self.targets.surfaced() if self.has_surfaces else self.targets.result()
 
-    def is_sheet(self, number: int) -> bool:
-        """Whether an object is drawn as a sheet, without an inside."""
-        return isinstance(self.plan.method, ThinLayer) or self.scene.objects[number].sheet_thickness is not None
+    @property
+    def sheets(self) -> dict[int, float]:
+        """Thickness in metres of the objects that are drawn as sheets, without an inside, by their numbers."""
+        thin = isinstance(self.plan.method, ThinLayer)
+        return {
+            i: self._sheet_thickness(body)
+            for i, body in enumerate(self.scene.objects)
+            if body.medium is not None and (thin or body.sheet_thickness is not None)
+        }
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
         """Target in which thickness passes add up, cleared when a frame first asks for it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -342,10 +342,10 @@ def surface_uniforms(scene: Scene, media: AxialRange, view: View) -> bytes:
     )
 
 
-def surface_table(scene: Scene, sheets: Collection[int]) -> npt.NDArray[np.float32]:
+def surface_table(scene: Scene, sheets: Mapping[int, float]) -> npt.NDArray[np.float32]:
     """(objects, 5, 4): what ``shaders/shade/surfaces.frag`` reads of each object, besides what textures vary.
 
-    `sheets`: numbers of the objects that are drawn without an inside.
+    `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers.
     """
     table = np.zeros((len(scene.objects), 5, 4), dtype=np.float32)
     for i, (row, body) in enumerate(zip(table, scene.objects, strict=True)):
@@ -357,6 +357,7 @@ def surface_table(scene: Scene, sheets: Collection[int]) -> npt.NDArray[np.float
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         much = surface.multiple_scattering and medium.scatters
         row[0] = medium.ior, surface.dispersion, i in sheets, much
+        row[1, :3] = bounded_extinction(medium, scene.diagonal) * sheets.get(i, 0.0)
         row[1, 3] = np.linalg.norm(body.bounds[1] - body.bounds[0])
         row[2] = *passed, surface.roughness
         row[3] = *np.minimum(stream[0], limit), surface.transmission

@@ -26,7 +26,7 @@ class InterfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies twice, with the depth test on; sheets have one border, seen from either side."""
         nothing = float(CONSTANTS["NOTHING"])
-        sheets = tuple(i for i in spec.objects if job.is_sheet(i))
+        sheets = tuple(i for i in spec.objects if i in job.sheets)
         solids = tuple(i for i in spec.objects if i not in sheets)
         for back, framebuffer in ((False, job.targets.entered()), (True, job.targets.left())):
             framebuffer.use()

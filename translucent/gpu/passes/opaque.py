@@ -29,8 +29,7 @@ class OpaquePass:
         """Draw the opaque objects with the depth test on."""
         framebuffer = job.targets.opaque()
         framebuffer.use()
-        nothing = float(CONSTANTS["NOTHING"])
-        framebuffer.clear(nothing, 0.0, 0.0, 0.0, depth=1.0)
+        _clear(framebuffer)
         job.gl.enable_only(moderngl.DEPTH_TEST)
         # Surfaces at the very end of the range count, too; and of surfaces in one place, those of the first object.
         job.gl.depth_func = "<="
@@ -64,3 +63,13 @@ class OpaquePass:
         set_uniform(program, "opaque_finish", finish)
         set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
         set_uniform(program, "opaque_emissive", tuple(np.asarray(surface.emissive)))
+
+
+def _clear(framebuffer: moderngl.Framebuffer) -> None:
+    """No surface anywhere, and no light, which is blurred where refraction is."""
+    on, off = (True,) * 4, (False,) * 4
+    framebuffer.color_mask = on, off
+    framebuffer.clear(float(CONSTANTS["NOTHING"]), 0.0, 0.0, 0.0, depth=1.0)
+    framebuffer.color_mask = off, on
+    framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+    framebuffer.color_mask = on, on

@@ -53,10 +53,15 @@ class SurfacesPass:
         for unit, texture in enumerate(textures):
             texture.use(unit)
         if job.has_opaque:
-            for unit, texture in enumerate(job.targets.opaque().color_attachments, _SAMPLERS.index("opaque_place")):
-                texture.use(unit)
+            place, radiance = job.targets.opaque().color_attachments
+            if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
+                radiance.build_mipmaps()  # rough refraction blurs what is behind
+                radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+                radiance.repeat_x = radiance.repeat_y = False
+            place.use(_SAMPLERS.index("opaque_place"))
+            radiance.use(_SAMPLERS.index("opaque_radiance"))
         maps = job.environments.light(environment)
-        table = surface_table(job.scene, [i for i in range(len(job.scene.objects)) if job.is_sheet(i)])
+        table = surface_table(job.scene, job.sheets)
         finishes = gl.texture(table.shape[1::-1], 4, table, dtype="f4")
         rest = (finishes, self._reflectance, job.environments.sharp(environment), maps.levels, maps.irradiance)
         for unit, item in enumerate(rest, _SAMPLERS.index("surface_table")):

@@ -1,0 +1,173 @@
+"""``translucent render``: environments, brightness, turntables, and pictures of quantities."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import translucent as tl
+from translucent.cli import main
+from translucent.commands.common import TONE_NAMES, read_environment
+from translucent.showcase import LIGHT_TABLE
+from translucent.tone import TONES
+
+
+class Result(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Result]
+SMALL = ("--size", "32x24", "--samples", "1")
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
+
+    def _run(*arguments: object) -> Result:
+        code = main([str(argument) for argument in arguments])
+        return Result(code, *capsys.readouterr())
+
+    return _run
+
+
+@pytest.fixture
+def panorama(tmp_path: Path) -> Path:
+    path = tmp_path / "sky.png"
+    Image.fromarray(np.full((8, 16, 3), 188, dtype=np.uint8)).save(path)
+    return path
+
+
+def pixels(path: Path) -> np.ndarray:
+    with Image.open(path) as picture:
+        return np.asarray(picture).astype(int)
+
+
+def test_environments_have_names_colors_and_files(panorama: Path) -> None:
+    assert read_environment(None, None) is None
+    assert read_environment("light-table", None) is LIGHT_TABLE
+    studio = read_environment("studio,-30.5", None)
+    assert studio is not None
+    assert (studio.kind, studio.rotation) == ("image", -30.5)
+    image = read_environment(f"{panorama},90", None)
+    assert image is not None
+    assert (image.kind, image.rotation) == ("image", 90.0)
+    color = read_environment("linear(1,0.5,0.25)", None)
+    assert color is not None
+    assert (color.kind, color.first.tolist()) == ("constant", [1.0, 0.5, 0.25])
+    both = read_environment("studio", "checker")
+    assert both is not None
+    assert (both.kind, both.seen.kind) == ("image", "checkerboard")
+    behind = read_environment(None, "teal")
+    assert behind is not None
+    assert behind.lighting(np.array([0.0, 1.0, 0.0])) == pytest.approx(LIGHT_TABLE.second)
+
+
+def test_the_names_of_tone_curves_are_those_there_are() -> None:
+    assert TONE_NAMES == TONES
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--environment", "reddish"], "color 'reddish'; neither a hex color"),
+        (["--environment", "studio,left"], "environment 'studio,left'; rotation 'left'; give degrees"),
+        (["--environment", "none.hdr"], "environment 'none.hdr'; no such file"),
+        (["--environment", "none.exr,30"], "environment 'none.exr'; no such file"),
+        (["--exposure", "nan"], "exposure nan; not within 100 stops"),
+        (["--tone", "filmic"], "Invalid value for '--tone'"),
+        (["--turntable", "1"], "Invalid value for '--turntable'"),
+        (["--turntable", "4", "--fps", "0"], "0.0 pictures per second; not in 1 to 100"),
+        (["--turntable", "4"], "animation 'a.png'; suffix '.png'; use .webp, .gif, .mp4, or a folder"),
+        (["--turntable", "4", "--aov", "aovs", "-o", "a.gif"], "--turntable 4; --aov is given, too"),
+    ],
+)
+def test_wrong_options_are_one_line(
+    run: Run, options: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("render", "bear", "-o", "a.png", *options)
+    assert (result.code, result.out) == (2, "")
+    assert message in result.err
+    assert result.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures("renderer")
+class TestRendering:
+    """What needs OpenGL."""
+
+    def test_a_background_is_seen_and_through_the_model(self, run: Run, tmp_path: Path, panorama: Path) -> None:
+        pictures = []
+        for i, options in enumerate(
+            (["--environment", panorama], ["--environment", "srgb(0.7373,0.7373,0.7373)"], ["--background", panorama])
+        ):
+            result = run("render", "bear", "-o", tmp_path / f"{i}.png", *SMALL, *options)
+            assert (result.code, result.err) == (0, "")
+            pictures.append(pixels(tmp_path / f"{i}.png"))
+        assert (pictures[0][0, 0] == 188).all()
+        # A picture of one color is that color, to a rounding of 8 bits.
+        assert np.abs(pictures[1] - pictures[0]).max() <= 1
+        assert np.abs(pictures[2] - pictures[0]).max() <= 1
+        assert (pictures[0][12, 16] < 188).any()
+
+    def test_exposure_and_tone_change_the_picture_and_not_the_numbers(self, run: Run, tmp_path: Path) -> None:
+        light = ("--environment", "linear(0.25,0.25,0.25)")
+        for name, options in {"plain": [], "bright": ["--exposure", "1"], "agx": ["--tone", "agx"]}.items():
+            assert run("render", "bear", "-o", tmp_path / f"{name}.png", *SMALL, *light, *options).code == 0
+            assert run("render", "bear", "-o", tmp_path / f"{name}.npz", *SMALL, *light, *options).code == 0
+        corners = {name: int(pixels(tmp_path / f"{name}.png")[0, 0, 0]) for name in ("plain", "bright", "agx")}
+        assert (corners["plain"], corners["bright"]) == (137, 188)  # sRGB of 1/4 and 1/2
+        assert corners["agx"] not in (137, 188)
+        with np.load(tmp_path / "plain.npz") as plain, np.load(tmp_path / "bright.npz") as bright:
+            np.testing.assert_array_equal(plain["radiance"], bright["radiance"])
+
+    @pytest.mark.parametrize("name", ["spin.webp", "spin.gif", "frames"])
+    def test_a_turntable_shows_the_model_from_all_around(self, run: Run, tmp_path: Path, name: str) -> None:
+        result = run("render", "bear", "-o", tmp_path / name, *SMALL, "--turntable", "4", "--json")
+        assert (result.code, result.err) == (0, "")
+        assert json.loads(result.out)["output"] == str(tmp_path / name)
+        if name == "frames":
+            files = sorted((tmp_path / name).iterdir())
+            assert [file.name for file in files] == ["0000.png", "0001.png", "0002.png", "0003.png"]
+            views = [pixels(file) for file in files]
+        else:
+            with Image.open(tmp_path / name) as picture:
+                assert picture.n_frames == 4
+                views = []
+                for i in range(4):
+                    picture.seek(i)
+                    views.append(np.asarray(picture.convert("RGB")).astype(int))
+        assert all(view.shape == (24, 32, 3) for view in views)
+        assert all(np.abs(view - other).max() > 20 for view, other in pairwise(views))
+        for view in views:  # no side of the frame cuts the model
+            border = np.concatenate([view[0], view[-1], view[:, 0], view[:, -1]])
+            assert np.ptp(border, axis=1).max() < 20
+
+    def test_quantities_are_written_as_pictures(self, run: Run, tmp_path: Path) -> None:
+        result = run("render", "bear", "-o", tmp_path / "bear.png", *SMALL, "--aov", tmp_path / "aovs")
+        assert (result.code, result.err) == (0, "")
+        names = sorted(file.name for file in (tmp_path / "aovs").iterdir())
+        assert names == ["thickness.png", "transmittance.png", "validity.png"]
+
+    def test_the_studio_is_seen_as_in_the_reference(self, tmp_path: Path) -> None:
+        mesh = tl.load_mesh(Path(tl.__file__).parents[1] / "meshes" / "bear.ply")
+        scene = tl.showcase(mesh, size=(32, 24), environment=tl.Environment.studio(rotation=20))
+        with tl.Renderer() as renderer:
+            found = renderer.render(scene, (32, 24))
+        truth = tl.reference.render(scene, (32, 24))
+        same = found.coverage == truth.coverage
+        # The texture unit interpolates with 8 bits of a fraction: 1/256 of the step between two pixels of the picture.
+        step = np.abs(np.diff(scene.environment.map.pixels, axis=1)).max()
+        assert np.abs(found.radiance - truth.radiance)[same].max() <= step / 256 + 1e-3
+        assert np.median(np.abs(found.radiance - truth.radiance)) < 1e-4

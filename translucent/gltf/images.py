@@ -1,0 +1,172 @@
+"""Pictures of glTF materials as textures. Source: glTF 2.0, sections 3.8 and 3.9, and KHR_texture_transform.
+
+Read are PNG and JPEG, from buffer views, data URIs and files beside; all over TEXCOORD_0.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, UnidentifiedImageError
+
+from translucent.color import srgb_to_linear
+from translucent.gltf.fields import extension, label, number, numbers, refused, section, whole
+from translucent.gltf.left_out import LeftOut
+from translucent.materials.gltf_file import GltfFile, Json
+from translucent.materials.gltf_texture import TEXTURE_TRANSFORM, TextureTransform
+from translucent.texture import Texture, Wrap
+
+Bytes = npt.NDArray[np.uint8]
+Pixels = npt.NDArray[np.float32]
+
+#: Pixels along a side beyond which a picture is made smaller; and of a whole one, beyond which it is refused.
+MAX_SIDE, MAX_PIXELS = 4096, 2**28
+
+_NEAREST = 9728
+_WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+
+
+class Textures:
+    """Textures of a file; those that are alike are one value.
+
+    Parameters
+    ----------
+    file : GltfFile
+    left_out : LeftOut
+        Gets what the textures do not hold.
+    """
+
+    def __init__(self, file: GltfFile, left_out: LeftOut) -> None:
+        self._file = file
+        self._left_out = left_out
+        self._pictures: dict[int, Bytes] = {}
+        self._made: dict[tuple[object, ...], Texture] = {}
+
+    def read(self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0) -> Texture | None:
+        """The texture that `holder` has as `key`; None if it has none, or none that is read.
+
+        Parameters
+        ----------
+        name : str
+            Of the material, as messages call it.
+        holder : dict
+        key : str
+        srgb : bool
+            Whether the picture's colors are encoded by sRGB.
+        normal_scale : float
+            Of a normal map, by which the normals' x and y are multiplied.
+
+        Raises
+        ------
+        InputError
+            If it points at nothing, its picture is missing or broken, or a value is wrong.
+        """
+        if key not in holder:
+            return None
+        where = f"{key} of material {name}"
+        info = section(self._file, where, holder, key)
+        entry = self._file.item("textures", info.get("index"))
+        transform = self._transform(where, info)
+        if transform.tex_coord != 0:
+            self._left_out.add(f"textures over TEXCOORD_{transform.tex_coord}", name)
+            return None
+        if "source" not in entry:
+            self._left_out.add("textures that are neither PNG nor JPEG", name)
+            return None
+        sampler = self._file.item("samplers", entry["sampler"]) if "sampler" in entry else {}
+        if sampler.get("magFilter") == _NEAREST:
+            self._left_out.add("nearest-neighbor filters of textures, drawn smooth", name)
+        wraps = tuple(self._wrap(where, sampler, axis) for axis in ("wrapS", "wrapT"))
+        made = (entry["source"], srgb, normal_scale, wraps, transform)
+        if made not in self._made:
+            pixels = _linear(self._picture(entry["source"], name), srgb=srgb)
+            self._made[made] = _texture(_scaled_normals(pixels, normal_scale), wraps, transform)
+        return self._made[made]
+
+    def _transform(self, where: str, info: Json) -> TextureTransform:
+        stated = extension(self._file, where, info, TEXTURE_TRANSFORM)
+        offset, scale = (
+            numbers(self._file, where, stated, key, (default, default)) for key, default in (("offset", 0), ("scale", 1))
+        )
+        rotation = number(self._file, where, stated, "rotation", 0.0)
+        tex_coord = whole(self._file, where, stated, "texCoord", whole(self._file, where, info, "texCoord", 0))
+        return TextureTransform((offset[0], offset[1]), rotation, (scale[0], scale[1]), tex_coord)
+
+    def _wrap(self, where: str, sampler: Json, axis: str) -> str:
+        code = sampler.get(axis, 10497)
+        if code not in _WRAPS:
+            raise refused(self._file, f"{where}: {axis} {code!r} is none of glTF 2.0")
+        return _WRAPS[code]
+
+    def _picture(self, index: int, name: str) -> Bytes:
+        """(h, w, 4): a picture as it is encoded, made smaller if it is large; each is read once."""
+        if index not in self._pictures:
+            entry = self._file.item("images", index)
+            where = f"image {label(self._file.items('images'), index)} of material {name}"
+            image = self._decoded(where, self._file.resource(entry))
+            if max(image.size) > MAX_SIDE:
+                self._left_out.add(f"pixels of textures beyond {MAX_SIDE} along a side", name)
+                image.thumbnail((MAX_SIDE, MAX_SIDE), Image.Resampling.BOX)
+            self._pictures[index] = np.asarray(image)
+        return self._pictures[index]
+
+    def _decoded(self, where: str, data: bytes) -> Image.Image:
+        do = "give a PNG or JPEG picture"
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+                opened = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+            if opened.width * opened.height > MAX_PIXELS:
+                raise refused(self._file, f"{where} has {opened.width}x{opened.height} pixels", "make it smaller")
+            if opened.mode.startswith("I"):  # 16 bits of grey, which `convert` would clip
+                return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
+            return opened.convert("RGBA")
+        except Image.DecompressionBombError:
+            raise refused(self._file, f"{where} is too large", "make it smaller") from None
+        except UnidentifiedImageError:
+            raise refused(self._file, f"{where} is neither PNG nor JPEG", do) from None
+        except (OSError, ValueError, SyntaxError) as error:
+            raise refused(self._file, f"{where} is broken ({error})", do) from error
+
+
+def _linear(picture: Bytes, *, srgb: bool) -> Pixels:
+    """(h, w, 4): linear values; opacity is never encoded."""
+    levels = np.arange(256) / 255
+    decoded = (srgb_to_linear(levels) if srgb else levels).astype(np.float32)
+    pixels = decoded[picture]
+    pixels[..., 3] = levels.astype(np.float32)[picture[..., 3]]
+    return pixels
+
+
+def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
+    """A normal map whose normals are steeper by a factor, and of unit length again."""
+    if scale == 1.0:
+        return pixels
+    normals = (2.0 * pixels[..., :3] - 1.0) * (scale, scale, 1.0)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    unit = normals / np.where(length > 0, length, 1.0)
+    return np.concatenate([0.5 + 0.5 * unit, pixels[..., 3:]], axis=-1).clip(0.0, 1.0).astype(np.float32)
+
+
+def _texture(pixels: Pixels, wraps: tuple[str, ...], transform: TextureTransform) -> Texture:
+    """From coordinates that count downwards to those that count upwards."""
+    turn, (scale_u, scale_v), (offset_u, offset_v) = transform.rotation, transform.scale, transform.offset
+    c, s = math.cos(turn), math.sin(turn)
+    scale, offset = np.array([scale_u, scale_v]), np.array([offset_u + s * scale_v, 1.0 - offset_v - c * scale_v])
+    if "mirror" in wraps:
+        pixels, scale, offset = _with_mirror_images(pixels, wraps), 0.5 * scale, 0.5 * offset
+    across: Wrap = "clamp" if wraps[0] == "clamp" else "repeat"
+    down: Wrap = "clamp" if wraps[1] == "clamp" else "repeat"
+    return Texture(pixels, scale, offset, math.degrees(turn), (across, down))
+
+
+def _with_mirror_images(pixels: Pixels, wraps: tuple[str, ...]) -> Pixels:
+    """Twice as wide and high, so that repeating it mirrors the picture in turn, where it is to be mirrored."""
+    right = {"mirror": pixels[:, ::-1], "repeat": pixels, "clamp": np.repeat(pixels[:, -1:], pixels.shape[1], axis=1)}
+    wide = np.concatenate([pixels, right[wraps[0]]], axis=1)
+    above = {"mirror": wide[::-1], "repeat": wide, "clamp": np.repeat(wide[:1], len(wide), axis=0)}
+    return np.concatenate([above[wraps[1]], wide], axis=0)
