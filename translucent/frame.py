@@ -24,6 +24,9 @@ ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage",
 #: More of them, that frames of ordered methods have.
 LAYER_ARRAYS = ("layers", "truncated")
 
+#: And what frames without a background have.
+MATTE_ARRAYS = ("alpha",)
+
 #: Of files that hold a frame.
 SUFFIXES = (".png", ".exr", ".npz")
 
@@ -56,6 +59,9 @@ class Frame:
         that find ordered intervals.
     truncated : (h, w) int32, optional
         How many of them the method had to leave out.
+    alpha : (h, w) float, optional
+        Of a frame rendered without the environment behind: share of what is behind that it hides, the mean of the
+        channels. The radiance is then that of the frame alone: an associated (premultiplied) color.
     """
 
     radiance: npt.NDArray[Any]
@@ -69,6 +75,7 @@ class Frame:
     provenance: dict[str, str] = field(default_factory=dict)
     layers: npt.NDArray[np.int32] | None = None
     truncated: npt.NDArray[np.int32] | None = None
+    alpha: npt.NDArray[Any] | None = None
 
     def __repr__(self) -> str:
         covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())
@@ -98,6 +105,9 @@ class Frame:
     def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: the radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
+        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them. Where it shines
+        more than it hides, alpha is raised to what the brightest channel needs.
+
         Parameters
         ----------
         exposure : float
@@ -112,7 +122,11 @@ class Frame:
         """
         curve = tone_curve(tone)
         linear = np.asarray(self.radiance, dtype=np.float64) * exposure_scale(check_exposure(exposure))
-        return np.rint(linear_to_srgb(curve(linear)) * 255.0).astype(np.uint8)
+        if self.alpha is None:
+            return np.rint(linear_to_srgb(curve(linear)) * 255.0).astype(np.uint8)
+        alpha = np.maximum(self.alpha, np.minimum(linear.max(axis=-1), 1.0))[..., None]
+        color = linear_to_srgb(curve(np.divide(linear, alpha, out=np.zeros_like(linear), where=alpha > 0)))
+        return np.rint(np.concatenate([color, alpha], axis=-1) * 255.0).astype(np.uint8)
 
     def save(self, path: str | Path, exposure: float = 0.0, tone: str = "none") -> None:
         """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).
@@ -169,7 +183,7 @@ class Frame:
 
     def _write_npz(self, path: Path) -> None:
         with path.open("wb") as stream:
-            arrays = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS)}
+            arrays = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS, *MATTE_ARRAYS)}
             arrays = {name: array for name, array in arrays.items() if array is not None}
             np.savez_compressed(stream, allow_pickle=False, **arrays)
 
@@ -177,6 +191,8 @@ class Frame:
         import OpenEXR
 
         channels = {"RGB": np.ascontiguousarray(self.radiance, dtype=np.float32)}
+        if self.alpha is not None:
+            channels = {"RGBA": np.concatenate([self.radiance, self.alpha[..., None]], axis=-1).astype(np.float32)}
         for name, layer in (("transmittance", self.transmittance), ("optical_depth", self.optical_depth)):
             for i, channel in enumerate("RGB"):
                 channels[f"{name}.{channel}"] = np.ascontiguousarray(layer[..., i], dtype=np.float32)
@@ -201,7 +217,7 @@ class Frame:
 
 
 def write_png(file: Path | BinaryIO, pixels: npt.NDArray[np.uint8]) -> None:
-    """Write 8-bit pixels (h, w, 3) or (h, w) as they are."""
+    """Write 8-bit pixels (h, w, 3), (h, w, 4) with alpha, or (h, w) as they are."""
     from PIL import Image
 
     Image.fromarray(pixels).save(file, format="PNG")

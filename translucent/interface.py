@@ -1,4 +1,4 @@
-"""What boundaries between media do with light, in float64. Each has a twin of its name in ``shaders/lib/interface.glsl``.
+"""What boundaries between media do with light, in float64. Each has a twin in ``shaders/lib/interface.glsl``.
 
 All functions are pure and broadcast. Directions (..., 3) are unit vectors in which light travels; a normal looks to the
 side that the light comes from; ``ior`` is the index of the other side relative to this one. The share that a smooth
@@ -33,8 +33,8 @@ def reflected_direction(direction: npt.ArrayLike, normal: npt.ArrayLike) -> Arra
 def refracted_direction(direction: npt.ArrayLike, normal: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
     """Direction of the light behind a boundary (Snell), (..., 3); zero under total internal reflection.
 
-    It is zero exactly where `optics.fresnel_dielectric` of the same cosine is 1, but for grazing incidence from the thin
-    side, which has a direction and carries nothing.
+    It is zero where `optics.fresnel_dielectric` of the same cosine is 1, but for grazing incidence on a denser medium,
+    which has a direction and carries nothing.
 
     Parameters
     ----------

@@ -93,7 +93,13 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
     """
     media = [body.medium for body in scene.bodies if body.medium is not None]
     effects = []
-    if scattering := [medium for medium in media if medium.scatters]:
+    layered = [body for body in scene.bodies if body.surface is not None and body.surface.multiple_scattering]
+    if borders and layered:
+        effects.append(
+            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the ray's "
+            "path, which edges and folds are not"
+        )
+    elif scattering := [medium for medium in media if medium.scatters]:
         if scatters:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in scattering)
             effects.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import warnings
 from importlib.metadata import version
@@ -13,6 +14,7 @@ import numpy as np
 
 from translucent.backdrop import Backdrop
 from translucent.camera import check_size
+from translucent.environment import Environment
 from translucent.errors import InputError, RenderError, TranslucentWarning
 from translucent.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
@@ -110,6 +112,8 @@ class Renderer:
         method: Method | None = None,
         samples: int = 1,
         backdrop: Backdrop | TextureBackdrop | None = None,
+        *,
+        transparent: bool = False,
     ) -> Frame:
         """Render a scene.
 
@@ -125,6 +129,10 @@ class Renderer:
             belong to the ray through the pixel center, as all do with 1.
         backdrop : Backdrop or TextureBackdrop, optional
             A picture of everything opaque, drawn elsewhere. The same for all samples of a pixel.
+        transparent : bool
+            Leave out the environment as far as it is seen behind everything, and give the frame an `alpha`; it still
+            lights, and is mirrored. Costs a second rendering: alpha is one minus the difference between frames before
+            white and before black (Smith & Blinn 1996).
 
         Returns
         -------
@@ -144,7 +152,9 @@ class Renderer:
             raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
         self._require_open()
         size = check_size(size)
-        if backdrop is None:
+        if transparent:
+            frame = self._render_transparent(scene, size, method, samples, backdrop)
+        elif backdrop is None:
             frame = self._engine.render(scene, size, self.plan(scene, method), samples)
         else:
             _check_backdrop(backdrop, size)
@@ -154,6 +164,25 @@ class Renderer:
         frame.provenance.update(self.provenance)
         _warn(frame)
         return frame
+
+    def _render_transparent(
+        self, scene: Scene, size: tuple[int, int], method: Method | None, samples: int, backdrop: object
+    ) -> Frame:
+        if backdrop is not None:
+            raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
+        before_black, before_white = (
+            self._engine.render(
+                dataclasses.replace(
+                    scene, environment=scene.environment.with_background(Environment.constant((level,) * 3))
+                ),
+                size,
+                self.plan(scene, method),
+                samples,
+            )
+            for level in (0.0, 1.0)
+        )
+        behind = np.mean(before_white.radiance.astype(np.float64) - before_black.radiance, axis=-1)
+        return dataclasses.replace(before_black, alpha=(1.0 - np.clip(behind, 0.0, 1.0)).astype(np.float32))
 
     def draw(
         self,

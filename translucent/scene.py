@@ -99,7 +99,9 @@ class Object:
             _require_type("surface of an object", self.surface, Surface, "use tl.Surface")
             if self.mesh.uv is None and any(self.surface.textures):
                 raise InputError(
-                    f"surface of {self.mesh.name!r}", "it has textures, and the mesh no texture coordinates", "unwrap it"
+                    f"surface of {self.mesh.name!r}",
+                    "it has textures, and the mesh no texture coordinates",
+                    "unwrap it",
                 )
 
     def __repr__(self) -> str:

@@ -14,6 +14,7 @@ from translucent.environment import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.scene import Light, Object, Scene
+from translucent.surface import Surface
 
 #: Linear color that the default medium keeps of white light after `DEFAULT_REACH` of the mesh's diagonal.
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
@@ -61,6 +62,27 @@ def framing(
         item.mesh.vertices[np.unique(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3] for item in objects
     ]
     return Camera.framing(np.concatenate(corners), size, fov_y=fov_y, up=up)
+
+
+def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
+    """The scene with borders as a picture needs them.
+
+    Media that scatter give back, and let through, what they scatter many times: without that milk would be black. A
+    roughness replaces that of all surfaces of media.
+    """
+
+    def finish(item: Object) -> Object:
+        if item.medium is None or not (item.medium.scatters or roughness is not None):
+            return item
+        surface = item.surface or Surface()
+        surface = dataclasses.replace(
+            surface,
+            multiple_scattering=item.medium.scatters or surface.multiple_scattering,
+            roughness=surface.roughness if roughness is None else roughness,
+        )
+        return dataclasses.replace(item, surface=surface)
+
+    return dataclasses.replace(scene, objects=[finish(item) for item in scene.objects])
 
 
 def filled(scene: AnyScene, medium: Medium) -> AnyScene:

@@ -37,8 +37,8 @@ class Surface:
     paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission and
     _dispersion).
 
-    An opaque object is a metal, or a coat with `ior` over paint, or between the two (glTF 2.0, Appendix B). The index of
-    refraction of a body is its medium's, and what is said to be of opaque objects has no effect on it.
+    An opaque object is a metal, or a coat with `ior` over paint, or between the two (glTF 2.0, Appendix B). The index
+    of refraction of a body is its medium's, and what is said to be of opaque objects has no effect on it.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Surface:
             "emissive_texture",
         ):
             if not isinstance(value := getattr(self, field), Texture | None):
-                raise InputError(f"surface {field} {value!r}", f"of type {type(value).__name__}", "use tl.Texture")
+                raise InputError(f"surface {field}", f"of type {type(value).__name__}", "use tl.Texture")
 
     @property
     def plain(self) -> bool:

@@ -29,23 +29,39 @@ OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 place, vec2 uv) {
                         mapped_normal(normal, place, uv), painted.a < opaque_finish.w);
 }
 
+// What the microfacets of one of the two layers mirror, relative to those without any loss.
+struct Layer {
+    vec3 facing;    // reflectance face-on, and
+    vec3 grazing;   // edge-on (Schlick 1994)
+    vec3 regained;  // what is lost between microfacets, as a factor
+    vec3 mirrored;  // share of uniform light
+};
+
+Layer layer_of(vec3 facing, vec2 table) {
+    // Only what hardly has a step in ior reflects less than 2 % face-on: that fades at grazing angles, too.
+    vec3 grazing = min(50.0 * facing, vec3(1.0));
+    vec3 regained = 1.0 + facing * (1.0 / max(table.x + table.y, 1e-3) - 1.0);
+    return Layer(facing, grazing, regained, (facing * table.x + grazing * table.y) * regained);
+}
+
+vec3 fresnel_of(Layer layer, float away) {
+    return (layer.facing + (layer.grazing - layer.facing) * away) * layer.regained;
+}
+
 // ray: unit, from the eye; normal: to the eye's side; place: from the eye.
 vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) {
     float ior = opaque_finish.z;
-    float coat = (ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0));
-    vec3 facing = mix(vec3(coat), finish.base, finish.metallic);
-    // Nothing but a border without a step in ior reflects less than 2 % face-on: then it fades at grazing angles, too.
-    vec3 grazing = min(50.0 * facing, vec3(1.0));
     float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
     vec2 table = textureLod(reflectance_table, (vec2(cos_view, finish.roughness) * 63.0 + 0.5) / 64.0, 0.0).rg;
-    vec3 regained = 1.0 + facing * (1.0 / max(table.x + table.y, 1e-3) - 1.0);
-    vec3 mirrored = (facing * table.x + grazing * table.y) * regained;
-    float entered = (1.0 - finish.metallic) * (1.0 - max(max(mirrored.r, mirrored.g), mirrored.b));
+    Layer coat = layer_of(vec3((ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0))), table);
+    Layer metal = layer_of(finish.base, table);
+    float painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored.r);
     float passed = max(max(opaque_passed.r, opaque_passed.g), opaque_passed.b);
     vec3 paint = finish.base * (1.0 - passed);
 
-    vec3 sum = mirrored * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + entered * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI;
+    vec3 sum = mix(coat.mirrored, metal.mirrored, finish.metallic)
+            * environment_light(reflected_direction(ray, normal), finish.roughness)
+        + painted * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI;
     float alpha = max(finish.roughness * finish.roughness, SMALLEST_HIGHLIGHT);
     for (int light = 0; light < light_count; ++light) {
         vec4 at = light_place[light];
@@ -55,15 +71,14 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) 
         vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;
         float cos_light = dot(normal, towards);
         if (cos_light <= 0.0) {
-            sum -= entered * opaque_passed.rgb / PI * cos_light * irradiance;
+            sum -= painted * opaque_passed.rgb / PI * cos_light * irradiance;
             continue;
         }
         vec3 half_way = normalize(towards - ray);
         float away = pow(1.0 - clamp(dot(half_way, towards), 0.0, 1.0), 5.0);
-        vec3 fresnel = facing + (grazing - facing) * away;
-        vec3 glint = fresnel * regained * ggx_distribution(min(dot(half_way, normal), 1.0), alpha)
-            * ggx_visibility(cos_light, cos_view, alpha);
-        sum += (glint + entered * paint / PI) * cos_light * irradiance;
+        vec3 glint = mix(fresnel_of(coat, away), fresnel_of(metal, away), finish.metallic)
+            * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
+        sum += (glint + painted * paint / PI) * cos_light * irradiance;
     }
     return sum + finish.emitted;
 }

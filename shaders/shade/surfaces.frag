@@ -160,8 +160,8 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
     float kept = border_reflectance(cosine, 1.0 / ior, 0.0);
     float blur = refraction_roughness(finish.roughness, ior);
-    // What the far border keeps inside leaves after at least one more crossing: seen where it is mirrored to.
-    result.light = kept * result.passed * environment_light(reflected_direction(inside, leaving.normal), blur);
+    // What the far border keeps inside leaves after more crossings: seen where it is mirrored to.
+    result.light = kept * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
     if (kept < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
     result.light *= result.passed;

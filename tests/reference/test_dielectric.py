@@ -424,9 +424,8 @@ def test_paint_lets_light_through_from_behind() -> None:
     wall = Object(box((-WIDE, 0, -WIDE), (WIDE, 1e-3, WIDE)), Medium(), surface=paint)
     up, down = (UP_AND_DOWN.irradiance_on([0.0, side, 0.0]) / np.pi for side in (1.0, -1.0))
     color, through = np.array([0.9, 0.5, 0.1]), np.array([1.0, 0.5, 1.0])
-    painted = color * (0.3 * up + 0.7 * through * down)
-    # At the lower face the paint is seen from inside, through the upper one.
-    within = color * (0.3 * up + 0.7 * through * down)
+    # The same at the lower face, seen through the upper one.
+    painted = within = 0.3 * color * up + 0.7 * through * down
     expected = 0.75 * painted + 0.25 * color * (0.75 * within + 0.25 * UP_AND_DOWN.lighting([0.0, -1.0, 0.0]))
     np.testing.assert_allclose(pixel(Scene([wall], oblique(0), environment=UP_AND_DOWN)), expected, rtol=1e-12)
 

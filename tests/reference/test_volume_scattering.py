@@ -410,7 +410,8 @@ def test_overlapping_bodies(overlap: Overlap) -> None:
 def test_bodies_of_one_medium(overlap: Overlap, times: int) -> None:
     objects = [Object(SLAB.tessellate(), medium) for medium in (RED, replace(RED, ior=1.3))]
     expected = layers(SUN, (-1.0, 0.0, [RED] * times))
-    np.testing.assert_allclose(middle(scene(*objects, lights=[SUN], overlap=overlap)), expected, rtol=1e-6)
+    found = middle(scene(*objects, lights=[SUN], overlap=overlap), refraction=False)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_union_tells_media_apart_that_only_scatter_differently() -> None:

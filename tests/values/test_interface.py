@@ -207,7 +207,9 @@ def test_ratio_of_angles(cosine: float, ior: float) -> None:
         return
     # acos is good to EPS / angle near 1, asin of a sine near 1 to EPS / cosine.
     expected = math.asin(math.sin(angle) / ior) / angle
-    assert interface.refraction_angle_ratio(cosine, ior) == pytest.approx(expected, abs=8 * EPS / min(angle, cosine) ** 2)
+    assert interface.refraction_angle_ratio(cosine, ior) == pytest.approx(
+        expected, abs=8 * EPS / min(angle, cosine) ** 2
+    )
 
 
 @pytest.mark.parametrize("ior", [0.7, 1.0, 1.33, 2.4])

@@ -84,6 +84,12 @@ def read_method(name: str | None, thickness: str | None) -> Method | None:
 def look_options(command: F) -> F:
     """Options for what lights the model, what is seen behind it, and how bright the picture is."""
     command = click.option(
+        "--roughness",
+        type=click.FloatRange(0.0, 1.0),
+        metavar="R",
+        help="Of the borders of media, 0 (polished) to 1. Default: 0, or that of the file's materials.",
+    )(command)
+    command = click.option(
         "--tone",
         type=click.Choice(TONE_NAMES),
         default="none",

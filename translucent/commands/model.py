@@ -51,10 +51,11 @@ def read_scene(
     view: View | None = None,
     size: tuple[int, int] = (1280, 720),
     environment: Environment | None = None,
+    roughness: float | None = None,
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
     from translucent.gltf.load import load_scene
-    from translucent.showcase import filled, showcase
+    from translucent.showcase import filled, finished, showcase
 
     view = view or View()
     if view.camera is not None and view.placed:
@@ -69,6 +70,7 @@ def read_scene(
             scene = filled(scene, medium)
         if environment is not None:
             scene = dataclasses.replace(scene, environment=environment)
+    scene = finished(scene, roughness)
     return dataclasses.replace(scene, camera=_placed_camera(scene, view, size)) if view.placed else scene
 
 

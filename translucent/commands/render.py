@@ -21,6 +21,7 @@ from translucent.commands.common import (
 )
 from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lines, read_scene, require_translucent
 from translucent.commands.pictures import Pictures, picture_options
+from translucent.errors import InputError
 
 
 @click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
@@ -52,6 +53,7 @@ from translucent.commands.pictures import Pictures, picture_options
     type=click.Choice(["pyrender"]),
     help="Let another renderer draw the opaque objects of a glTF file.",
 )
+@click.option("--transparent", is_flag=True, help="Leave out the environment behind: a picture with alpha.")
 @picture_options
 @click.option("--backend", metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
 @common_options
@@ -72,10 +74,12 @@ def render(
     background: str | None,
     exposure: float,
     tone: str,
+    roughness: float | None,
     method_name: str | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
+    transparent: bool,
     turntable: int | None,
     fps: float,
     aov: Path | None,
@@ -90,24 +94,29 @@ def render(
     import translucent as tl
     from translucent.turntable import framed_all_around
 
+    if transparent and (opaque_with is not None or output.suffix.lower() == ".mp4"):
+        other = "--opaque-with, which draws what is behind" if opaque_with else "a film, which holds no alpha"
+        raise InputError("--transparent", other, "leave out one of the two")
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     pixels = read_size(size)
     medium = read_medium(color, distance, preset_name)
     method = read_method(method_name, thickness)
     view = View(camera, eye, target, up, fov)
-    scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background))
+    scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background), roughness)
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)
     with tl.Renderer(backend) as renderer:
-        draw = partial(renderer.render, size=pixels, method=method, samples=samples)
+        draw = partial(renderer.render, size=pixels, method=method, samples=samples, transparent=transparent)
         if opaque_with is not None:
             from translucent.interop.pyrender import render_scene
 
             draw = partial(render_scene, size=pixels, method=method, samples=samples, renderer=renderer)
         frame = pictures.write(scene, draw)
-    warn_if_black(frame)
+    # What scatters many times is bright though no light passes straight.
+    if not any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
+        warn_if_black(frame)
     media = medium_lines(scene)
     if as_json:
         click.echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))

@@ -46,7 +46,9 @@ class Textures:
         self._pictures: dict[int, Bytes] = {}
         self._made: dict[tuple[object, ...], Texture] = {}
 
-    def read(self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0) -> Texture | None:
+    def read(
+        self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0
+    ) -> Texture | None:
         """The texture that `holder` has as `key`; None if it has none, or none that is read.
 
         Parameters
@@ -90,7 +92,8 @@ class Textures:
     def _transform(self, where: str, info: Json) -> TextureTransform:
         stated = extension(self._file, where, info, TEXTURE_TRANSFORM)
         offset, scale = (
-            numbers(self._file, where, stated, key, (default, default)) for key, default in (("offset", 0), ("scale", 1))
+            numbers(self._file, where, stated, key, (default, default))
+            for key, default in (("offset", 0), ("scale", 1))
         )
         rotation = number(self._file, where, stated, "rotation", 0.0)
         tex_coord = whole(self._file, where, stated, "texCoord", whole(self._file, where, info, "texCoord", 0))

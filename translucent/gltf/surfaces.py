@@ -29,6 +29,7 @@ _dispersion, _diffuse_transmission, _emissive_strength and _unlit.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -45,6 +46,7 @@ from translucent.materials.gltf_file import GltfFile, Json
 from translucent.medium import Medium
 from translucent.scene import OPAQUE_COLOR
 from translucent.surface import MAX_DISPERSION, Surface
+from translucent.texture import Texture
 
 Array = npt.NDArray[np.float64]
 
@@ -142,22 +144,18 @@ class _Reader:
         return Finish(color, surface=self._opaque(), hidden=self._hidden())
 
     def _opaque(self) -> Surface:
-        return Surface(
-            metallic=self._metallic(),
+        return dataclasses.replace(
+            self._with_sides(self._common()),
             color=self.base_color[:3],
             ior=self.material.ior or DEFAULT_IOR,
             emissive=self.material.emissive,
             emissive_texture=self.textures.read(self.name, self.entry, "emissiveTexture", srgb=True),
-            **self._common(),
-            **self._sides(),
         )
 
     def _unlit(self) -> Surface:
-        texture = self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
-        color = self.base_color[:3]
-        return Surface(
-            color=(0.0, 0.0, 0.0), ior=1.0, emissive=color, emissive_texture=texture, color_texture=texture, **self._sides()
-        )
+        texture, color = self._color_texture(), self.base_color[:3]
+        black = Surface(color=(0, 0, 0), ior=1.0, emissive=color, emissive_texture=texture, color_texture=texture)
+        return self._with_sides(black)
 
     def _translucent(self, color: Array) -> Surface:
         if (mode := self.entry.get("alphaMode", "OPAQUE")) != "OPAQUE":
@@ -166,54 +164,60 @@ class _Reader:
             self.left_out.add("glowing surfaces of translucent objects", self.name)
         if (dispersion := self.material.dispersion) > MAX_DISPERSION:
             self.left_out.add(f"dispersion above {MAX_DISPERSION:g}", self.name)
-        return Surface(
+        return dataclasses.replace(
+            self._common(),
             color=color,
             transmission=self.material.transmission,
             transmission_texture=self.textures.read(self.name, self._extension(TRANSMISSION), "transmissionTexture"),
             dispersion=min(dispersion, MAX_DISPERSION),
-            metallic=self._metallic(),
-            **self._common(),
         )
 
-    def _metallic(self) -> float:
-        return share(self.file, self.where, self.base, "metallicFactor", 1.0)
-
-    def _common(self) -> dict[str, object]:
+    def _common(self) -> Surface:
         """What surfaces of any kind of object have."""
         file, where, diffuse = self.file, self.where, self._extension(DIFFUSE_TRANSMISSION)
         for key in ("diffuseTransmissionTexture", "diffuseTransmissionColorTexture"):
             if key in diffuse:
                 self.left_out.add("textures of diffuse transmission", self.name)
-        map_of_normals = section(file, where, self.entry, "normalTexture")
-        steep = number(file, where, map_of_normals, "scale", 1.0)
-        return {
-            "roughness": share(file, where, self.base, "roughnessFactor", 1.0),
-            "diffuse_transmission": share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
-            "diffuse_transmission_color": shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
-            "color_texture": self.textures.read(self.name, self.base, "baseColorTexture", srgb=True),
-            "roughness_texture": self.textures.read(self.name, self.base, "metallicRoughnessTexture"),
-            "normal_texture": self.textures.read(self.name, self.entry, "normalTexture", normal_scale=steep),
-        }
+        steep = number(file, where, section(file, where, self.entry, "normalTexture"), "scale", 1.0)
+        return Surface(
+            roughness=share(file, where, self.base, "roughnessFactor", 1.0),
+            metallic=share(file, where, self.base, "metallicFactor", 1.0),
+            diffuse_transmission=share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
+            diffuse_transmission_color=shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
+            color_texture=self._color_texture(),
+            roughness_texture=self.textures.read(self.name, self.base, "metallicRoughnessTexture"),
+            normal_texture=self.textures.read(self.name, self.entry, "normalTexture", normal_scale=steep),
+        )
 
-    def _sides(self) -> dict[str, object]:
-        """What is seen of an opaque object: both sides, and where its alpha makes no holes."""
+    def _color_texture(self) -> Texture | None:
+        return self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
+
+    def _with_sides(self, surface: Surface) -> Surface:
+        """The surface of an opaque object with what is seen of it: both sides, and where its alpha makes no holes."""
         double_sided = self.entry.get("doubleSided", False)
         if not isinstance(double_sided, bool):
             raise refused(self.file, f"{self.where}: doubleSided is {double_sided!r}, not true or false")
         mode, opacity, cutoff = self.entry.get("alphaMode", "OPAQUE"), self.base_color[3], 0.0
         if mode == "MASK":
-            cutoff = min(number(self.file, self.where, self.entry, "alphaCutoff", 0.5) / max(opacity, 1e-9), 1.0)
+            cutoff = min(self._alpha_cutoff() / max(opacity, 1e-9), 1.0)
         elif mode == "BLEND":
             cutoff = 0.5
-            self.left_out.add("blending by alphaMode BLEND, drawn as holes where a texture's opacity is below 0.5", self.name)
+            self.left_out.add(
+                "blending by alphaMode BLEND, drawn as holes where a texture's opacity is below 0.5", self.name
+            )
         elif mode != "OPAQUE":
             raise refused(self.file, f"{self.where}: alphaMode {mode!r} is none of glTF 2.0")
-        return {"double_sided": double_sided, "alpha_cutoff": max(cutoff, 0.0)}
+        return dataclasses.replace(surface, double_sided=double_sided, alpha_cutoff=cutoff)
+
+    def _alpha_cutoff(self) -> float:
+        cutoff = number(self.file, self.where, self.entry, "alphaCutoff", 0.5)
+        if cutoff < 0:
+            raise refused(self.file, f"{self.where}: alphaCutoff {cutoff:g} is below 0", "mend the file")
+        return cutoff
 
     def _hidden(self) -> bool:
-        if self.entry.get("alphaMode") != "MASK":
-            return False
-        return bool(self.base_color[3] < number(self.file, self.where, self.entry, "alphaCutoff", 0.5))
+        """Whether alpha is below the cutoff everywhere."""
+        return self.entry.get("alphaMode") == "MASK" and bool(self.base_color[3] < self._alpha_cutoff())
 
     def _extension(self, name: str) -> Json:
         return extension(self.file, self.where, self.entry, name)

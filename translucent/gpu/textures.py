@@ -17,7 +17,8 @@ from translucent.texture import Texture
 TEXTURE_FIELDS = ("color_texture", "roughness_texture", "transmission_texture", "normal_texture", "emissive_texture")
 
 #: In place of a texture: all values as they are, and a normal straight out.
-_WHITE, _STRAIGHT = Texture(np.ones((1, 1, 3))), Texture(np.full((1, 1, 3), (0.5, 0.5, 1.0)))
+_WHITE = Texture(np.ones((1, 1, 3), dtype=np.float32))
+_STRAIGHT = Texture(np.full((1, 1, 3), (0.5, 0.5, 1.0), dtype=np.float32))
 
 
 def texture_units(first: int) -> dict[str, int]:

@@ -192,7 +192,7 @@ class Meetings:
         front, back = (irradiance_at(self.own.scene, points, side * normals) for side in (1.0, -1.0))
         behind = through * self._table("diffuse_transmission_color")[chosen] * back
         with np.errstate(under="ignore"):
-            self.radiance[chosen] += share * self.color[chosen] / np.pi * ((1.0 - through) * front + behind)
+            self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
         """Point and directional lights in rough borders, reflected by one microfacet; nothing shadows them."""
