@@ -96,8 +96,10 @@ class DensityGrid:
         share = place - low
         high = np.minimum(low + 1, count - 1)
         x, y, z = np.moveaxis(np.stack([low, high]), -1, 0)
-        ends = (np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1))
-        return trilinear(*ends, share)
+        lower, upper = (
+            np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1)
+        )
+        return trilinear(lower, upper, share)
 
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding.
@@ -249,7 +251,7 @@ def exponential_density(along: npt.ArrayLike, densest: npt.ArrayLike, log_ratio:
     """
     u, ratio = np.clip(np.asarray(along, dtype=np.float64), 0.0, 1.0), np.asarray(log_ratio)
     with np.errstate(under="ignore"):
-        return np.asarray(densest * optics.transmittance(np.abs(ratio) * np.where(ratio > 0, 1.0 - u, u)))
+        return np.asarray(np.asarray(densest) * optics.transmittance(np.abs(ratio) * np.where(ratio > 0, 1.0 - u, u)))
 
 
 def exponential_density_mean(

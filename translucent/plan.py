@@ -9,10 +9,11 @@ from translucent.errors import InputError
 from translucent.plan_limits import (
     MAX_SCATTER_LIGHTS,
     closed_sheet_limits,
+    marching_limits,
+    marching_method,
     mesh_limits,
     open_bodies,
     open_limits,
-    refuse_varying_density,
     scattering_limits,
     unmodelled_effects,
 )
@@ -83,7 +84,9 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         require_clear_priorities(scene)
     if not capabilities.opengl:
         return _plan_traced(scene, method, capabilities)
-    refuse_varying_density(scene)
+    if any(body.density is not None for body in scene.bodies):
+        chosen = marching_method(scene, method, capabilities)
+        return _plan_ordered(scene, chosen, capabilities, "the density varies from place to place")
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
     if (why := _why_order_matters(scene, method)) is not None:
@@ -265,6 +268,8 @@ def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilitie
         passes.append(_light_views(scene, points))
     passes.append(_ordered_pass(scene, method, why))
     limits = open_limits(scene) + _layer_limits(scene, method)
+    if isinstance(method, RayMarched):
+        limits += marching_limits(scene, method)
     if _scatters(scene):
         limits += scattering_limits(scene)
     if sheets and any(body.medium is not None and body.medium.emits for body in scene.bodies):

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from translucent.density import DensityGrid
 from translucent.errors import InputError
 from translucent.medium import Medium
+from translucent.render_plan import Capabilities
 from translucent.scene import Object, Scene
-from translucent.thickness import Method, ThinLayer
+from translucent.thickness import LEAST_SEEN, MAX_STEPS, Method, RayMarched, ThinLayer
 
 #: Lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
 
 #: Optical depth across a scene beyond which float32 places are too coarse for where light is scattered.
 DENSE = 1e5
+
+#: Steps through an interval of varying density, at least, where nobody says how many.
+LEAST_STEPS = 64
 
 #: What a plan says that does not follow lights into media; the renderer warns of it.
 LIGHTS_LEFT_OUT = (
@@ -49,14 +54,44 @@ def closed_sheet_limits(scene: Scene, method: ThinLayer) -> list[str]:
     return [f"{names} closed, but drawn as sheets: what is inside is left out"] if solid else []
 
 
-def refuse_varying_density(scene: Scene) -> None:
-    """Raise where a density varies in space, which no pass renders."""
-    if dense := [body.mesh.name for body in scene.bodies if body.density is not None]:
+def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> RayMarched:
+    """How rays march where the density varies: as asked for, or with a step for each voxel, and 64 at least.
+
+    Raises
+    ------
+    InputError
+        If another method is asked for, or the machine cannot march.
+    """
+    names = ", ".join(repr(body.mesh.name) for body in scene.bodies if body.density is not None)
+    if not capabilities.shader_storage:
         raise InputError(
-            f"rendering {', '.join(map(repr, dense))} with a density that varies",
-            "no pass of the renderer goes through one",
-            "march the rays on the CPU: tl.reference.march(scene, size)",
+            f"rendering {names} with a density that varies",
+            "this OpenGL has no shader storage buffers, which came with 4.3",
+            "render on the CPU (backend='cpu'), or march there: tl.reference.march(scene, size)",
         )
+    if method is None:
+        grids = [np.shape(body.density.values) for body in scene.bodies if isinstance(body.density, DensityGrid)]
+        return RayMarched(steps=min(max([LEAST_STEPS, *(max(shape) for shape in grids)]), MAX_STEPS))
+    if not isinstance(method, RayMarched):
+        raise InputError(
+            type(method).__name__,
+            f"{names}: the density varies, and only steps through the intervals tell how deep they are",
+            "use RayMarched, or leave the choice to the planner",
+        )
+    return method
+
+
+def marching_limits(scene: Scene, method: RayMarched) -> list[str]:
+    """What marching leaves out."""
+    varies = any(body.density is not None for body in scene.bodies)
+    what = "optical depth, and what is emitted and scattered, are" if varies else "what is emitted and scattered is"
+    limits = [
+        f"{what} a sum over {method.steps} steps in each interval ({method.quadrature}); what lies behind a "
+        f"transmittance of {LEAST_SEEN:g} is left out of it"
+    ]
+    if varies and scene.lights:
+        limits[0] += "; depths from the lights are exact, with a path through the density for each step and light"
+    return limits
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[str]:

@@ -10,7 +10,8 @@ import numpy as np
 from translucent.backdrop import Backdrop
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
-from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, VIEW
+from translucent.gpu.densities import GridTexture, density_uniforms, scene_grids
+from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, VIEW
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
@@ -50,7 +51,7 @@ class FrameJob:
 
     Parameters
     ----------
-    gl, scene, plan, targets, meshes
+    gl, scene, plan, targets, meshes, grids
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
     """
@@ -62,6 +63,7 @@ class FrameJob:
         plan: RenderPlan,
         targets: Targets,
         meshes: MeshCache,
+        grids: GridTexture,
         backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> None:
         self.gl = gl
@@ -69,6 +71,7 @@ class FrameJob:
         self.plan = plan
         self.targets = targets
         self.meshes = meshes
+        self.grids = grids
         self.backdrop = backdrop
         self.averaging = False
         self.light_views: LightViews | None = None
@@ -116,6 +119,9 @@ class FrameJob:
             points = method.steps if isinstance(method, RayMarched) else getattr(method, "light_points", 1)
             content = scatter_uniforms(self.scene, self.media_range, view, self.light_views, points)
             self._constant[SCATTER] = self.gl.buffer(content)
+            if self.varies:
+                densities = density_uniforms(self.scene, self.slots, self.light_views.center)
+                self._constant[DENSITY] = self.gl.buffer(densities)
         self._view.bind_to_uniform_block(VIEW.binding)
         for block, buffer in self._constant.items():
             buffer.bind_to_uniform_block(block.binding)
@@ -134,6 +140,11 @@ class FrameJob:
     def marches(self) -> bool:
         """Whether the method steps through the intervals."""
         return isinstance(self.plan.method, RayMarched)
+
+    @property
+    def varies(self) -> bool:
+        """Whether the density of any body varies."""
+        return any(body.density is not None for body in self.scene.bodies)
 
     @property
     def starts_inside(self) -> bool:
@@ -167,6 +178,11 @@ class FrameJob:
         """Give the places where rays end to the shader that reads texture `unit`, if there are any."""
         if self.has_opaque:
             self.targets.opaque().color_attachments[0].use(unit)
+
+    def bind_grids(self, unit: int) -> None:
+        """Give the density grids to the shader that reads texture `unit`, if a density varies."""
+        if self.varies:
+            self.grids.use(unit, scene_grids(self.scene, self.slots))
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state; front faces are those where a ray enters."""

@@ -202,4 +202,16 @@ SCATTER = UniformBlock(
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER)}
+#: Per frame: densities that vary, by slots. Points count from the center of the media.
+DENSITY = UniformBlock(
+    "Density",
+    7,
+    (
+        ("density_rows", "f4", (3 * MAX_SLOTS, 4)),  # from a point to the unit box of the slot's body
+        # Kind; axis, density at its start and end, or the densest and the logarithm of their ratio
+        ("density_profile", "f4", (MAX_SLOTS, 4)),
+        ("density_grid", "f4", (MAX_SLOTS, 4)),  # voxels along x, y and z; the first layer in the texture of all grids
+    ),
+)
+
+BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY)}

@@ -15,6 +15,7 @@ from translucent.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.context import GpuContext, adopt_context, open_context
+from translucent.gpu.densities import GridTexture
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
@@ -55,6 +56,7 @@ class GpuRenderer:
     def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
         self.context: GpuContext = open_context(backend) if context is None else adopt_context(context)
         self._meshes = MeshCache(self.context.gl)
+        self._grids = GridTexture(self.context.gl)
         with self.context.current():
             self._timer = PassTimer(self.context.gl)
         self._targets: Targets | None = None
@@ -125,7 +127,7 @@ class GpuRenderer:
                 self._targets.release()
                 self._targets = None
             self._targets = Targets(self.context.gl, size)
-        return FrameJob(self.context.gl, scene, plan, self._targets, self._meshes, backdrop)
+        return FrameJob(self.context.gl, scene, plan, self._targets, self._meshes, self._grids, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
@@ -177,6 +179,7 @@ class GpuRenderer:
         self._closed = True
         with self.context.current():
             self._meshes.release()
+            self._grids.release()
             if self._targets is not None:
                 self._targets.release()
             self._passes.clear()

@@ -84,7 +84,8 @@ class LightViewsPass:
         if side not in self._targets:
             self._targets[side] = Targets(self._gl, (side, side))
         scenes = [replace(job.scene, camera=camera) for camera in cameras]
-        return [FrameJob(job.gl, scene, job.plan, self._targets[side], job.meshes) for scene in scenes]
+        shared = self._targets[side], job.meshes, job.grids
+        return [FrameJob(job.gl, scene, job.plan, *shared) for scene in scenes]
 
     def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> bool:
         """Make all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
