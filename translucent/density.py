@@ -96,9 +96,7 @@ class DensityGrid:
         share = place - low
         high = np.minimum(low + 1, count - 1)
         x, y, z = np.moveaxis(np.stack([low, high]), -1, 0)
-        lower, upper = (
-            np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1)
-        )
+        lower, upper = (np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1))
         return trilinear(lower, upper, share)
 
     def mean_between(self, start: Array, end: Array) -> Array:

@@ -36,7 +36,8 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
 
     Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
     often, and whether at all, the medium fills a place. An open body keeps a slot of its own, lest its holes cancel
-    those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority share one.
+    those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority
+    share one.
     """
     groups: list[list[int]] = []
     for i, body in enumerate(scene.objects):

@@ -29,7 +29,8 @@ uint light_cell(LightCells cells, ivec2 texel) {
 struct LightRay {
     vec3 point;
     float place;   // of the point
-    vec3 advance;  // metres, for each place
+    vec3 advance;  // in metres, for each place
+    float metres;  // its length
 };
 
 vec3 point_at(LightRay ray, float place) {
@@ -50,10 +51,9 @@ vec3 part_depth(uint link, LightRay ray, float from, float to) {
         }
         extinction += share * slot_extinction[slot].rgb;
     }
-    return extinction * ((to - from) * uintBitsToFloat(words.w));
+    return extinction * ((to - from) * ray.metres);
 #else
-    vec4 behind = light_media[link - 1u];
-    return behind.rgb * ((to - from) * behind.a);
+    return light_media[link - 1u].rgb * ((to - from) * ray.metres);
 #endif
 }
 
@@ -115,7 +115,8 @@ vec4 light_depth(int light, vec3 point) {
     if (place > light_ends[cell] + 1.5 / views.z) { return vec4(0.0); }
 #endif
     vec3 travel = place_of_light.w == 0.0 ? -place_of_light.xyz : point - place_of_light.xyz;
-    LightRay ray = LightRay(point, place, travel / max(dot(scatter_views[4 * view + 3].xyz, travel), 1e-30));
+    vec3 advance = travel / max(dot(scatter_views[4 * view + 3].xyz, travel), 1e-30);
+    LightRay ray = LightRay(point, place, advance, length(advance));
     vec4 depth = texel_light_depth(cell, offset, ray);
     if (light_heads[cell] != 0u && depth.w < STEEP_IN_LIGHT_VIEW) { return vec4(depth.rgb, 1.0); }
     vec3 sum = vec3(0.0);

@@ -12,6 +12,7 @@ from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.densities import GridTexture, density_uniforms, scene_grids
 from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, VIEW
+from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
@@ -94,6 +95,9 @@ class FrameJob:
             LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque)),
             ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
         }
+        if self.varies:
+            densities = density_uniforms(scene, self.slots, media_sphere(scene)[0])
+            self._constant[DENSITY] = gl.buffer(densities)
         self._cleared: set[str] = set()
         self.place((0.0, 0.0))
 
@@ -112,16 +116,13 @@ class FrameJob:
     def bind(self) -> None:
         """Bind this frame's uniforms, where another's have been bound since it was placed."""
         if self.marches and not self.scatters and self.light_views is None:
-            self.light_views = LightViews(self.scene.camera.eye, (), np.zeros((0, 4)), np.zeros((0, 4)))
+            self.light_views = LightViews(media_sphere(self.scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4)))
         if self.light_views is not None and SCATTER not in self._constant:
             view = View(self.scene.camera, self.targets.size)
             method = self.plan.method
             points = method.steps if isinstance(method, RayMarched) else getattr(method, "light_points", 1)
             content = scatter_uniforms(self.scene, self.media_range, view, self.light_views, points)
             self._constant[SCATTER] = self.gl.buffer(content)
-            if self.varies:
-                densities = density_uniforms(self.scene, self.slots, self.light_views.center)
-                self._constant[DENSITY] = self.gl.buffer(densities)
         self._view.bind_to_uniform_block(VIEW.binding)
         for block, buffer in self._constant.items():
             buffer.bind_to_uniform_block(block.binding)

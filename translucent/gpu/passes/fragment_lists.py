@@ -30,7 +30,12 @@ class FragmentListsPass:
     def __init__(self, gl: moderngl.Context) -> None:
         self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
         self._resolve = Variants(
-            gl, "geometry/fullscreen.vert", "intervals/fragment_lists_resolve.frag", 430, opaque_place=0, density_grids=1
+            gl,
+            "geometry/fullscreen.vert",
+            "intervals/fragment_lists_resolve.frag",
+            430,
+            opaque_place=0,
+            density_grids=1,
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
