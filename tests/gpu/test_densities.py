@@ -219,6 +219,7 @@ def test_a_grid_that_no_texture_holds(renderer: tl.Renderer) -> None:
 def test_the_densest_place_of_a_dense_medium_is_finite(renderer: tl.Renderer) -> None:
     soot = tl.Medium(absorption=1e250, emission=1.0)
     body = tl.Object(Box().tessellate(), soot, density=tl.DensityGrid(np.full((2, 2, 2), 1e12)))
-    frame = renderer.render(tl.Scene([body], CAMERA, [], DUSK), SIZE, tl.RayMarched(steps=8))
+    frame = renderer.render(tl.Scene([body], CAMERA, [], DUSK), SIZE, tl.RayMarched(steps=8, quadrature="left"))
     assert np.isfinite(frame.radiance).all()
+    assert np.isfinite(frame.optical_depth).all()
     assert frame.transmittance[frame.coverage].max() == 0
