@@ -19,6 +19,8 @@ EnvironmentKind = Literal["constant", "gradient", "checkerboard"]
 #: Largest radiance, intensity or irradiance: its products with lengths stay within float32.
 MAX_RADIANCE = 1e18
 
+_WHAT = "environment radiance"
+
 
 @dataclass(frozen=True, eq=False)
 class PointLight:
@@ -118,27 +120,27 @@ class Environment:
             raise InputError(
                 f"environment kind {self.kind!r}", "not known", f"use one of {', '.join(get_args(EnvironmentKind))}"
             )
-        object.__setattr__(self, "first", _positive("environment radiance", self.first))
-        object.__setattr__(self, "second", _positive("environment radiance", self.second))
+        object.__setattr__(self, "first", _positive(_WHAT, self.first))
+        object.__setattr__(self, "second", _positive(_WHAT, self.second))
         if not 0 < self.tiles <= 1e6:
             raise InputError(f"checkerboard of {self.tiles} tiles", "not in 0 to 1e6", "give for example 8")
 
     @classmethod
     def constant(cls, radiance: ColorLike) -> Environment:
         """The same radiance from everywhere."""
-        return cls("constant", _radiance(radiance), _radiance(radiance))
+        return cls("constant", *2 * (parse_radiance(_WHAT, radiance),))
 
     @classmethod
     def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
         """From `bottom` for rays straight down (-Y) to `top` for rays straight up (+Y), linear in the sine between."""
-        return cls("gradient", _radiance(bottom), _radiance(top))
+        return cls("gradient", parse_radiance(_WHAT, bottom), parse_radiance(_WHAT, top))
 
     @classmethod
     def checkerboard(
         cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
     ) -> Environment:
         """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
-        return cls("checkerboard", _radiance(first), _radiance(second), tiles)
+        return cls("checkerboard", parse_radiance(_WHAT, first), parse_radiance(_WHAT, second), tiles)
 
     def radiance(self, directions: npt.ArrayLike, backdrop: npt.ArrayLike) -> Array:
         """Radiance along rays, (..., 3); the twin of ``shaders/lib/environment.glsl``.
@@ -214,5 +216,6 @@ def _positive(what: str, value: npt.ArrayLike) -> Array:
     return triple
 
 
-def _radiance(color: ColorLike) -> Array:
-    return _positive("environment radiance", parse_color(color) if isinstance(color, str) else color)
+def parse_radiance(what: str, color: ColorLike) -> Array:
+    """(3,): linear radiance from a color as text, or one or three numbers >= 0; errors name it `what`."""
+    return _positive(what, parse_color(color) if isinstance(color, str) else color)

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from translucent.density import DensityGrid
 from translucent.errors import InputError
 from translucent.medium import Medium
-from translucent.render_plan import Capabilities
+from translucent.render_plan import Capabilities, RenderPlan
 from translucent.scene import Object, Scene
-from translucent.thickness import LEAST_SEEN, MAX_STEPS, Method, RayMarched, ThinLayer
+from translucent.thickness import (
+    LEAST_SEEN,
+    MAX_STEPS,
+    DepthPeeling,
+    FragmentLists,
+    Method,
+    OrderedMethod,
+    RayMarched,
+    ThinLayer,
+)
 
 #: Lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
@@ -24,6 +35,9 @@ LEAST_STEPS = 64
 LIGHTS_LEFT_OUT = (
     "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
 )
+
+#: What a plan says where media scatter and nothing shines.
+ONLY_REMOVES = "in-scattered light: scattering only removes light"
 
 
 def open_bodies(scene: Scene) -> tuple[int, ...]:
@@ -52,6 +66,17 @@ def closed_sheet_limits(scene: Scene, method: ThinLayer) -> list[str]:
     solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
     names = ", ".join(repr(body.mesh.name) for body in solid)
     return [f"{names} closed, but drawn as sheets: what is inside is left out"] if solid else []
+
+
+def layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
+    """What is left out where a ray can cross more surfaces than the method keeps."""
+    if isinstance(method, FragmentLists | RayMarched):
+        return []
+    most = method.max_layers if isinstance(method, DepthPeeling) else method.k
+    meshes = [body.mesh for body in scene.bodies if body.sheet_thickness is None]
+    # A ray crosses a convex body's surface twice, and no face more than once.
+    possible = sum(2 if mesh.diagnosis.convex else len(mesh.faces) for mesh in meshes)
+    return [f"pixels with more than {most} surfaces are marked invalid"] if possible > most else []
 
 
 def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> RayMarched:
@@ -83,13 +108,14 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
 
 def marching_limits(scene: Scene, method: RayMarched) -> list[str]:
     """What marching leaves out."""
-    varies = any(body.density is not None for body in scene.bodies)
-    what = "optical depth, and what is emitted and scattered, are" if varies else "what is emitted and scattered is"
+    what = (
+        "optical depth, and what is emitted and scattered, are" if scene.varies else "what is emitted and scattered is"
+    )
     limits = [
         f"{what} a sum over {method.steps} steps in each interval ({method.quadrature}); what lies behind a "
         f"transmittance of {LEAST_SEEN:g} is left out of it"
     ]
-    if varies and scene.lights:
+    if scene.varies and scene.lights:
         limits[0] += "; depths from the lights are exact, with a path through the density for each step and light"
     return limits
 
@@ -128,7 +154,7 @@ def unmodelled_effects(scene: Scene, *, scatters: bool) -> tuple[str, ...]:
                 f"path, here {1 / densest:.2g} m; light of the environment scattered"
             )
         else:
-            effects.append(LIGHTS_LEFT_OUT if scene.lights else "in-scattered light: scattering only removes light")
+            effects.append(LIGHTS_LEFT_OUT if scene.lights else ONLY_REMOVES)
     elif scene.lights and not scene.opaque:
         effects.append("lights: they shine on nothing, since no medium scatters and nothing is opaque")
     if any(medium.ior > 1 for medium in media):
@@ -140,6 +166,17 @@ def unmodelled_effects(scene: Scene, *, scatters: bool) -> tuple[str, ...]:
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
         effects.append(f'priorities: overlap="{scene.overlap}" does not use them')
     return tuple(effects)
+
+
+def with_ambient_told(plan: RenderPlan) -> RenderPlan:
+    """The plan of a scene in which media emit what they scatter of the ambient radiance, made to say so."""
+    *before, last = plan.passes
+    reason = (
+        f"{last.reason}; of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
+    )
+    effects = tuple(effect for effect in plan.unmodelled if effect != ONLY_REMOVES)
+    way = "what dims ambient light on its way to a place in the media"
+    return replace(plan, passes=(*before, replace(last, reason=reason)), unmodelled=(*effects, way))
 
 
 def _clear(medium: Medium) -> bool:

@@ -22,7 +22,7 @@ MODULES: dict[str, ModuleType] = {
 }
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
-HOST_ONLY = {"color": {"parse_color", "to_hex"}, "camera": {"check_size"}}
+HOST_ONLY = {"color": {"parse_color", "to_hex"}, "camera": {"check_size"}, "lights": {"parse_radiance"}}
 
 DEPTHS = np.concatenate(
     [[0.0], np.geomspace(1e-30, 1e4, 200), [0.5, np.nextafter(0.5, 0), 87.0, 88.8, 104.0, 1e5, 1e30]]

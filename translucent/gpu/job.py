@@ -95,7 +95,7 @@ class FrameJob:
             LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque)),
             ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
         }
-        if self.varies:
+        if self.scene.varies:
             densities = density_uniforms(scene, self.slots, media_sphere(scene)[0])
             self._constant[DENSITY] = gl.buffer(densities)
         self._cleared: set[str] = set()
@@ -143,11 +143,6 @@ class FrameJob:
         return isinstance(self.plan.method, RayMarched)
 
     @property
-    def varies(self) -> bool:
-        """Whether the density of any body varies."""
-        return any(body.density is not None for body in self.scene.bodies)
-
-    @property
     def starts_inside(self) -> bool:
         """Whether rays may start inside a body."""
         return any(placement.expected_count[1] > 0 for placement in self._placements)
@@ -182,7 +177,7 @@ class FrameJob:
 
     def bind_grids(self, unit: int) -> None:
         """Give the density grids to the shader that reads texture `unit`, if a density varies."""
-        if self.varies:
+        if self.scene.varies:
             self.grids.use(unit, scene_grids(self.scene, self.slots))
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:

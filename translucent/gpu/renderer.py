@@ -127,6 +127,7 @@ class GpuRenderer:
                 self._targets.release()
                 self._targets = None
             self._targets = Targets(self.context.gl, size)
+        scene = scene.with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, self._meshes, self._grids, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:

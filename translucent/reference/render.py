@@ -44,8 +44,9 @@ TOLERANCE = 1e-6
 def render(scene: Scene, size: tuple[int, int], method: Method | None = None, tolerance: float = TOLERANCE) -> Frame:
     """True thickness, transmittance and radiance of a scene.
 
-    Radiance holds what is behind, what media emit, and the light of all lights that solid media scatter once; not what
-    they scatter out of the environment, what sheets scatter, or what is scattered twice (`path_trace` has it all).
+    Radiance holds what is behind, what media emit, what they scatter of `Scene.ambient`, and the light of all lights
+    that solid media scatter once; not what they scatter out of the environment, what sheets scatter out of lights, or
+    what is scattered twice (`path_trace` has it all).
     Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
 
     Parameters
