@@ -19,6 +19,9 @@ from translucent.thickness import LEAST_SEEN, Quadrature
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8
 
+#: Pixels along a side of the tiles of which peeling learns how many crossings they have at most.
+PEEL_TILE = 16
+
 #: Numbers that shaders share; Python is the only place where they are written.
 CONSTANTS: dict[str, str] = {
     "PI": "3.14159265358979",
@@ -33,6 +36,7 @@ CONSTANTS: dict[str, str] = {
     "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
     "PEEL_BATCH": str(PEEL_BATCH),
+    "PEEL_TILE": str(PEEL_TILE),
     "STEEP_IN_LIGHT_VIEW": "5e-3",  # places per texel, from which on a face may well curve within a texel
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
