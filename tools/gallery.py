@@ -59,7 +59,10 @@ def jade() -> tl.Scene:
 def soap() -> tl.Scene:
     """A bar of soap, lit from behind its far edge."""
     body = tl.Object(
-        mesh("soap"), tl.scattering_medium((0.9, 0.66, 0.34), 0.006, ior=1.45), turned(24.0), surface=tl.Surface(roughness=0.35, multiple_scattering=True)
+        mesh("soap"),
+        tl.scattering_medium((0.9, 0.66, 0.34), 0.006, ior=1.45),
+        turned(24.0),
+        surface=tl.Surface(roughness=0.35, multiple_scattering=True),
     )
     camera = tl.Camera.look_at((0.0, 0.13, 0.21), (0.0, 0.012, 0.0), fov_y=24.0)
     return tl.Scene([body], camera, [tl.DirectionalLight((-0.3, -0.5, 0.8), 1.5)], STUDIO)
@@ -71,7 +74,12 @@ def bears() -> tl.Scene:
     places = ((-0.0135, 0.0, 0.001), (0.0, 0.0, 0.004), (0.0135, 0.0, 0.0))
     surface = tl.Surface(roughness=0.22)
     objects = [
-        tl.Object(mesh("bear"), tl.Medium.from_color(color, 0.006, ior=1.4), turned(-18.0 + 18.0 * i, shift=place), surface=surface)
+        tl.Object(
+            mesh("bear"),
+            tl.Medium.from_color(color, 0.006, ior=1.4),
+            turned(-18.0 + 18.0 * i, shift=place),
+            surface=surface,
+        )
         for i, (color, place) in enumerate(zip(colors, places, strict=True))
     ]
     camera = tl.Camera.look_at((0.0, 0.03, 0.09), (0.0, 0.0092, 0.0), fov_y=24.0)
@@ -90,7 +98,10 @@ def amber() -> tl.Scene:
 def candle() -> tl.Scene:
     """A wax candle, lit by its own flame and from behind."""
     wax = tl.Object(
-        mesh("candle"), tl.scattering_medium((0.95, 0.88, 0.72), 0.002, ior=1.44), surface=tl.Surface(roughness=0.45, multiple_scattering=True), priority=0
+        mesh("candle"),
+        tl.scattering_medium((0.95, 0.88, 0.72), 0.002, ior=1.44),
+        surface=tl.Surface(roughness=0.45, multiple_scattering=True),
+        priority=0,
     )
     fire = tl.Object(mesh("flame"), tl.Medium(absorption=20.0, emission=(900.0, 480.0, 130.0)))
     wick = tl.Object(mesh("wick"), None, color=(0.03, 0.02, 0.02))

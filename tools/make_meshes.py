@@ -244,7 +244,7 @@ def arc(center: tuple[float, float], radius: float, start: float, end: float, po
 
 
 def candle() -> Mesh:
-    """A pillar candle that has burnt for a while: a round foot, an upright side, a soft rim, and a hollow in the top."""
+    """A pillar candle that has burnt for a while: a round foot, an upright side, a soft rim, and a hollow top."""
     foot, rim = 0.25, 0.35
     side = np.linspace(foot, CANDLE_RIM - rim, 24)[1:-1]
     hollow = np.linspace(CANDLE_RADIUS - 2 * rim, 0.0, 18)[1:]

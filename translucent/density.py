@@ -95,10 +95,9 @@ class DensityGrid:
         low = np.minimum(place.astype(np.int64), np.maximum(count - 2, 0))
         share = place - low
         high = np.minimum(low + 1, count - 1)
-        with np.errstate(under="ignore"):
-            (x, y, z), (u, v, w) = (np.moveaxis(np.stack([low, high]), -1, 0), np.moveaxis(share, -1, 0))
-            rows = [values[x[i], y[j], z[0]] * (1 - w) + values[x[i], y[j], z[1]] * w for i in (0, 1) for j in (0, 1)]
-            return np.asarray((rows[0] * (1 - v) + rows[1] * v) * (1 - u) + (rows[2] * (1 - v) + rows[3] * v) * u)
+        x, y, z = np.moveaxis(np.stack([low, high]), -1, 0)
+        lower, upper = (np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1))
+        return trilinear(lower, upper, share)
 
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding.
@@ -176,9 +175,7 @@ class LinearDensity:
 
     def at(self, points: npt.ArrayLike) -> Array:
         """(...,): density at points (..., 3)."""
-        u = _along(points, self.axis)
-        with np.errstate(under="ignore"):
-            return np.asarray(self.start * (1.0 - u) + self.end * u)
+        return linear_density(_along(points, self.axis), self.start, self.end)
 
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding."""
@@ -216,21 +213,72 @@ class ExponentialDensity:
 
     def at(self, points: npt.ArrayLike) -> Array:
         """(...,): density at points (..., 3)."""
-        with np.errstate(under="ignore"):
-            return np.asarray(self.start * np.exp(self._log_ratio * _along(points, self.axis)))
+        return exponential_density(_along(points, self.axis), self.maximum, self.log_ratio)
 
     def mean_between(self, start: Array, end: Array) -> Array:
         """(k,): mean density on straight lines from `start` (k, 3) to `end` (k, 3), exact up to rounding."""
-        difference = _along(start, self.axis) - _along(end, self.axis)
-        with np.errstate(under="ignore"):
-            return np.asarray(self.at(start) * optics.mean_transmittance(self._log_ratio * difference))
+        ends = _along(start, self.axis), _along(end, self.axis)
+        return exponential_density_mean(*ends, self.maximum, self.log_ratio)
 
     @property
-    def _log_ratio(self) -> float:
+    def log_ratio(self) -> float:
+        """Logarithm of the ratio of the last density to the first."""
         return float(np.log(self.end) - np.log(self.start))
 
 
 Density = DensityGrid | LinearDensity | ExponentialDensity
+
+
+def linear_density(along: npt.ArrayLike, start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
+    """(...,): density from `start` to `end` at places along an axis; constant beyond 0 and 1."""
+    u = np.clip(np.asarray(along, dtype=np.float64), 0.0, 1.0)
+    with np.errstate(under="ignore"):
+        return np.asarray(np.asarray(start) * (1.0 - u) + np.asarray(end) * u)
+
+
+def exponential_density(along: npt.ArrayLike, densest: npt.ArrayLike, log_ratio: npt.ArrayLike) -> Array:
+    """(...,): exponential density at places along an axis; constant beyond 0 and 1.
+
+    Parameters
+    ----------
+    along : array_like (...)
+    densest : array_like (...)
+        The larger one of the densities at both ends, from which it falls.
+    log_ratio : array_like (...)
+        log(end / start).
+    """
+    u, ratio = np.clip(np.asarray(along, dtype=np.float64), 0.0, 1.0), np.asarray(log_ratio)
+    with np.errstate(under="ignore"):
+        return np.asarray(np.asarray(densest) * optics.transmittance(np.abs(ratio) * np.where(ratio > 0, 1.0 - u, u)))
+
+
+def exponential_density_mean(
+    start: npt.ArrayLike, end: npt.ArrayLike, densest: npt.ArrayLike, log_ratio: npt.ArrayLike
+) -> Array:
+    """(...,): mean of `exponential_density` on straight lines between places `start` and `end` of the axis."""
+    a, b = (np.clip(np.asarray(place, dtype=np.float64), 0.0, 1.0) for place in (start, end))
+    ratio = np.asarray(log_ratio)
+    thickest = exponential_density(np.where(ratio > 0, np.maximum(a, b), np.minimum(a, b)), densest, ratio)
+    with np.errstate(under="ignore"):
+        return np.asarray(thickest * optics.mean_transmittance(np.abs(ratio) * np.abs(a - b)))
+
+
+def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> Array:
+    """(...,): values between the corners of cells.
+
+    Parameters
+    ----------
+    low, high : array_like (..., 4)
+        At the corners at the lower and the upper end along x, in the order of (y, z) = (low, low), (low, high),
+        (high, low), (high, high).
+    share : array_like (..., 3)
+        Place in the cell, 0 to 1 along each axis.
+    """
+    u, v, w = np.moveaxis(np.asarray(share, dtype=np.float64), -1, 0)[..., None]
+    with np.errstate(under="ignore"):
+        face = np.asarray(low) * (1.0 - u) + np.asarray(high) * u
+        edge = face[..., :2] * (1.0 - v) + face[..., 2:] * v
+        return np.asarray(edge[..., 0] * (1.0 - w[..., 0]) + edge[..., 1] * w[..., 0])
 
 
 def _along(points: npt.ArrayLike, axis: int) -> Array:

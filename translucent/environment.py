@@ -26,6 +26,8 @@ EnvironmentKind = Literal["constant", "gradient", "checkerboard", "image"]
 #: Stops beyond which no exposure makes sense: the radiance of any image stays far below `lights.MAX_RADIANCE`.
 MAX_EXPOSURE = 32.0
 
+_WHAT = "environment radiance"
+
 
 @dataclass(frozen=True, eq=False)
 class Environment:
@@ -88,19 +90,19 @@ class Environment:
     @classmethod
     def constant(cls, radiance: ColorLike) -> Environment:
         """The same radiance from everywhere."""
-        return cls("constant", _radiance(radiance), _radiance(radiance))
+        return cls("constant", parse_radiance(_WHAT, radiance), parse_radiance(_WHAT, radiance))
 
     @classmethod
     def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
         """From `bottom` for rays straight down (-Y) to `top` for rays straight up (+Y), linear in the sine between."""
-        return cls("gradient", _radiance(bottom), _radiance(top))
+        return cls("gradient", parse_radiance(_WHAT, bottom), parse_radiance(_WHAT, top))
 
     @classmethod
     def checkerboard(
         cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
     ) -> Environment:
         """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
-        return cls("checkerboard", _radiance(first), _radiance(second), tiles)
+        return cls("checkerboard", parse_radiance(_WHAT, first), parse_radiance(_WHAT, second), tiles)
 
     @classmethod
     def image(
@@ -256,5 +258,6 @@ def equirectangular_uv(direction: npt.ArrayLike, turn: npt.ArrayLike) -> Array:
     return np.stack([u, np.arctan2(np.hypot(x, z), y) / np.pi], axis=-1)
 
 
-def _radiance(color: ColorLike) -> Array:
-    return positive_triple("environment radiance", parse_color(color) if isinstance(color, str) else color)
+def parse_radiance(what: str, color: ColorLike) -> Array:
+    """(3,): linear radiance from a color as text, or one or three numbers >= 0; errors name it `what`."""
+    return positive_triple(what, parse_color(color) if isinstance(color, str) else color)

@@ -10,12 +10,15 @@ from translucent.plan_borders import border_passes, touching_borders
 from translucent.plan_limits import (
     MAX_SCATTER_LIGHTS,
     closed_sheet_limits,
+    layer_limits,
+    marching_limits,
+    marching_method,
     mesh_limits,
     open_bodies,
     open_limits,
-    refuse_varying_density,
     scattering_limits,
     unmodelled_effects,
+    with_ambient_told,
 )
 from translucent.render_plan import Capabilities, PassSpec, RenderPlan
 from translucent.scene import Object, Scene
@@ -76,6 +79,8 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     capabilities = capabilities or Capabilities()
+    if scene.scatters_ambient:
+        return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities))
     if not scene.bodies:
         raise InputError(
             f"rendering {_names(scene.objects)}",
@@ -86,7 +91,9 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         require_clear_priorities(scene)
     if not capabilities.opengl:
         return _plan_traced(scene, method, capabilities)
-    refuse_varying_density(scene)
+    if scene.varies:
+        method = marching_method(scene, method, capabilities)
+        return _plan_ordered(scene, method, capabilities, "the density varies from place to place")
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
     if (why := _why_order_matters(scene, method)) is not None:
@@ -234,17 +241,6 @@ def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
     return PassSpec("depth_peeling", reason, solids, draws, cost=draws * COSTS["depth_peeling"])
 
 
-def _layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
-    """What is left out where a ray can cross more surfaces than the method keeps."""
-    if isinstance(method, FragmentLists | RayMarched):
-        return []
-    most = method.max_layers if isinstance(method, DepthPeeling) else method.k
-    bodies = [scene.objects[i] for i in _solids(scene)]
-    # A ray crosses a convex body's surface twice, and no face more than once.
-    possible = sum(2 if body.mesh.diagnosis.convex else len(body.mesh.faces) for body in bodies)
-    return [f"pixels with more than {most} surfaces are marked invalid"] if possible > most else []
-
-
 def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilities, why: str) -> RenderPlan:
     sheets = _sheets(scene)
     name = type(method).__name__
@@ -269,7 +265,9 @@ def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilitie
         points = method.steps if isinstance(method, RayMarched) else method.light_points
         passes.append(_light_views(scene, points))
     passes.append(_ordered_pass(scene, method, why))
-    limits = open_limits(scene) + _layer_limits(scene, method)
+    limits = open_limits(scene) + layer_limits(scene, method)
+    if isinstance(method, RayMarched):
+        limits += marching_limits(scene, method)
     if _scatters(scene):
         limits += scattering_limits(scene)
     if sheets and any(body.medium is not None and body.medium.emits for body in scene.bodies):

@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from translucent.density import DensityGrid
 from translucent.errors import InputError
+from translucent.render_plan import Capabilities, RenderPlan
 from translucent.scene import Object, Scene
-from translucent.thickness import Method, ThinLayer
+from translucent.thickness import (
+    LEAST_SEEN,
+    MAX_STEPS,
+    DepthPeeling,
+    FragmentLists,
+    Method,
+    OrderedMethod,
+    RayMarched,
+    ThinLayer,
+)
 
 #: Lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
@@ -14,10 +27,16 @@ MAX_SCATTER_LIGHTS = 8
 #: Optical depth across a scene beyond which float32 places are too coarse for where light is scattered.
 DENSE = 1e5
 
+#: Steps through an interval of varying density, at least, where nobody says how many.
+LEAST_STEPS = 64
+
 #: What a plan says that does not follow lights into media; the renderer warns of it.
 LIGHTS_LEFT_OUT = (
     "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
 )
+
+#: What a plan says where media scatter and nothing shines.
+ONLY_REMOVES = "in-scattered light: scattering only removes light"
 
 
 def open_bodies(scene: Scene) -> tuple[int, ...]:
@@ -48,14 +67,56 @@ def closed_sheet_limits(scene: Scene, method: ThinLayer) -> list[str]:
     return [f"{names} closed, but drawn as sheets: what is inside is left out"] if solid else []
 
 
-def refuse_varying_density(scene: Scene) -> None:
-    """Raise where a density varies in space, which no pass renders."""
-    if dense := [body.mesh.name for body in scene.bodies if body.density is not None]:
+def layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
+    """What is left out where a ray can cross more surfaces than the method keeps."""
+    if isinstance(method, FragmentLists | RayMarched):
+        return []
+    most = method.max_layers if isinstance(method, DepthPeeling) else method.k
+    meshes = [body.mesh for body in scene.bodies if body.sheet_thickness is None]
+    # A ray crosses a convex body's surface twice, and no face more than once.
+    possible = sum(2 if mesh.diagnosis.convex else len(mesh.faces) for mesh in meshes)
+    return [f"pixels with more than {most} surfaces are marked invalid"] if possible > most else []
+
+
+def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> RayMarched:
+    """How rays march where the density varies: as asked for, or with a step for each voxel, and 64 at least.
+
+    Raises
+    ------
+    InputError
+        If another method is asked for, or the machine cannot march.
+    """
+    names = ", ".join(repr(body.mesh.name) for body in scene.bodies if body.density is not None)
+    if not capabilities.shader_storage:
         raise InputError(
-            f"rendering {', '.join(map(repr, dense))} with a density that varies",
-            "no pass of the renderer goes through one",
-            "march the rays on the CPU: tl.reference.march(scene, size)",
+            f"rendering {names} with a density that varies",
+            "this OpenGL has no shader storage buffers, which came with 4.3",
+            "render on the CPU (backend='cpu'), or march there: tl.reference.march(scene, size)",
         )
+    if method is None:
+        grids = [np.shape(body.density.values) for body in scene.bodies if isinstance(body.density, DensityGrid)]
+        return RayMarched(steps=min(max([LEAST_STEPS, *(max(shape) for shape in grids)]), MAX_STEPS))
+    if not isinstance(method, RayMarched):
+        raise InputError(
+            type(method).__name__,
+            f"{names}: the density varies, and only steps through the intervals tell how deep they are",
+            "use RayMarched, or leave the choice to the planner",
+        )
+    return method
+
+
+def marching_limits(scene: Scene, method: RayMarched) -> list[str]:
+    """What marching leaves out."""
+    what = (
+        "optical depth, and what is emitted and scattered, are" if scene.varies else "what is emitted and scattered is"
+    )
+    limits = [
+        f"{what} a sum over {method.steps} steps in each interval ({method.quadrature}); what lies behind a "
+        f"transmittance of {LEAST_SEEN:g} is left out of it"
+    ]
+    if scene.varies and scene.lights:
+        limits[0] += "; depths from the lights are exact, with a path through the density for each step and light"
+    return limits
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[str]:
@@ -96,8 +157,8 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
     layered = [body for body in scene.bodies if body.surface is not None and body.surface.multiple_scattering]
     if borders and layered:
         effects.append(
-            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the ray's "
-            "path, which edges and folds are not"
+            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
+            "path of the ray, which edges and folds are not"
         )
     elif scattering := [medium for medium in media if medium.scatters]:
         if scatters:
@@ -107,7 +168,7 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
                 f"path, here {1 / densest:.2g} m; light of the environment scattered"
             )
         else:
-            effects.append(LIGHTS_LEFT_OUT if scene.lights else "in-scattered light: scattering only removes light")
+            effects.append(LIGHTS_LEFT_OUT if scene.lights else ONLY_REMOVES)
     elif scene.lights and not scene.opaque:
         effects.append("lights: they shine on nothing, since no medium scatters and nothing is opaque")
     bent = [body for body in scene.bodies if body.has_interface]
@@ -133,6 +194,18 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
 def _is_invisible(body: Object) -> bool:
     medium = body.medium
     return medium is not None and not body.has_interface and not (medium.extinction > 0).any() and not medium.emits
+
+
+def with_ambient_told(plan: RenderPlan) -> RenderPlan:
+    """The plan of a scene in which media emit what they scatter of the ambient radiance, made to say so."""
+    told = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
+    passes = tuple(
+        replace(step, reason=f"{step.reason}; {told}") if step.name in ("transmittance", "shade") else step
+        for step in plan.passes
+    )
+    effects = tuple(effect for effect in plan.unmodelled if effect != ONLY_REMOVES)
+    way = "what dims ambient light on its way to a place in the media"
+    return replace(plan, passes=passes, unmodelled=(*effects, way))
 
 
 def _is_sheet(body: Object, method: Method) -> bool:

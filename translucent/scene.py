@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -13,10 +13,10 @@ import numpy.typing as npt
 from translucent.camera import Camera
 from translucent.color import ColorLike, parse_color
 from translucent.density import Density
-from translucent.environment import Environment
+from translucent.environment import Environment, parse_radiance
 from translucent.errors import InputError
 from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
+from translucent.medium import MAX_EMISSION, Medium
 from translucent.mesh import MAX_COORDINATE, Mesh
 from translucent.surface import Surface
 
@@ -167,6 +167,11 @@ class Scene:
         What fills a place that several bodies claim. ``add``: the mixture of all, and thickness counts each of them.
         ``union``: each medium once, however many bodies bring it. ``priority``: the medium of the highest priority.
         With the last two, thickness counts a place once.
+    ambient : str or array_like (3,)
+        Radiance that reaches every place inside the media alike from all around, as if nothing were in its way: a color
+        as text, or linear RGB. Media scatter it into the view rays, sigma_s times ambient for each metre, whatever
+        their phase function. It stands for light that has been scattered often, or comes from the environment, which
+        by itself lights opaque objects only. Default: none.
     """
 
     objects: Sequence[Object]
@@ -174,6 +179,7 @@ class Scene:
     lights: Sequence[Light] = ()
     environment: Environment = field(default_factory=lambda: Environment.constant((1.0, 1.0, 1.0)))
     overlap: Overlap = "add"
+    ambient: ColorLike = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for field_name, kinds in (("objects", Object), ("lights", (PointLight, DirectionalLight))):
@@ -190,6 +196,14 @@ class Scene:
             raise InputError(
                 f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
             )
+        object.__setattr__(self, "ambient", parse_radiance("ambient radiance", self.ambient))
+        for body in self.bodies:
+            if not (self.source(body) <= MAX_EMISSION).all():
+                raise InputError(
+                    f"ambient radiance in {body.mesh.name!r}",
+                    f"it scatters more than {MAX_EMISSION:g} of it for each metre",
+                    "check the unit of the scattering",
+                )
 
     def __repr__(self) -> str:
         return f"Scene of {len(self.objects)} objects, {len(self.lights)} lights, {self.environment.kind} environment"
@@ -209,6 +223,39 @@ class Scene:
         """(2, 3): smallest and largest world coordinates of all objects."""
         boxes = np.stack([body.bounds for body in self.objects])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def source(self, body: Object) -> Array:
+        """(3,): radiance per metre that a body's medium adds to all rays: q + sigma_s A, with the ambient radiance A.
+
+        Phase functions integrate to 1, so none of them matters.
+        """
+        if body.medium is None:
+            return np.zeros(3)
+        with np.errstate(over="ignore", under="ignore"):
+            scattered = np.asarray(body.medium.scattering) * np.asarray(self.ambient)
+            return np.asarray(body.medium.emission + scattered, dtype=np.float64)
+
+    @property
+    def varies(self) -> bool:
+        """Whether the density of any body varies in space."""
+        return any(body.density is not None for body in self.bodies)
+
+    @property
+    def scatters_ambient(self) -> bool:
+        """Whether any medium scatters ambient radiance."""
+        media = [body.medium for body in self.bodies if body.medium is not None]
+        return any(bool((np.asarray(medium.scattering) * np.asarray(self.ambient) > 0).any()) for medium in media)
+
+    @cached_property
+    def with_ambient_emitted(self) -> Scene:
+        """The scene in which media emit what they scatter of the ambient radiance; this one if that is none."""
+        if not self.scatters_ambient:
+            return self
+        objects = [
+            body if body.medium is None else replace(body, medium=replace(body.medium, emission=self.source(body)))
+            for body in self.objects
+        ]
+        return replace(self, objects=objects, ambient=(0.0, 0.0, 0.0))
 
     @property
     def diagonal(self) -> float:

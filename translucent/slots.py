@@ -36,7 +36,8 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
 
     Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
     often, and whether at all, the medium fills a place. An open body keeps a slot of its own, lest its holes cancel
-    those of another. With ``overlap="priority"`` only bodies of equal priority share one.
+    those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority
+    share one.
     """
     groups: list[list[int]] = []
     for i, body in enumerate(scene.objects):
@@ -101,6 +102,8 @@ def _never_negative(body: Object) -> bool:
 def _fill_alike(scene: Scene, a: Object, b: Object) -> bool:
     """Whether it makes no difference which of two bodies fills a place."""
     if a.medium is None or b.medium is None or not same_medium(a, b):
+        return False
+    if a.density is not None or b.density is not None:
         return False
     if not scene.lights:
         return True

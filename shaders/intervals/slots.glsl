@@ -2,6 +2,9 @@
 // silhouette, where rounding has the two change places, it does not.
 
 #include <Media>
+#if VARIES
+#include "volume/density.glsl"
+#endif
 
 int slot_turns(int winding[SLOTS], int slot) {
     if (winding[slot] <= 0) { return 0; }
@@ -16,10 +19,20 @@ int slot_turns(int winding[SLOTS], int slot) {
     for (int other = 0; other < slot; ++other) {
         bool alike = slot_extinction[other].rgb == slot_extinction[slot].rgb
             && slot_emission[other].rgb == slot_emission[slot].rgb && slot_scattering[other] == slot_scattering[slot];
+#if VARIES
+        alike = alike && !slot_varies(slot) && !slot_varies(other);
+#endif
         if (winding[other] > 0 && alike) { return 0; }
     }
     return 1;
 #else
     return winding[slot];
 #endif
+}
+
+// The same for all slots, as numbers: how much of each medium there is where its density is 1.
+float[SLOTS] all_turns(int winding[SLOTS]) {
+    float turns[SLOTS];
+    for (int slot = 0; slot < SLOTS; ++slot) { turns[slot] = float(slot_turns(winding, slot)); }
+    return turns;
 }

@@ -55,11 +55,14 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
     vec3 added = emitted_radiance(mix.emission, mix.extinction, metres);
 #if SCATTER
     if (mix.count > 0.0) {
-#if MARCH
         ViewRay ray = ray_from(float(walk.place) / float(place_steps()));
-        added = marched(walk.winding, ray, metres, mix.extinction, mix.emission);
+        float turns[SLOTS] = all_turns(walk.winding);
+#if MARCH
+        Marched march = marched(turns, ray, metres, mix.extinction, mix.emission, transmittance(walk.optical_depth));
+        added = march.color;
+        depth = march.depth;
 #else
-        added += in_scattered(walk.winding, ray_from(float(walk.place) / float(place_steps())), metres, mix.extinction);
+        added += in_scattered(turns, ray, metres, mix.extinction);
 #endif
     }
 #endif

@@ -160,8 +160,10 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
     float kept = border_reflectance(cosine, 1.0 / ior, 0.0);
     float blur = refraction_roughness(finish.roughness, ior);
-    // What the far border keeps inside leaves after more crossings: seen where it is mirrored to.
-    result.light = kept * environment_light(reflected_direction(inside, leaving.normal), blur);
+    // What the far border keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
+    // where it is mirrored to. Light that scatters on the way comes out all the same where media give it back.
+    vec3 again = finish.scatters_much ? vec3(1.0) : result.passed;
+    result.light = kept * again * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
     if (kept < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
     result.light *= result.passed;

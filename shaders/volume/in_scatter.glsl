@@ -26,20 +26,19 @@ ViewRay ray_from(float place) {
     return ViewRay(across * spread - scatter_off_axis.xyz + along, normalize(ray_forward.xyz + across * scatter_near.z));
 }
 
-// Scattering times phase function of what fills a segment, for a cosine between the directions of travel.
-vec3 scattering_phase(int winding[SLOTS], float cos_scatter) {
+// Scattering times phase function of what fills a place, for a cosine between the directions of travel.
+vec3 scattering_phase(float turns[SLOTS], float cos_scatter) {
     vec3 sum = vec3(0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
-        int turns = slot_turns(winding, slot);
-        if (turns > 0) {
-            sum += float(turns) * slot_scattering[slot].rgb * henyey_greenstein(cos_scatter, slot_scattering[slot].a);
+        if (turns[slot] > 0.0) {
+            sum += turns[slot] * slot_scattering[slot].rgb * henyey_greenstein(cos_scatter, slot_scattering[slot].a);
         }
     }
     return sum;
 }
 
 // One light's radiance at distance s along the segment, per metre, without the transmittances; w: its visibility.
-vec4 scattered_here(int winding[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
+vec4 scattered_here(float turns[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
     vec3 point = ray.start + s * ray.direction;
     vec4 depth = light_depth(light, point);
     tau = depth.rgb;
@@ -48,7 +47,7 @@ vec4 scattered_here(int winding[SLOTS], int light, ViewRay ray, float s, out vec
     float r2 = max(dot(towards, towards), 1e-30);
     float cos_scatter = dot(towards * inversesqrt(r2), ray.direction);
     vec3 power = scatter_light_power[light].rgb * (place.w == 0.0 ? 1.0 : 1.0 / r2);
-    return vec4(power * scattering_phase(winding, cos_scatter), depth.a);
+    return vec4(power * scattering_phase(turns, cos_scatter), depth.a);
 }
 
 // Where v in 0..1 a share u of the integral of e^(-x v) is reached, and dv / du there. A rising exponential is a falling
@@ -66,10 +65,10 @@ vec2 secant_point(float u, float x) {
     return x < 0.0 ? vec2(1.0 - found.x, found.y) : found;
 }
 
-vec3 scatter_from_light(int winding[SLOTS], int light, ViewRay ray, float metres, vec3 sigma) {
+vec3 scatter_from_light(float turns[SLOTS], int light, ViewRay ray, float metres, vec3 sigma) {
     vec3 tau_start, tau_end, tau;
-    scattered_here(winding, light, ray, 0.0, tau_start);
-    scattered_here(winding, light, ray, metres, tau_end);
+    scattered_here(turns, light, ray, 0.0, tau_start);
+    scattered_here(turns, light, ray, metres, tau_end);
     vec3 rise = sigma * metres + tau_end - tau_start;
 
     // Where the light is nearest: at distance closest along the ray, height metres off it.
@@ -103,7 +102,7 @@ vec3 scatter_from_light(int winding[SLOTS], int light, ViewRay ray, float metres
             } else {
                 weight *= metres;
             }
-            vec4 light_here = scattered_here(winding, light, ray, s, tau);
+            vec4 light_here = scattered_here(turns, light, ray, s, tau);
             vec3 here = weight * light_here.a * light_here.rgb * transmittance(sigma * s + tau);
 #if GRAY
             sum += here;
@@ -115,10 +114,10 @@ vec3 scatter_from_light(int winding[SLOTS], int light, ViewRay ray, float metres
     return sum;
 }
 
-vec3 in_scattered(int winding[SLOTS], ViewRay ray, float metres, vec3 sigma) {
+vec3 in_scattered(float turns[SLOTS], ViewRay ray, float metres, vec3 sigma) {
     vec3 sum = vec3(0.0);
     for (int light = 0; light < scatter_light_count; ++light) {
-        sum += scatter_from_light(winding, light, ray, metres, sigma);
+        sum += scatter_from_light(turns, light, ray, metres, sigma);
     }
     return sum;
 }

@@ -6,7 +6,12 @@
 #include "intervals/walk.glsl"
 #include "lib/ray.glsl"
 
-layout(std430, binding = 5) buffer LightMedia { vec4 light_media[]; };
+#if VARIES
+#define MEDIUM uvec4
+#else
+#define MEDIUM vec4
+#endif
+layout(std430, binding = 5) buffer LightMedia { MEDIUM light_media[]; };
 layout(std430, binding = 6) buffer LightEnds { float light_ends[]; };
 
 #if OPAQUE
@@ -15,9 +20,18 @@ uniform sampler2D opaque_place;
 
 uniform int cell_offset;
 
-// Extinction behind a node, and metres for each place.
-vec4 behind(Walk walk, float metres_per_place) {
+// Extinction behind a node, and metres for each place. Where it varies, how often each medium is there.
+MEDIUM behind(Walk walk, float metres_per_place) {
+#if VARIES
+    uvec4 words = uvec4(0u, 0u, 0u, floatBitsToUint(metres_per_place));
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        uint turns = min(uint(slot_turns(walk.winding, slot)), (1u << TURNS_BITS) - 1u);
+        words[slot / TURNS_PER_WORD] |= turns << uint(TURNS_BITS * (slot % TURNS_PER_WORD));
+    }
+    return words;
+#else
     return vec4(contents(walk.winding).extinction, metres_per_place);
+#endif
 }
 
 void main() {

@@ -7,7 +7,11 @@
 
 layout(std430, binding = 3) buffer LightHeads { uint light_heads[]; };    // links, view after view
 layout(std430, binding = 4) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the place
+#if VARIES
+layout(std430, binding = 5) buffer LightMedia { uvec4 light_media[]; };   // turns of the slots, metres for each place
+#else
 layout(std430, binding = 5) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres for each place
+#endif
 layout(std430, binding = 6) buffer LightEnds { float light_ends[]; };     // place where an opaque surface ends each ray
 
 // Where the views of a light are: their texels begin at first, and each has size x size of them.
@@ -21,29 +25,66 @@ uint light_cell(LightCells cells, ivec2 texel) {
     return cells.first + uint(held.y * cells.size + held.x);
 }
 
-// Optical depth to a place, by the crossings of a texel, moved along their faces to the point's own ray; w: the steepest of
-// these, in places per texel. offset: of the point from the texel's center.
-vec4 texel_light_depth(uint cell, vec2 offset, float place) {
-    vec3 depth = vec3(0.0);
+// A light's ray through a point, by places.
+struct LightRay {
+    vec3 point;
+    float place;   // of the point
+    vec3 advance;  // in metres, for each place
+    float metres;  // its length
+};
+
+vec3 point_at(LightRay ray, float place) {
+    return ray.point + (place - ray.place) * ray.advance;
+}
+
+// Optical depth of a part of a light's ray behind a node.
+vec3 part_depth(uint link, LightRay ray, float from, float to) {
+#if VARIES
+    uvec4 words = light_media[link - 1u];
     vec3 extinction = vec3(0.0);
-    float metres = 0.0;
+    for (int slot = 0; slot < SLOTS; ++slot) {
+        uint turns = words[slot / TURNS_PER_WORD] >> uint(TURNS_BITS * (slot % TURNS_PER_WORD));
+        float share = float(turns & ((1u << TURNS_BITS) - 1u));
+        if (share > 0.0 && slot_varies(slot)) {
+            vec3 start = place_in_box(slot, point_at(ray, from));
+            share *= mean_density(slot, start, place_in_box(slot, point_at(ray, to)));
+        }
+        extinction += share * slot_extinction[slot].rgb;
+    }
+    return extinction * ((to - from) * ray.metres);
+#else
+    return light_media[link - 1u].rgb * ((to - from) * ray.metres);
+#endif
+}
+
+// Optical depth to the point of a ray, by the crossings of a texel, moved along their faces to this very ray; w: the
+// steepest of these, in places per texel. offset: of the point from the texel's center.
+vec4 texel_light_depth(uint cell, vec2 offset, LightRay ray) {
+    vec3 depth = vec3(0.0);
     float last = 0.0;
     float steepest = 0.0;
-    for (uint link = light_heads[cell]; link != 0u;) {
-        uvec4 node = light_nodes[link - 1u];
-        vec2 slope = uintBitsToFloat(node.zw);
-        float moved = float(crossing_step(node.x)) / float(place_steps()) + dot(slope, offset);
-        steepest = max(steepest, max(abs(slope.x), abs(slope.y)));
-        if (moved > place) { break; }
-        moved = max(moved, last);
-        depth += extinction * ((moved - last) * metres);
+    uint behind = 0u;
+    uint link = light_heads[cell];
+    bool before = true;
+    while (before) {
+        float moved = ray.place;
+        uint next = 0u;
+        before = link != 0u;
+        if (before) {
+            uvec4 node = light_nodes[link - 1u];
+            vec2 slope = uintBitsToFloat(node.zw);
+            moved = float(crossing_step(node.x)) / float(place_steps()) + dot(slope, offset);
+            steepest = max(steepest, max(abs(slope.x), abs(slope.y)));
+            before = moved <= ray.place;
+            next = node.y;
+        }
+        moved = max(min(moved, ray.place), last);
+        if (behind != 0u && moved > last) { depth += part_depth(behind, ray, last, moved); }
         last = moved;
-        vec4 behind = light_media[link - 1u];
-        extinction = behind.rgb;
-        metres = behind.a;
-        link = node.y;
+        behind = link;
+        link = next;
     }
-    return vec4(depth + extinction * ((place - last) * metres), steepest);
+    return vec4(depth, steepest);
 }
 
 // Which of the six views of a cube looks at a point, given from the light.
@@ -73,7 +114,10 @@ vec4 light_depth(int light, vec3 point) {
 #if SHADOWS
     if (place > light_ends[cell] + 1.5 / views.z) { return vec4(0.0); }
 #endif
-    vec4 depth = texel_light_depth(cell, offset, place);
+    vec3 travel = place_of_light.w == 0.0 ? -place_of_light.xyz : point - place_of_light.xyz;
+    vec3 advance = travel / max(dot(scatter_views[4 * view + 3].xyz, travel), 1e-30);
+    LightRay ray = LightRay(point, place, advance, length(advance));
+    vec4 depth = texel_light_depth(cell, offset, ray);
     if (light_heads[cell] != 0u && depth.w < STEEP_IN_LIGHT_VIEW) { return vec4(depth.rgb, 1.0); }
     vec3 sum = vec3(0.0);
     float total = 0.0;
@@ -83,7 +127,7 @@ vec4 light_depth(int light, vec3 point) {
         ivec2 aside = ivec2(i & 1, i >> 1);
         uint other = light_cell(cells, corner + aside);
         if (light_heads[other] == 0u) { continue; }
-        depth = texel_light_depth(other, share - vec2(aside), place);
+        depth = texel_light_depth(other, share - vec2(aside), ray);
         vec2 weights = mix(1.0 - share, share, vec2(aside));
         float weight = (weights.x * weights.y + 1e-4) / (depth.w * depth.w + 1e-9);
         sum += weight * depth.rgb;

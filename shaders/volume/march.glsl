@@ -46,32 +46,67 @@ vec2 metres_at_share(float share, int light, ViewRay ray, float metres) {
     return vec2(clamp(closest + height * tangent, 0.0, metres), angle * height * (1.0 + tangent * tangent));
 }
 
-// One source: a light, or the emission of the media for -1.
-vec3 march_source(int winding[SLOTS], int light, ViewRay ray, float metres, vec3 sigma, vec3 emission) {
-    vec3 sum = vec3(0.0);
+struct Marched {
+    vec3 color;  // seen from the segment's beginning
+    vec3 depth;
+};
+
+// The steps of one pass: emission and all lights, for variable = -1; or with equal angles one point light, which the first
+// pass then leaves out. before: transmittance from the eye to the segment. Where that of all channels falls below
+// LEAST_SEEN, sources are not looked for: what is left out is at most this share of what comes from there.
+Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
+    Marched sum = Marched(vec3(0.0), vec3(0.0));
     for (int i = 0; i < march_steps; ++i) {
         vec3 shares = step_shares(i);
-        float begin = metres_at_share(shares.x, light, ray, metres).x;
-        float end = metres_at_share(shares.y, light, ray, metres).x;
-        vec2 at = metres_at_share(shares.z, light, ray, metres);
+        float begin = metres_at_share(shares.x, variable, ray, metres).x;
+        float end = metres_at_share(shares.y, variable, ray, metres).x;
+        vec2 at = metres_at_share(shares.z, variable, ray, metres);
         vec3 source = emission;
-        if (light >= 0) {
+#if VARIES
+        float here[SLOTS] = turns;
+        sigma = source = vec3(0.0);
+        for (int slot = 0; slot < SLOTS; ++slot) {
+            if (turns[slot] > 0.0 && slot_varies(slot)) {
+                here[slot] *= density_at(slot, place_in_box(slot, ray.start + at.x * ray.direction));
+            }
+            sigma += here[slot] * slot_extinction[slot].rgb;
+            source += here[slot] * slot_emission[slot].rgb;
+        }
+        vec3 through = transmittance(sum.depth);
+#else
+        float here[SLOTS] = turns;
+        sum.depth = sigma * begin;
+        vec3 through = transmittance(sum.depth);
+#endif
+        sum.depth += sigma * (end - begin);
+        vec3 seen = through * before;
+        if (max(seen.r, max(seen.g, seen.b)) < LEAST_SEEN) { continue; }
+        if (variable >= 0) { source = vec3(0.0); }
+        for (int light = 0; light < scatter_light_count; ++light) {
+            bool angular = march_rule == MARCH_EQUIANGULAR && scatter_light_place[light].w != 0.0;
+            if (angular ? light != variable : variable >= 0) { continue; }
             vec3 tau;
-            vec4 lit = scattered_here(winding, light, ray, at.x, tau);
-            source = lit.a * lit.rgb * transmittance(tau);
+            vec4 lit = scattered_here(here, light, ray, at.x, tau);
+            source += lit.a * lit.rgb * transmittance(tau);
         }
         vec3 color = march_rule == MARCH_EXPONENTIAL
             ? emitted_radiance(source, sigma, end - begin)
             : source * at.y * (shares.y - shares.x) * transmittance(sigma * (at.x - begin));
-        sum += transmittance(sigma * begin) * color;
+        sum.color += through * color;
     }
     return sum;
 }
 
-vec3 marched(int winding[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission) {
-    vec3 sum = march_source(winding, -1, ray, metres, sigma, emission);
-    for (int light = 0; light < scatter_light_count; ++light) {
-        sum += march_source(winding, light, ray, metres, sigma, emission);
+Marched marched(float turns[SLOTS], ViewRay ray, float metres, vec3 sigma, vec3 emission, vec3 before) {
+    Marched sum = Marched(vec3(0.0), sigma * metres);
+    for (int variable = -1; variable < scatter_light_count; ++variable) {
+        bool angular = march_rule == MARCH_EQUIANGULAR && scatter_light_place[max(variable, 0)].w != 0.0;
+        if (variable >= 0 && !angular) { continue; }
+        Marched pass = march_pass(turns, variable, ray, metres, sigma, emission, before);
+        sum.color += pass.color;
+#if VARIES
+        if (variable < 0) { sum.depth = pass.depth; }
+#endif
     }
     ++marched_segments;
     return sum;

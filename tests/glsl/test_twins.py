@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent import camera, color, environment, interface, optics, tone, two_stream
+from translucent import camera, color, density, environment, interface, optics, tone, two_stream
 from translucent.assets import shader_library
 from translucent.gpu.probe import run_function, signatures
 
@@ -18,13 +18,19 @@ MODULES: dict[str, ModuleType] = {
     "interface": interface,
     "two_stream": two_stream,
     "color": color,
+    "density": density,
     "environment": environment,
     "ray": camera,
     "tone": tone,
 }
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
-HOST_ONLY = {"color": {"parse_color", "to_hex"}, "camera": {"check_size"}, "tone": {"tone_curve"}}
+HOST_ONLY = {
+    "color": {"parse_color", "to_hex"},
+    "camera": {"check_size"},
+    "tone": {"tone_curve"},
+    "environment": {"parse_radiance"},
+}
 
 DEPTHS = np.concatenate(
     [[0.0], np.geomspace(1e-30, 1e4, 200), [0.5, np.nextafter(0.5, 0), 87.0, 88.8, 104.0, 1e5, 1e30]]
@@ -106,7 +112,23 @@ def _turned_arguments() -> list[np.ndarray]:
 RADIANCE = np.concatenate([[-1.0, 0.0], np.geomspace(1e-6, 1e6, 90), np.linspace(0.01, 1.5, 60)])
 
 
+def _cell_arguments() -> list[np.ndarray]:
+    rng = np.random.default_rng(6)
+    low, high = rng.random((2, 300, 4)) * 10.0 ** rng.integers(-6, 7, (2, 300, 1))
+    share = np.concatenate([rng.random((292, 3)), np.indices((2, 2, 2)).reshape(3, 8).T])
+    return [values.astype(np.float32) for values in (low, high, share)]
+
+
+#: Within the box, on its border, and what rounding puts outside.
+ALONG = np.concatenate([np.linspace(0, 1, 13), [-1e-6, 1 + 1e-6, 1e-30, 1 - 1e-7]])
+
 ARGUMENTS = {
+    "linear_density": _mixed(ALONG, np.array([0.0, 1.0, 1e-6, 1e12]), np.array([0.0, 1.0, 3.0])),
+    "exponential_density": _mixed(ALONG, np.array([1e-6, 1.0, 1e12]), np.array([0.0, -1e-7, 1e-3, -0.5, 3.0, -60.0])),
+    "exponential_density_mean": _mixed(
+        ALONG, ALONG, np.array([1e-6, 1e12]), np.array([0.0, -1e-7, 1e-3, -0.5, 3.0, -60.0])
+    ),
+    "trilinear": _cell_arguments(),
     "transmittance": [_triples(DEPTHS)],
     "opacity": [_triples(DEPTHS)],
     "mean_transmittance": [_triples(DEPTHS)],
@@ -227,6 +249,13 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
         allowed = allowed + eps * np.minimum(depth, 200.0) * exact * 4
     if name == "emitted_radiance":
         allowed = allowed + 1e-37
+    if name.startswith("exponential_density"):
+        # An exponential multiplies the rounding of its exponent, and of the place in it, by up to the exponent.
+        allowed = allowed + 4 * eps * np.abs(arguments[-1]) * np.abs(exact)
+    if name == "linear_density":
+        allowed = allowed + 4 * eps * np.maximum(arguments[1], arguments[2])  # mix may cancel
+    if name == "trilinear":
+        allowed = allowed + 8 * eps * np.maximum(arguments[0], arguments[1]).max(axis=1)
     return allowed + 1.2e-38  # below the smallest normal number everything may flush to 0
 
 

@@ -72,6 +72,23 @@ def test_a_thousand_renders_and_a_hundred_resizes_leave_nothing_behind() -> None
         assert grown * (1 if sys.platform != "darwin" else 1 / 1024) < 10_000
 
 
+def test_density_grids_that_are_drawn_no_more_free_their_texture() -> None:
+    mesh, camera = Box().tessellate(), tl.Camera.look_at((1, 2, 3), (0, 0, 0))
+    with tl.Renderer() as renderer:
+        count = _counter(renderer)
+
+        def work(sizes: tuple[int, ...]) -> None:
+            for size in sizes:
+                grid = tl.DensityGrid(np.ones((size, size, size)))
+                renderer.render(tl.Scene([tl.Object(mesh, tl.Medium(1.0), density=grid)], camera), (32, 24))
+            gc.collect()
+
+        work((2,))
+        objects = count()
+        work((3, 4, 5))
+        assert count() == objects
+
+
 def test_meshes_that_are_gone_free_their_buffers() -> None:
     with tl.Renderer() as renderer:
         count = _counter(renderer)

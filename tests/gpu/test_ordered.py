@@ -389,3 +389,20 @@ def test_a_saved_frame_holds_its_layers(renderer: tl.Renderer, tmp_path: Path) -
     ).save(tmp_path / "b.npz")
     with np.load(tmp_path / "b.npz") as stored:
         assert "layers" not in stored
+
+
+@pytest.mark.parametrize("corner", [(-1, -1), (1, -1), (-1, 1), (1, 1)])
+def test_peeling_goes_on_for_the_one_pixel_that_needs_it(renderer: tl.Renderer, corner: tuple[int, int]) -> None:
+    """A stack of plates in a corner of a picture whose size no tile divides, and a box everywhere else."""
+    camera = tl.Camera.orthographic((0, 0, 10), (0, 0, 0), height=37.0)  # a pixel is 1 m
+    spot = np.array(corner) * (25, 18)
+    plates = [
+        tl.Object(Box((spot[0] - 0.4, spot[1] - 0.4, z), (spot[0] + 0.4, spot[1] + 0.4, z + 0.5)).tessellate(), AMBER)
+        for z in range(7)
+    ]
+    wide = tl.Object(Box((-20, -15, -2), (20, 15, -1)).tessellate(), AMBER)
+    frame = renderer.render(tl.Scene([*plates, wide], camera), (51, 37), tl.DepthPeeling())
+    assert frame.valid.all()
+    assert frame.layers is not None
+    assert frame.layers.max() == 14
+    np.testing.assert_allclose(frame.thickness.max(), 3.5, rtol=1e-5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
+from translucent.gpu.passes.light_views import LightViewsPass
 from translucent.solids import Box, Sphere
 
 BLACK = tl.Environment.constant((0.0, 0.0, 0.0))
@@ -297,3 +299,46 @@ def test_a_method_that_leaves_scattered_light_out_says_so(renderer: tl.Renderer)
     for method in (tl.SignedDepth(), tl.DepthPeeling()):
         with pytest.warns(tl.TranslucentWarning, match="this method leaves out what lights send into media"):
             renderer.render(scene, SIZE, method)
+
+
+def test_lights_look_again_only_when_what_they_see_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames are those of a new renderer, wherever the camera goes and whatever changes."""
+    looks = []
+    original = LightViewsPass._look
+
+    def counted(self: LightViewsPass, job: Any, spec: Any) -> Any:
+        looks.append(job)
+        return original(self, job, spec)
+
+    monkeypatch.setattr(LightViewsPass, "_look", counted)
+    mesh, moved = Box().tessellate(), np.eye(4)
+    moved[0, 3] = 0.3
+    milk, soot = tl.Medium(scattering=2.0), tl.Medium(scattering=2.0, absorption=3.0)
+    low, high = tl.PointLight((0, -2, 0), (9, 9, 9)), tl.PointLight((0, 2, 0), (9, 9, 9))
+    rock = tl.Object(Box((-0.1, 0.6, -0.1), (0.1, 0.8, 0.1)).tessellate())
+    front, side = tl.Camera.look_at((0, 0, 4), (0, 0, 0)), tl.Camera.look_at((4, 0, 1), (0, 0, 0))
+    grids = [tl.DensityGrid(np.full((2, 2, 2), value)) for value in (1.0, 2.0)]
+    frames = [
+        ([tl.Object(mesh, milk)], front, [high], 1),
+        ([tl.Object(mesh, milk)], side, [high], 0),
+        ([tl.Object(mesh, milk)], front, [replace(high, intensity=(1, 1, 1))], 0),
+        ([tl.Object(mesh, milk)], front, [low], 1),
+        ([tl.Object(mesh, milk, moved)], front, [low], 1),
+        ([tl.Object(mesh, soot, moved)], front, [low], 1),
+        ([tl.Object(mesh, soot, moved), rock], front, [high], 1),
+        ([tl.Object(mesh, soot, density=grids[0])], front, [high], 1),
+        ([tl.Object(mesh, soot, density=grids[1])], front, [high], 1),
+        ([tl.Object(mesh, soot, density=grids[1])], front, [tl.DirectionalLight((0, -1, 0), (1, 1, 1))], 1),
+    ]
+    with tl.Renderer() as kept:
+        for objects, camera, lights, expected in frames:
+            scene = tl.Scene(objects, camera, lights)
+            looks.clear()
+            found = kept.render(scene, (24, 16)).radiance
+            assert len(looks) == expected
+            with tl.Renderer() as new:
+                np.testing.assert_array_equal(found, new.render(scene, (24, 16)).radiance)
+        looks.clear()
+        kept.render(scene, (24, 16), samples=4)
+        kept.render(scene, (25, 16))
+        assert len(looks) == 1

@@ -90,7 +90,8 @@ def ball_radiance(scene: tl.Scene, sigma: Array, ior: float) -> tuple[Array, npt
     def light(direction: Array) -> Array:
         return scene.environment.radiance(direction, np.zeros((*direction.shape[:-1], 2)))
 
-    through = np.exp(-sigma * path) * ((1 - share) * light(out) + share * light(kept))
+    passed = np.exp(-sigma * path)
+    through = passed * ((1 - share) * light(out) + share * passed * light(kept))
     return share * light(interface.reflected_direction(ray, normal)) + (1 - share) * through, hit
 
 
@@ -123,7 +124,8 @@ def test_a_pane_shifts_light_and_does_not_turn_it(renderer: tl.Renderer) -> None
     path = 0.4 / optics.refracted_cosine(cosine, ior)[..., None]
     mirrored = ray * (1, 1, -1)
     sky, back = (SKY.radiance(direction, np.zeros((*ray.shape[:2], 2))) for direction in (ray, mirrored))
-    expected = share * back + (1 - share) * np.exp(-sigma * path) * ((1 - share) * sky + share * back)
+    passed = np.exp(-sigma * path)
+    expected = share * back + (1 - share) * passed * ((1 - share) * sky + share * passed * back)
     np.testing.assert_allclose(frame.radiance, expected, rtol=1e-3)
 
 

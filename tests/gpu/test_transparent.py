@@ -39,7 +39,7 @@ def test_before_any_grey_it_is_the_frame_with_that_background(renderer: tl.Rende
 
 
 def test_files_hold_alpha(renderer: tl.Renderer, scene: tl.Scene, tmp_path: Path) -> None:
-    OpenEXR = pytest.importorskip("OpenEXR")  # noqa: N806
+    OpenEXR = pytest.importorskip("OpenEXR")
     frame = renderer.render(scene, SIZE, transparent=True)
     for name in ("a.png", "a.exr", "a.npz"):
         frame.save(tmp_path / name)

@@ -10,8 +10,10 @@ import numpy as np
 from translucent.backdrop import Backdrop
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
+from translucent.gpu.densities import GridTexture, density_uniforms, scene_grids
 from translucent.gpu.environment_maps import EnvironmentMaps
-from translucent.gpu.layout import BODY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
+from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
+from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.targets import Targets
 from translucent.gpu.textures import TextureCache
@@ -53,7 +55,7 @@ class FrameJob:
 
     Parameters
     ----------
-    gl, scene, plan, targets, meshes, environments, textures
+    gl, scene, plan, targets, meshes, grids, environments, textures
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
     """
@@ -65,6 +67,7 @@ class FrameJob:
         plan: RenderPlan,
         targets: Targets,
         meshes: MeshCache,
+        grids: GridTexture,
         environments: EnvironmentMaps,
         textures: TextureCache,
         backdrop: Backdrop | TextureBackdrop | None = None,
@@ -74,6 +77,7 @@ class FrameJob:
         self.plan = plan
         self.targets = targets
         self.meshes = meshes
+        self.grids = grids
         self.environments = environments
         self.textures = textures
         self.backdrop = backdrop
@@ -101,6 +105,9 @@ class FrameJob:
         if self.has_surfaces:
             view = View(scene.camera, targets.size)
             self._constant[SURFACES] = gl.buffer(surface_uniforms(scene, self.media_range, view))
+        if self.scene.varies:
+            densities = density_uniforms(scene, self.slots, media_sphere(scene)[0])
+            self._constant[DENSITY] = gl.buffer(densities)
         self._cleared: set[str] = set()
         self.place((0.0, 0.0))
 
@@ -119,7 +126,7 @@ class FrameJob:
     def bind(self) -> None:
         """Bind this frame's uniforms, where another's have been bound since it was placed."""
         if self.marches and not self.scatters and self.light_views is None:
-            self.light_views = LightViews(self.scene.camera.eye, (), np.zeros((0, 4)), np.zeros((0, 4)))
+            self.light_views = LightViews(media_sphere(self.scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4)))
         if self.light_views is not None and SCATTER not in self._constant:
             view = View(self.scene.camera, self.targets.size)
             method = self.plan.method
@@ -202,6 +209,11 @@ class FrameJob:
         """Give the places where rays end to the shader that reads texture `unit`, if there are any."""
         if self.has_opaque:
             self.targets.opaque().color_attachments[0].use(unit)
+
+    def bind_grids(self, unit: int) -> None:
+        """Give the density grids to the shader that reads texture `unit`, if a density varies."""
+        if self.scene.varies:
+            self.grids.use(unit, scene_grids(self.scene, self.slots))
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state; front faces are those where a ray enters."""

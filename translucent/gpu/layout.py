@@ -179,7 +179,7 @@ ENVIRONMENT = UniformBlock(
 #: Per frame: where the borders of bodies are. Positions count from the center of the media.
 SURFACES = UniformBlock(
     "Surfaces",
-    7,
+    8,
     (
         ("surface_right", "f4", (4,)),  # camera's axes, times half the view's extent (at distance 1); w: perspective
         ("surface_up", "f4", (4,)),
@@ -226,4 +226,16 @@ SCATTER = UniformBlock(
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, SURFACES)}
+#: Per frame: densities that vary, by slots. Points count from the center of the media.
+DENSITY = UniformBlock(
+    "Density",
+    7,
+    (
+        ("density_rows", "f4", (3 * MAX_SLOTS, 4)),  # from a point to the unit box of the slot's body
+        # Kind; axis, density at its start and end, or the densest and the logarithm of their ratio
+        ("density_profile", "f4", (MAX_SLOTS, 4)),
+        ("density_grid", "f4", (MAX_SLOTS, 4)),  # voxels along x, y and z; the first layer in the texture of all grids
+    ),
+)
+
+BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES)}

@@ -15,6 +15,7 @@ from translucent.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.context import GpuContext, adopt_context, open_context
+from translucent.gpu.densities import GridTexture
 from translucent.gpu.environment_maps import EnvironmentMaps
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
@@ -57,6 +58,7 @@ class GpuRenderer:
     def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
         self.context: GpuContext = open_context(backend) if context is None else adopt_context(context)
         self._meshes = MeshCache(self.context.gl)
+        self._grids = GridTexture(self.context.gl)
         self._environments = EnvironmentMaps(self.context.gl)
         self._textures = TextureCache(self.context.gl)
         with self.context.current():
@@ -129,7 +131,8 @@ class GpuRenderer:
                 self._targets.release()
                 self._targets = None
             self._targets = Targets(self.context.gl, size)
-        shared = self._meshes, self._environments, self._textures
+        shared = self._meshes, self._grids, self._environments, self._textures
+        scene = scene.with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, *shared, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
@@ -183,6 +186,7 @@ class GpuRenderer:
         self._closed = True
         with self.context.current():
             self._meshes.release()
+            self._grids.release()
             self._environments.release()
             self._textures.release()
             if self._targets is not None:

@@ -14,7 +14,7 @@ from translucent.color import LUMINANCE_WEIGHTS
 from translucent.errors import RenderError
 from translucent.gpu.layout import BLOCKS
 from translucent.optics import MIN_THIN_LAYER_COSINE
-from translucent.thickness import Quadrature
+from translucent.thickness import LEAST_SEEN, Quadrature
 from translucent.tone import (
     AGX_DISPLAY,
     AGX_MIDDLE_GREY,
@@ -31,6 +31,9 @@ from translucent.tone import (
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8
 
+#: Pixels along a side of the tiles of which peeling learns how many crossings they have at most.
+PEEL_TILE = 16
+
 #: Numbers that shaders share; Python is the only place where they are written.
 CONSTANTS: dict[str, str] = {
     "PI": "3.14159265358979",
@@ -45,8 +48,15 @@ CONSTANTS: dict[str, str] = {
     "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
     "PEEL_BATCH": str(PEEL_BATCH),
+    "PEEL_TILE": str(PEEL_TILE),
     "STEEP_IN_LIGHT_VIEW": "5e-3",  # places per texel, from which on a face may well curve within a texel
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
+    "LEAST_SEEN": repr(LEAST_SEEN),
+    "DENSITY_GRID": "1.0",
+    "DENSITY_LINEAR": "2.0",
+    "DENSITY_EXPONENTIAL": "3.0",
+    "TURNS_BITS": "6",  # of a word, for how often a medium fills a place
+    "TURNS_PER_WORD": "5",
     "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this share of it are near
     "FLAG_COVERED": "1.0",
     "FLAG_VALID": "2.0",

@@ -186,7 +186,9 @@ def media_uniforms(scene: Scene, slots: tuple[Slot, ...], placements: list[Place
     """Contents of the Media block."""
     extinction, emission, scattering = (np.zeros((MAX_SLOTS, 4)) for _ in range(3))
     for i, slot in enumerate(slots[:MAX_SLOTS]):
-        extinction[i, :3] = bounded_extinction(slot.medium, scene.diagonal)
+        density = scene.objects[slot.objects[0]].density
+        densest = 1.0 if density is None else max(density.maximum, 1.0)
+        extinction[i, :3] = bounded_extinction(slot.medium, densest * scene.diagonal)
         emission[i, :3] = slot.medium.emission
         share = extinction[i, :3] / np.where(slot.medium.extinction > 0, slot.medium.extinction, 1.0)
         scattering[i] = *(share * np.asarray(slot.medium.scattering)), slot.medium.anisotropy

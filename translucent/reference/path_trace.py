@@ -70,7 +70,7 @@ def path_trace(
     Raises
     ------
     InputError
-        If an argument is not in its range, a body is open or a sheet, or the media are too deep.
+        If an argument is not in its range, a body is open or a sheet, the media are too deep, or radiance is ambient.
     """
     began = time.perf_counter()
     width, height = check_size(size)
@@ -102,6 +102,12 @@ def path_trace(
 
 
 def _check(scene: Scene, paths: int, max_events: int | None) -> None:
+    if scene.scatters_ambient:
+        raise InputError(
+            "path tracing with ambient radiance",
+            "it stands for what paths find by themselves: light of the environment, and light scattered often",
+            "leave ambient out",
+        )
     if paths < 2:
         raise InputError(f"path tracing with {paths} paths", "no spread without two", "use for example 64")
     if max_events is not None and max_events < 0:

@@ -54,8 +54,9 @@ def render(
 ) -> Frame:
     """True thickness, transmittance and radiance of a scene.
 
-    Radiance holds what is behind, what media emit, and the light of all lights that solid media scatter once; not what
-    they scatter out of the environment, what sheets scatter, or what is scattered twice (`path_trace` has it all).
+    Radiance holds what is behind, what media emit, what they scatter of `Scene.ambient`, and the light of all lights
+    that solid media scatter once; not what they scatter out of the environment, what sheets scatter out of lights, or
+    what is scattered twice (`path_trace` has it all).
     Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
 
     Where light changes at the borders of bodies (`Object.has_interface`), radiance is that of rays that bend and split

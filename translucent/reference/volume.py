@@ -32,16 +32,17 @@ class Volume:
     Attributes
     ----------
     extinction, scattering, emission : (n, 3) float64
-        Where the density is 1.
+        Where the density is 1. Emission counts what is scattered of the ambient radiance.
     anisotropy : (n,) float64
     """
 
     def __init__(self, scene: Scene) -> None:
         media = [body.medium for body in scene.objects]
-        self.extinction, self.scattering, self.emission = (
+        self.extinction, self.scattering = (
             np.array([getattr(medium, name) if medium else np.zeros(3) for medium in media], dtype=np.float64)
-            for name in ("extinction", "scattering", "emission")
+            for name in ("extinction", "scattering")
         )
+        self.emission = np.stack([scene.source(body) for body in scene.objects])
         self.anisotropy = np.array([medium.anisotropy if medium else 0.0 for medium in media])
         self._densities = [(i, body.density) for i, body in enumerate(scene.objects) if body.density is not None]
         self._boxes = {i: _UnitBox(scene, i) for i, _ in self._densities}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import moderngl
+import numpy as np
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
-from translucent.gpu.shaders import CONSTANTS, PEEL_BATCH, set_uniform
+from translucent.gpu.shaders import CONSTANTS, PEEL_BATCH, PEEL_TILE, set_uniform
 from translucent.render_plan import PassSpec
 from translucent.thickness import DepthPeeling
 
@@ -22,6 +23,7 @@ class DepthPeelingPass:
     def __init__(self, gl: moderngl.Context) -> None:
         self._peel = Variants(gl, "geometry/body.vert", "intervals/peel.frag", previous=_PREVIOUS, opaque_place=_OPAQUE)
         self._remaining = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_remaining.frag", found=0)
+        self._counted = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_counted.frag", first=0)
         batch = {f"pass_{i}": i for i in range(PEEL_BATCH)}
         state = {name: PEEL_BATCH + i for i, name in enumerate(_STATE)}
         self._fold = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_fold.frag", **batch, **state)
@@ -40,7 +42,11 @@ class DepthPeelingPass:
         for number in range(most):
             batch.append(job.targets.peeled(number % PEEL_BATCH))
             self._find(job, spec, batch, ends, first=number == 0)
-            last = number + 1 == most or not self._found_any(job, batch[-1])
+            if number == 0:
+                most = min(most, self._passes_needed(job, batch[0], both))
+            # An opaque surface makes all alike that it hides: fewer passes may do than there are crossings.
+            done = job.has_opaque and number > 0 and not self._found_any(job, batch[-1])
+            last = number + 1 == most or done
             if last or len(batch) == PEEL_BATCH:
                 self._go_along(job, batch, ends, folds, last)
                 folds += 1
@@ -67,6 +73,19 @@ class DepthPeelingPass:
         job.draw(self._peel.program(WITH_NORMAL=0, WITH_POSITION=0, **switches), spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)
+
+    def _passes_needed(self, job: FrameJob, first: moderngl.Framebuffer, both: bool) -> int:
+        """After how many passes no pixel can have any crossings left, by the count of the first pass."""
+        width, height = (-(-length // PEEL_TILE) for length in first.size)
+        tiles = job.targets.peeled(1)
+        tiles.scissor = 0, 0, width, height
+        tiles.use()
+        first.color_attachments[0].use(0)
+        self._counted.draw_fullscreen(self._counted.program())
+        tiles.scissor = None
+        found = np.frombuffer(tiles.read((0, 0, width, height), components=1, alignment=1, dtype="f4"), np.float32)
+        layers = round(float(found.max()))
+        return 1 + (-(-layers // 2) if both else layers)
 
     def _found_any(self, job: FrameJob, found: moderngl.Framebuffer) -> bool:
         """Whether a pass has found a crossing in any pixel."""

@@ -30,7 +30,12 @@ class FragmentListsPass:
     def __init__(self, gl: moderngl.Context) -> None:
         self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
         self._resolve = Variants(
-            gl, "geometry/fullscreen.vert", "intervals/fragment_lists_resolve.frag", 430, opaque_place=0
+            gl,
+            "geometry/fullscreen.vert",
+            "intervals/fragment_lists_resolve.frag",
+            430,
+            opaque_place=0,
+            density_grids=1,
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -90,6 +95,7 @@ class FragmentListsPass:
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
         _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
+        job.bind_grids(1)
         switches = {"OPAQUE": job.has_opaque, "BORDERS": job.finds_exits}
         program = self._resolve.program(**walk_switches(job), GRADIENT=0, **switches)
         if isinstance(method := job.plan.method, RayMarched):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,6 +18,7 @@ from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightViews
+from translucent.lights import PointLight
 from translucent.render_plan import PassSpec
 from translucent.scene import Light
 
@@ -48,27 +50,34 @@ class LightViewsPass:
         self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_place=0)
         self._opaque = OpaquePass(gl)
         self._targets: dict[int, Targets] = {}
+        self._held: tuple[object, LightViews] | None = None
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Make the lists of all views, and tell the shaders where the lights are."""
-        if job.light_views is None:  # else this is one more sample of a frame, and lights do not move
-            for side in _SIDES:
-                if (found := self._look(job, spec, side)) is not None:
-                    job.light_views = found
-                    break
-            else:
-                raise RenderError(
-                    f"{len(job.scene.lights)} lights on media that scatter",
-                    f"what they see does not fit into the {job.targets.largest_storage / 1e6:.0f} MB that a shader of "
-                    "this OpenGL reaches",
-                    "use fewer lights, or simpler bodies",
-                )
+        # Lights see the same from frame to frame, wherever the camera is.
+        seen = _seen(job)
+        if self._held is None or self._held[0] != seen:
+            self._held = None
+            self._held = seen, self._look(job, spec)
+        job.light_views = self._held[1]
         job.bind()
         for name, binding in _READ.items():
             if name != "light_ends" or job.scene.opaque:
                 job.targets.storage(name, 1).bind_to_storage_buffer(binding)
 
-    def _look(self, job: FrameJob, spec: PassSpec, side: int) -> LightViews | None:
+    def _look(self, job: FrameJob, spec: PassSpec) -> LightViews:
+        """What all lights see, in the largest views that fit."""
+        for side in _SIDES:
+            if (found := self._look_closely(job, spec, side)) is not None:
+                return found
+        raise RenderError(
+            f"{len(job.scene.lights)} lights on media that scatter",
+            f"what they see does not fit into the {job.targets.largest_storage / 1e6:.0f} MB that a shader of this "
+            "OpenGL reaches",
+            "use fewer lights, or simpler bodies",
+        )
+
+    def _look_closely(self, job: FrameJob, spec: PassSpec, side: int) -> LightViews | None:
         """What all lights see, in views of some size; None if no buffer holds it."""
         groups = [self._light_jobs(job, light, side) for light in job.scene.lights]
         jobs = [light_job for group in groups for light_job in group]
@@ -84,7 +93,7 @@ class LightViewsPass:
         if side not in self._targets:
             self._targets[side] = Targets(self._gl, (side, side))
         scenes = [replace(job.scene, camera=camera) for camera in cameras]
-        shared = job.meshes, job.environments, job.textures
+        shared = job.meshes, job.grids, job.environments, job.textures
         return [FrameJob(job.gl, scene, job.plan, self._targets[side], *shared) for scene in scenes]
 
     def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> bool:
@@ -156,6 +165,28 @@ class LightViewsPass:
         set_uniform(program, "cell_offset", offset)
         self._sorting.draw_fullscreen(program)
         self._gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
+
+
+def _seen(job: FrameJob) -> object:
+    """Equal for frames in which lights see the same and the same buffers hold it; keeps nothing alive."""
+    scene = job.scene
+    objects = tuple(
+        (
+            weakref.ref(body.mesh),
+            body.matrix.tobytes(),
+            body.medium,
+            body.priority,
+            body.sheet_thickness,
+            None if body.density is None else weakref.ref(body.density),
+        )
+        for body in scene.objects
+    )
+    return weakref.ref(job.targets), objects, tuple(_light_key(light) for light in scene.lights), scene.overlap
+
+
+def _light_key(light: Light) -> tuple[object, ...]:
+    where = light.position if isinstance(light, PointLight) else light.direction
+    return type(light), np.asarray(where).tobytes()
 
 
 def _cells(job: FrameJob) -> int:

@@ -57,6 +57,7 @@ def walk_switches(job: Any) -> dict[str, bool | int]:
         "EMISSION": job.emits,
         "SCATTER": job.scatters or job.marches,
         "MARCH": job.marches,
+        "VARIES": job.scene.varies,
         # One set of points serves all channels where light fares alike in them.
         "GRAY": all(_is_gray(slot.medium.extinction) for slot in job.slots),
         "SHADOWS": bool(job.scene.opaque),
