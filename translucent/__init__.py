@@ -14,6 +14,10 @@ from translucent import reference
 from translucent.albedo import scattering_medium
 from translucent.appearance import Appearance, appearance_of, average_color, medium_for_average_color
 from translucent.backdrop import Backdrop
+from translucent.bake.bake import bake_thickness
+from translucent.bake.settings import BakeSettings
+from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
+from translucent.bake.vertices import bake_vertex_thickness
 from translucent.camera import Camera
 from translucent.conversion import (
     DistanceMatch,
@@ -57,6 +61,8 @@ __all__ = [
     "Appearance",
     "BackFaceDepth",
     "Backdrop",
+    "BakeReport",
+    "BakeSettings",
     "Camera",
     "Capabilities",
     "DensityGrid",
@@ -83,11 +89,15 @@ __all__ = [
     "Renderer",
     "Scene",
     "SignedDepth",
+    "ThicknessMap",
     "ThinLayer",
     "TranslucentError",
     "TranslucentWarning",
+    "VertexThickness",
     "appearance_of",
     "average_color",
+    "bake_thickness",
+    "bake_vertex_thickness",
     "clamp_colors",
     "color_at_distance",
     "compare",

@@ -57,7 +57,7 @@ class Directions:
     @property
     def most(self) -> int:
         """How many rays a point may have."""
-        return self.table.shape[2]
+        return int(self.table.shape[2])
 
     def at(self, points: Points, begin: int, end: int) -> Floats:
         """(3, k, end - begin): world directions of rays `begin` to `end` of each point."""

@@ -65,7 +65,7 @@ class Rays:
         In radii; infinite where a ray finds no exit. What lies beyond `reach` is some number at least as large.
         """
         rays = directions.shape[2]
-        distance, cosine, face = (found.reshape(-1) for found in self._first(points, directions))
+        distance, cosine, face = self._first(points, directions)
         # NaN, where no face was found, is not above it either.
         doubtful = ~(cosine > GRAZING)
         ray = np.flatnonzero(doubtful if self.gaps == "first-exit" else ~(distance >= self.reach))
@@ -78,15 +78,13 @@ class Rays:
         return np.maximum(distance, 0.0, out=distance).reshape(-1, rays), traced
 
     def _first(self, points: Points, directions: Floats) -> tuple[Array, Array, npt.NDArray[np.int32]]:
-        """(k, r): distance to the plane of the first face, cosine at it, above 0 where the ray leaves, and the face."""
+        """(k r,): distance to the plane of the first face, cosine at it, above 0 where the ray leaves, and the face."""
         count, rays = directions.shape[1:]
-        planes = self.surface.planes
-        start = (points.start - OFFSET * planes[points.face, :3]).astype(np.float32)
         origins = np.empty((3, count, rays), dtype=np.float32)
-        origins[:] = start.T[:, :, None]
+        origins[:] = self.starts(points).T[:, :, None]
         face = self._trace(origins.reshape(3, -1), directions.reshape(3, -1)).reshape(count, rays)
         # Index -1 takes some face; the ray is doubtful all the same.
-        plane = np.take(planes, face, axis=0, mode="clip")
+        plane = np.take(self.surface.planes, face, axis=0, mode="clip")
         distance, cosine = plane[..., 3].copy(), np.empty((count, rays))
         np.multiply(plane[..., 0], directions[0], out=cosine)
         product = np.multiply(plane[..., 0], points.start[:, 0, None])
@@ -99,7 +97,11 @@ class Rays:
         cosine[face < 0] = np.nan
         with np.errstate(all="ignore"):
             distance /= cosine
-        return distance, cosine, face
+        return distance.reshape(-1), cosine.reshape(-1), face.reshape(-1)
+
+    def starts(self, points: Points) -> Floats:
+        """(k, 3): where rays from points (k) begin, a little below the surface."""
+        return (points.start - OFFSET * self.surface.planes[points.face, :3]).astype(np.float32)
 
     def _trace(self, origins: Floats, directions: Floats) -> npt.NDArray[np.int32]:
         """(n,): first face on rays (3, n), -1 where there is none."""

@@ -46,7 +46,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.face)
 
-    def __getitem__(self, index: slice) -> Points:
+    def __getitem__(self, index: slice | Integers) -> Points:
         return Points(self.face[index], self.exact[index], self.start[index], self.normal[index])
 
 
