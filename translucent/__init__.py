@@ -15,6 +15,8 @@ from translucent.albedo import scattering_medium
 from translucent.appearance import Appearance, appearance_of, average_color, medium_for_average_color
 from translucent.backdrop import Backdrop
 from translucent.bake.bake import bake_thickness
+from translucent.bake.batch import BatchReport, bake_many
+from translucent.bake.reading import load_thickness_map
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 from translucent.bake.vertices import bake_vertex_thickness
@@ -63,6 +65,7 @@ __all__ = [
     "Backdrop",
     "BakeReport",
     "BakeSettings",
+    "BatchReport",
     "Camera",
     "Capabilities",
     "DensityGrid",
@@ -96,6 +99,7 @@ __all__ = [
     "VertexThickness",
     "appearance_of",
     "average_color",
+    "bake_many",
     "bake_thickness",
     "bake_vertex_thickness",
     "clamp_colors",
@@ -110,6 +114,7 @@ __all__ = [
     "load_medium",
     "load_mesh",
     "load_scene",
+    "load_thickness_map",
     "medium_for_average_color",
     "plan",
     "preset",

@@ -1,6 +1,7 @@
 """Which primitives of a glTF file get thickness, and their meshes as a baker takes them.
 
-Those whose material lets light in; where none does, all triangles, whose materials then will. Each is baked in the
+Those whose material lets light in, but for open meshes that it makes thin walls: they have no inside. Where no material
+lets light in, all triangles, whose materials then will. Each is baked in the
 mesh's own space, as glTF states thickness, so nodes that share a mesh share the map, whatever their scale.
 
 The UVs are those that the material reads its thickness texture at (KHR_texture_transform included, as long as it keeps
@@ -89,10 +90,16 @@ def find_targets(
         raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
     materials = materials_of(file)
     found: list[Target] = []
+    walls: list[str] = []
     for place in _places(file, materials):
         primitive = builder.primitive(*place)
         material = materials[primitive["material"]] if "material" in primitive else None
         name = _name(file, place)
+        if material is not None and material.kind == "thin wall":
+            outline = _read(builder.file(), primitive, name, metres, None)
+            if not outline.diagnosis.closed:
+                walls.append(name)
+                continue
         if not needs_uv:
             mesh = _read(builder.file(), primitive, name, metres, None)
             found.append(Target(place, mesh, medium=_medium(material, metres)))
@@ -104,6 +111,9 @@ def find_targets(
         mesh = _read(builder.file(), primitive, name, metres, tex_coord)
         mesh, keeps = _transformed(mesh, material, tex_coord)
         found.append(Target(place, mesh, tex_coord, keeps, _medium(material, metres)))
+    if not found:
+        told = f"all that lets light in are thin walls without an inside: {', '.join(walls)}"
+        raise InputError(f"glTF {str(file.path)!r}", told, "give one of them a volume, or a closed mesh")
     return found
 
 
@@ -184,7 +194,7 @@ def add_uv(builder: GlbBuilder, primitive: Json, name: str, size: int) -> int:
     corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     if len(corners) % 3 or corners.max(initial=0) >= len(positions):
         raise InputError(asked, "its indices make no triangles", "export the file again")
-    made = unwrap(Mesh(positions, corners.reshape(-1, 3), name=name), size, None)
+    made = unwrap(Mesh(positions, corners.reshape(-1, 3).astype(np.int32), name=name), size, None)
     assert made.mesh.uv is not None
     for holder in [primitive["attributes"], *primitive.get("targets", [])]:
         for key, index in holder.items():
