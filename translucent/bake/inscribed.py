@@ -24,8 +24,12 @@ from translucent.bake.texels import closest
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-#: About how many points of the surface the search tree holds, and how many of them are tried around a center.
-TREE_POINTS, TRIED = 400_000, 6
+#: About how many points of the surface the search tree holds, beyond one for each face, and how many of them are tried
+#: around a center. The center of a round body is as far from all points, so that a search looks at every one.
+TREE_POINTS, TRIED = 20_000, 6
+
+#: Larger trees are searched to this relative error of the distance only, for the same reason.
+LARGE_TREE, LARGE_TREE_ERROR = 50_000, 0.005
 
 #: Rounds of shrinking at most, and the share of the radius below which it has come to rest.
 ROUNDS, AT_REST = 32, 1e-7
@@ -50,6 +54,7 @@ class InscribedSpheres:
         self._flat = np.stack([_flatten(self._axes, corners[:, i] - corners[:, 0]) for i in range(3)], axis=1)
         points, self._face = _spread(corners)
         self._tree = cKDTree(points)
+        self._error = LARGE_TREE_ERROR if len(points) > LARGE_TREE else 0.0
 
     def diameters(self, points: Points, exits: Array) -> Array:
         """(k,): diameters in radii of the mesh; `exits` (k,) are the distances to the exits along -n."""
@@ -75,7 +80,7 @@ class InscribedSpheres:
 
     def _nearest(self, center: Array) -> Array:
         """(k, 3): points of the surface nearest to centers (k, 3), of the faces whose tree points are nearest."""
-        _, found = self._tree.query(center, k=min(TRIED, self._tree.n))
+        _, found = self._tree.query(center, k=min(TRIED, self._tree.n), eps=self._error)
         found = found.reshape(len(center), -1)
         best, distance = np.zeros_like(center), np.full(len(center), np.inf)
         for column in range(found.shape[1]):
