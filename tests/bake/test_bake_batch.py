@@ -143,7 +143,7 @@ def test_a_bad_asset_stops_no_other(make_jobs: Any, tmp_path: Path) -> None:
     report = bake_many(jobs, Serial())
     assert [asset["status"] for asset in report.assets] == ["baked", "failed", "baked", "failed"]
     assert "it has no faces" in report.assets[1]["error"] or "cannot be read" in report.assets[1]["error"]
-    assert "no such file" in report.assets[3]["error"]
+    assert report.assets[3]["error"] == f"mesh {jobs[3]['model']!r}; no such file; check the path"
     assert "2 baked, 0 skipped, 2 failed" in str(report)
     whole([jobs[0], jobs[2]])
 

@@ -136,3 +136,21 @@ def test_the_command_line_checks_what_it_wrote(
     told = capsys.readouterr().out
     assert "thickness      rms" in told
     assert f"{path}.check.png: with the map, true, difference" in told
+
+
+def test_a_gltf_file_is_checked_in_metres_and_in_its_own_medium(
+    ball_glb: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A ball of radius 1 whose unit is mm, in a medium that lets exp(-1) pass after 1 in that unit."""
+    source, path = tmp_path / "wine.glb", tmp_path / "t.glb"
+    color = f"linear({np.exp(-1)},{np.exp(-1)},{np.exp(-1)})"
+    assert main(["material", "apply", str(ball_glb), "--color", color, "--distance", "1m", "-o", str(source)]) == 0
+    capsys.readouterr()
+    options = ["--size", "128", "--rays", "16", "--unit", "mm", "--check", "--json"]
+    assert main(["bake", str(source), "-o", str(path), *options]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["check"].values()
+    assert found["mean_thickness"] == pytest.approx(4 / 3 * 1e-3, rel=0.03)
+    assert abs(found["thickness"]["bias"]) < 0.05 * 1e-3
+    # With t = 2 s, s^2 uniform: the mean of exp(-2 s) is (1 - 3 exp(-2)) / 2; with the mean t everywhere exp(-4 / 3).
+    expected = np.exp(-4 / 3) - (1 - 3 * np.exp(-2)) / 2
+    assert found["transmittance"]["bias"] == pytest.approx(expected, abs=0.012)
