@@ -56,7 +56,8 @@ def _line(asset: Record, width: int) -> str:
         return f"{told}  {asset['error']}"
     if found := asset.get("range"):
         told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
-    return told + "".join(f"; {line}" for line in asset.get("warnings", []))
+    turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
+    return told + "".join(f"; {line}" for line in [*turned, *asset.get("warnings", [])])
 
 
 def bake_many(
@@ -130,8 +131,10 @@ def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
 
 
 def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
+    from translucent import __version__
+
     # An executor has its own idea of how many run at a time on a machine.
-    futures = {executor.submit(run_job, {"threads": 1, **job}): job for job in jobs}
+    futures = {executor.submit(run_job, {"threads": 1, **job}, __version__): job for job in jobs}
     try:
         for future in as_completed(futures):
             job = futures[future]
@@ -148,9 +151,18 @@ def _lost(job: Job) -> Record:
     return _entry(job, "failed", 0.0, error="its process died; out of memory, or a crash; try a smaller --size")
 
 
-def run_job(job: Job) -> Record:
-    """Do one job of a batch; what goes wrong is in the entry that it returns."""
+def run_job(job: Job, version: str | None = None) -> Record:
+    """Do one job of a batch; what goes wrong is in the entry that it returns.
+
+    A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
+    """
+    from translucent import __version__
+
     started = time.perf_counter()
+    if version not in (None, __version__):
+        return _entry(
+            job, "failed", 0.0, error=f"its worker has version {__version__}, and not {version}; install that"
+        )
     try:
         content = content_hash(job)
         if is_done(job, content):

@@ -140,7 +140,7 @@ def _write_exr(task: _Task, path: Path) -> None:
         with OpenEXR.File(header, channels) as file:
             file.write(str(path))
     except RuntimeError as error:  # what OpenEXR makes of a full disk
-        raise OSError(str(error).replace(str(path), "the file")) from error
+        raise OSError(str(error).replace(str(path), "the file").rstrip(".")) from error
 
 
 def _stated(task: _Task) -> dict[str, Any]:
