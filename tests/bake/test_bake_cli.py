@@ -15,12 +15,13 @@ import pytest
 import trimesh
 
 import translucent as tl
+from translucent.bake.glb_builder import GlbBuilder
 from translucent.bake.record import sidecar_of
 from translucent.cli import main
 from translucent.commands import bake as command
 from translucent.materials.gltf import read_materials
 from translucent.materials.gltf_file import read_gltf
-from translucent.materials.gltf_scene import thickness_map
+from translucent.materials.gltf_scene import thickness_at, thickness_map
 
 QUICK = ("--size", "32", "--rays", "4", "--padding", "2")
 
@@ -341,30 +342,26 @@ def test_their_map_is_read_by_its_green_channel(assets: Path) -> None:
         assert np.abs(values - wanted).min() < 1e-5
 
 
-def test_our_map_agrees_with_theirs_where_blocks_are_as_deep_as_wide(assets: Path, attenuation: Path) -> None:
-    """The row with their texture: cubes, whose thickness along the normal is their edge."""
-    from translucent.bake.glb_builder import GlbBuilder
+def test_our_maps_agree_with_what_its_authors_wrote(assets: Path, attenuation: Path) -> None:
+    """Cubes, whose thickness along the normal is their edge: by a texture in one row, by factors in others."""
     from translucent.bake.gltf_targets import find_targets
-    from translucent.materials.gltf_scene import thickness_at
 
-    source = read_gltf(assets / "gltf" / "AttenuationTest.glb")
-    targets = {target.place: target for target in find_targets(GlbBuilder(source), new_uv=False)}
+    source, baked = read_gltf(assets / "gltf" / "AttenuationTest.glb"), read_gltf(attenuation)
     theirs = {one.index: one for one in read_materials(source.path)}
     ours = {one.index: one for one in read_materials(attenuation)}
-    baked = read_gltf(attenuation)
-    checked = 0
-    for place, target in targets.items():
-        index = source.items("meshes")[place[0]]["primitives"][place[1]]["material"]
-        if not theirs[index].has_thickness_texture:
-            continue
-        middle = target.mesh.uv[target.mesh.faces].mean(axis=1)
-        uv = np.column_stack([middle[:, 0], 1 - middle[:, 1]])
-        step = theirs[index].thickness / 255 + ours[index].thickness / 255
-        difference = thickness_at(baked, ours[index], uv) - thickness_at(source, theirs[index], uv)
-        # Both round to a step; which of neighbors a texel at the edge of theirs shows is not asked here.
-        assert np.median(np.abs(difference)) <= 0.5 * step
-        checked += len(uv)
-    assert checked
+    textures = 0
+    for target in find_targets(GlbBuilder(source)):
+        mesh, primitive = target.place
+        index = source.items("meshes")[mesh]["primitives"][primitive]["material"]
+        assert ours[index].thickness == pytest.approx(theirs[index].thickness, rel=1e-6)
+        if theirs[index].has_thickness_texture:
+            middle = target.mesh.uv[target.mesh.faces].mean(axis=1)
+            uv = np.column_stack([middle[:, 0], 1 - middle[:, 1]])
+            # 32, 64, 128, 191 and 255 of 255, in both; in theirs by hand.
+            wanted = thickness_at(source, theirs[index], uv)
+            np.testing.assert_allclose(thickness_at(baked, ours[index], uv), wanted, rtol=1e-6)
+            textures += len(np.unique(wanted.round(4)))
+    assert textures == 5
 
 
 def test_the_validator_accepts_their_file_with_our_maps(validate: Any, attenuation: Path) -> None:
