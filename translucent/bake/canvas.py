@@ -94,7 +94,8 @@ class Checkpoint:
             return
         asked = f"checkpoint {str(self._path)!r}"
         try:
-            with np.load(self._path, allow_pickle=False) as data:
+            # Opened here, since NumPy leaves what it opens itself open where it is damaged.
+            with self._path.open("rb") as file, np.load(file, allow_pickle=False) as data:
                 if str(data["key"]) != self._key:
                     raise InputError(asked, "it is of another mesh or other settings", "remove it, or bake as before")
                 for name in self._ARRAYS:

@@ -61,7 +61,9 @@ class Directions:
 
     def at(self, points: Points, begin: int, end: int) -> Floats:
         """(3, k, end - begin): world directions of rays `begin` to `end` of each point."""
-        local = np.take(self.table[:, :, begin:end], _hash(points.exact, self.seed, self.table.shape[1]), axis=1)
+        sets = self.table.shape[1]
+        chosen = _hash(points.exact, self.seed, sets) if sets > 1 else np.zeros(len(points), dtype=np.int64)
+        local = np.take(self.table[:, :, begin:end], chosen, axis=1)
         inward = -points.normal
         tangent, bitangent = (axis.astype(np.float32) for axis in _tangents(inward))
         normal = inward.astype(np.float32)

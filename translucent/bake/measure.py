@@ -107,8 +107,7 @@ class Measure:
         values, errors = np.zeros(len(points)), np.zeros(len(points))
         tolerance = np.inf if self.settings.tolerance is None else self.settings.tolerance / self.unit
         live, begin, end = np.arange(len(points)), 0, min(self.settings.rays, self.directions.most)
-        distance, edges = np.empty((len(points), 0)), np.empty(0, dtype=np.int64)
-        blocks = min(BLOCKS, end)
+        distance, edges = np.empty((len(points), 0)), np.empty((0, min(BLOCKS, end)), dtype=np.int64)
         traced = cast = escaped = 0
         while True:
             if self.stop.is_set():
@@ -117,7 +116,7 @@ class Measure:
             found, more = self.rays.distances(asked, self.directions.at(asked, begin, end))
             traced, cast, escaped = traced + more, cast + found.size, escaped + int(np.isinf(found).sum())
             distance = found if begin == 0 else np.concatenate([distance, found], axis=1)
-            edges = np.concatenate([edges, block_edges(begin, end, blocks)])
+            edges = np.concatenate([edges, block_edges(begin, end, edges.shape[1])])
             values[live], errors[live] = self._estimate(asked, distance, edges)
             above = errors[live] > tolerance
             if end == self.directions.most or not above.any():

@@ -79,8 +79,8 @@ class RayMean:
         Parameters
         ----------
         distance : (k, n) float64
-        edges : (rounds * b + 1,) int64
-            Where the blocks of each round of rays begin, and n.
+        edges : (rounds, b) int64
+            Where the b blocks of each round of rays begin.
         """
         if distance.shape[1] == 1:
             length = np.minimum(distance[:, 0], self.reach)
@@ -128,15 +128,14 @@ class RayMean:
 
 
 def block_edges(begin: int, end: int, blocks: int) -> Integers:
-    """(blocks,): where the blocks of rays `begin` to `end` begin, as equal as can be."""
-    return begin + np.arange(blocks) * (end - begin) // blocks
+    """(1, blocks): where the blocks of rays `begin` to `end` begin, as equal as can be."""
+    return (begin + np.arange(blocks) * (end - begin) // blocks)[None]
 
 
 def _ratio(values: Array, counted: npt.NDArray[np.bool_], edges: Integers) -> tuple[Array, Array]:
     """Mean (k,) of the counted `values` (k, n), 0 where others stand, and its standard error (k,) from blocks."""
-    blocks = min(BLOCKS, values.shape[1])
-    sums = _block_sums(values, edges, blocks)
-    counts = _block_sums(counted.astype(np.float64), edges, blocks)
+    blocks = edges.shape[1]
+    sums, counts = _block_sums(values, edges), _block_sums(counted.astype(np.float64), edges)
     total = np.maximum(counts.sum(axis=1), 1.0)
     mean = sums.sum(axis=1) / total
     with np.errstate(under="ignore"):
@@ -144,7 +143,7 @@ def _ratio(values: Array, counted: npt.NDArray[np.bool_], edges: Integers) -> tu
         return mean, np.sqrt(spread * blocks / max(blocks - 1, 1)) / total
 
 
-def _block_sums(values: Array, edges: Integers, blocks: int) -> Array:
+def _block_sums(values: Array, edges: Integers) -> Array:
     """(k, blocks): sums over the blocks, each over all rounds."""
-    sums = np.add.reduceat(values, edges, axis=1)
-    return np.asarray(sums.reshape(len(values), -1, blocks).sum(axis=1))
+    sums = np.add.reduceat(values, edges.ravel(), axis=1)
+    return np.asarray(sums.reshape(len(values), *edges.shape).sum(axis=1))
