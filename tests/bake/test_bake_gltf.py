@@ -17,7 +17,7 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
-from translucent.bake.glb_builder import GlbBuilder
+from translucent.bake.glb_builder import INDICES, GlbBuilder
 from translucent.bake.gltf_maps import write_maps
 from translucent.bake.gltf_targets import find_targets
 from translucent.bake.writing import save_map, save_vertices
@@ -262,6 +262,21 @@ def test_a_mesh_is_in_its_own_space_and_in_metres(scene: MapMaker, tmp_path: Pat
     assert target.mesh.diagnosis.solid
 
 
+def test_thin_walls_without_an_inside_are_left_alone(scene: MapMaker, tmp_path: Path) -> None:
+    before = scene(tmp_path / "in.glb", 2, extensions=GLASS)
+    builder = GlbBuilder(before)
+    primitive = builder.primitive(0, 0)
+    corners = Accessors(before).indices(primitive["indices"])[3:]  # one face is missing
+    primitive["indices"] = builder.add_accessor(corners.astype(np.uint32), INDICES)
+    assert [target.place for target in find_targets(builder)] == [(1, 0)]
+    builder.primitive(1, 0)["indices"] = primitive["indices"]
+    with pytest.raises(tl.InputError, match="thin walls without an inside: Ball 0, Ball 1"):
+        find_targets(builder)
+    # With a volume it is meant to be solid; the bake tells how many rays escape.
+    builder.tree["materials"][0]["extensions"]["KHR_materials_volume"] = {"thicknessFactor": 1}
+    assert len(find_targets(builder)) == 2
+
+
 @pytest.mark.parametrize("scale", [(0.5, 0.25), (3.0, 3.0)])
 def test_a_texture_transform_stays_where_it_is_of_use(
     scene: MapMaker, scale: tuple[float, float], make_map: MapMaker, ramp: np.ndarray, tmp_path: Path
@@ -337,7 +352,7 @@ def test_new_uvs_take_all_vertex_data_along(scene: MapMaker, tmp_path: Path) -> 
 @pytest.mark.parametrize("change", ["compressed", "strip"])
 def test_what_cannot_be_unwrapped_is_refused(scene: MapMaker, change: str, tmp_path: Path) -> None:
     pytest.importorskip("xatlas", reason="xatlas makes the UVs")
-    before = scene(tmp_path / "in.glb", 1, extensions=GLASS)
+    before = scene(tmp_path / "in.glb", 1, extensions={**GLASS, "KHR_materials_volume": {"thicknessFactor": 1}})
     if change == "strip":
         before.tree["meshes"][0]["primitives"][0]["mode"] = 5
     else:
