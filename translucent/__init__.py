@@ -14,6 +14,12 @@ from translucent import reference
 from translucent.albedo import scattering_medium
 from translucent.appearance import Appearance, appearance_of, average_color, medium_for_average_color
 from translucent.backdrop import Backdrop
+from translucent.bake.bake import bake_thickness
+from translucent.bake.batch import BatchReport, bake_many
+from translucent.bake.reading import load_thickness_map
+from translucent.bake.settings import BakeSettings
+from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
+from translucent.bake.vertices import bake_vertex_thickness
 from translucent.camera import Camera
 from translucent.conversion import (
     DistanceMatch,
@@ -60,6 +66,9 @@ __all__ = [
     "Appearance",
     "BackFaceDepth",
     "Backdrop",
+    "BakeReport",
+    "BakeSettings",
+    "BatchReport",
     "Camera",
     "Capabilities",
     "DensityGrid",
@@ -88,11 +97,16 @@ __all__ = [
     "SignedDepth",
     "Surface",
     "Texture",
+    "ThicknessMap",
     "ThinLayer",
     "TranslucentError",
     "TranslucentWarning",
+    "VertexThickness",
     "appearance_of",
     "average_color",
+    "bake_many",
+    "bake_thickness",
+    "bake_vertex_thickness",
     "clamp_colors",
     "color_at_distance",
     "compare",
@@ -105,6 +119,7 @@ __all__ = [
     "load_medium",
     "load_mesh",
     "load_scene",
+    "load_thickness_map",
     "medium_for_average_color",
     "plan",
     "preset",

@@ -9,6 +9,7 @@ import warnings
 
 import click
 
+from translucent.commands.bake import bake
 from translucent.commands.doctor import doctor
 from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
@@ -57,7 +58,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, explain, extinction, presets, material, doctor):
+for command in (render, bake, explain, extinction, presets, material, doctor):
     cli.add_command(command)
 
 

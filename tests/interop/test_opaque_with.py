@@ -55,13 +55,17 @@ def write(path: Path, *materials: dict[str, Any]) -> Path:
     return path
 
 
+#: Much the same from everywhere: pyrender has only a mean light from all around.
+LIT = ("--environment", "light-table")
+
+
 def test_pyrender_draws_the_opaque_objects_of_a_file(pyrender: ModuleType, run: Run, tmp_path: Path) -> None:
-    red = {"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.1, 0.1, 1]}}
+    red = {"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.1, 0.1, 1], "metallicFactor": 0.0}}
     model = write(tmp_path / "scene.glb", {"extensions": GLASS}, red)
     arrays = {}
     for name, options in (("own", ()), ("pyrender", ("--opaque-with", "pyrender"))):
         output = tmp_path / f"{name}.npz"
-        code, out, err = run("render", model, "-o", output, "--size", "64x48", "--samples", 4, *options)
+        code, out, err = run("render", model, "-o", output, "--size", "64x48", "--samples", 4, *LIT, *options)
         assert (code, err) == (0, "")
         with np.load(output) as file:
             arrays[name] = dict(file)

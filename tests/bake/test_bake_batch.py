@@ -1,0 +1,330 @@
+"""Many assets: equal to one by one, skipped when done, and stopped by nothing - not even a killed worker."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import translucent as tl
+from translucent.bake import jobs as jobs_module
+from translucent.bake.batch import bake_many, run_job
+from translucent.bake.jobs import bake_file, content_hash
+from translucent.bake.local_pool import in_processes
+from translucent.bake.record import read_record, sidecar_of
+
+Job = dict[str, Any]
+QUICK = {"size": 16, "rays": 4, "padding": 2}
+
+
+class Serial(Executor):
+    """Does each job at once, here."""
+
+    def submit(self, task: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(task(*arguments, **named))
+        return future
+
+
+@pytest.fixture
+def make_jobs(make_ball: Callable[..., trimesh.Trimesh], tmp_path: Path) -> Callable[..., list[Job]]:
+    """Jobs for balls of different sizes, as .obj files with UVs."""
+
+    def _make(count: int, out: str = "maps", suffix: str = ".npy", **more: Any) -> list[Job]:
+        (tmp_path / out).mkdir(exist_ok=True)
+        made = []
+        for i in range(count):
+            model = tmp_path / f"ball{i:02d}.obj"
+            if not model.exists():
+                make_ball(1, 0.1 * (i + 1)).export(model)
+            output = tmp_path / out / f"{model.stem}{suffix}"
+            made.append({"model": str(model), "output": str(output), "settings": QUICK, **more})
+        return made
+
+    return _make
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """The files of a folder, but for records, which tell times."""
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.suffix != ".json"}
+
+
+def whole(jobs: list[Job]) -> None:
+    """Every output is there, is what its record says, and nothing else is beside it."""
+    folder = Path(jobs[0]["output"]).parent
+    expected = {Path(job["output"]).name for job in jobs}
+    assert {path.name for path in folder.iterdir()} == expected | {f"{name}.json" for name in expected}
+    for job in jobs:
+        assert jobs_module.is_done(job, content_hash(job))
+
+
+def test_a_job_is_done_and_done_once(make_jobs: Any) -> None:
+    (job,) = make_jobs(1)
+    first = run_job(job)
+    assert (first["status"], first["error"], first["unit"]) == ("baked", None, "m")
+    assert 0 < first["range"]["min"] <= first["range"]["max"] <= 0.2
+    whole([job])
+    written = os.stat(job["output"]).st_mtime_ns
+    assert run_job(job)["status"] == "skipped"
+    assert run_job({**job, "threads": 2, "resume": False})["status"] in ("skipped", "baked")
+    assert os.stat(job["output"]).st_mtime_ns >= written
+
+
+def test_a_worker_of_another_version_bakes_nothing(make_jobs: Any) -> None:
+    (job,) = make_jobs(1)
+    entry = run_job(job, "0.0.0")
+    assert entry["status"] == "failed"
+    assert entry["error"] == f"its worker has version {tl.__version__}, and not 0.0.0; install that"
+    assert not Path(job["output"]).exists()
+    assert run_job(job, tl.__version__)["status"] == "baked"
+
+
+def test_a_mesh_that_was_inside_out_is_told(make_ball: Any, tmp_path: Path) -> None:
+    ball = make_ball(1)
+    ball.invert()
+    ball.export(tmp_path / "inverted.obj")
+    job = {"model": str(tmp_path / "inverted.obj"), "output": str(tmp_path / "t.npy"), "settings": QUICK}
+    with pytest.warns(tl.TranslucentWarning, match="turned"):
+        report = bake_many([job], Serial())
+    assert "; turned 1 closed part outwards" in str(report)
+
+
+@pytest.mark.parametrize("what", ["settings", "mesh", "output", "record", "medium", "version"])
+def test_whatever_changes_is_baked_again(what: str, make_jobs: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    (job,) = make_jobs(1)
+    assert run_job(job)["status"] == "baked"
+    assert run_job(job)["status"] == "skipped"
+    if what == "settings":
+        job = {**job, "settings": {**QUICK, "seed": 1}}
+    elif what == "mesh":
+        with Path(job["model"]).open("a") as stream:
+            stream.write("# one comment more\n")
+    elif what == "output":
+        Path(job["output"]).write_bytes(Path(job["output"]).read_bytes()[:-1])
+    elif what == "record":
+        sidecar_of(Path(job["output"])).write_text("{ cut")
+    elif what == "medium":
+        job = {**job, "medium": [1.0, 2.0, 3.0]}
+    else:
+        monkeypatch.setattr(tl, "__version__", "999", raising=False)
+    assert run_job(job)["status"] == "baked"
+    assert run_job(job)["status"] == "skipped"
+
+
+def test_the_files_that_a_gltf_links_to_count(ball_glb: Path, tmp_path: Path) -> None:
+    from translucent.materials.gltf_file import read_gltf
+
+    file = read_gltf(ball_glb)
+    (tmp_path / "data.bin").write_bytes(file.resource({}))
+    file.tree["buffers"][0]["uri"] = "data.bin"
+    (tmp_path / "ball.gltf").write_text(json.dumps(file.tree))
+    job = {"model": str(tmp_path / "ball.gltf"), "output": str(tmp_path / "t.npy")}
+    before = content_hash(job)
+    assert content_hash(job) == before
+    (tmp_path / "data.bin").write_bytes(b"\0" * len(file.resource({})))
+    assert content_hash(job) != before
+
+
+def test_a_batch_is_what_one_by_one_is(make_jobs: Any, tmp_path: Path) -> None:
+    alone, together = make_jobs(4, "alone"), make_jobs(4, "together")
+    for job in alone:
+        bake_file(job)
+    heard: list[str] = []
+    report = bake_many(together, workers=2, progress=lambda entry: heard.append(entry["model"]))
+    assert (report.count("baked"), report.count("failed")) == (4, 0)
+    assert [asset["model"] for asset in report.assets] == [job["model"] for job in together]
+    assert sorted(heard) == [job["model"] for job in together]
+    assert contents(tmp_path / "alone") == contents(tmp_path / "together")
+    whole(together)
+    again = bake_many(together, Serial())
+    assert again.count("skipped") == 4
+    assert "0 baked, 4 skipped, 0 failed" in str(again)
+    json.dumps(report.summary(), allow_nan=False)
+
+
+def test_a_bad_asset_stops_no_other(make_jobs: Any, tmp_path: Path) -> None:
+    jobs = make_jobs(3)
+    Path(jobs[1]["model"]).write_text("v 0 0 0\n")
+    (tmp_path / "gone.obj").unlink(missing_ok=True)
+    jobs.append({**jobs[0], "model": str(tmp_path / "gone.obj"), "output": str(tmp_path / "maps" / "gone.npy")})
+    report = bake_many(jobs, Serial())
+    assert [asset["status"] for asset in report.assets] == ["baked", "failed", "baked", "failed"]
+    assert "it has no faces" in report.assets[1]["error"] or "cannot be read" in report.assets[1]["error"]
+    assert report.assets[3]["error"] == f"mesh {jobs[3]['model']!r}; no such file; check the path"
+    assert "2 baked, 0 skipped, 2 failed" in str(report)
+    whole([jobs[0], jobs[2]])
+
+
+def test_what_is_wrong_with_the_whole_batch_is_an_error(make_jobs: Any) -> None:
+    jobs = make_jobs(2)
+    with pytest.raises(tl.InputError, match="rename one of them"):
+        bake_many([jobs[0], {**jobs[1], "output": jobs[0]["output"].upper()}])
+    with pytest.raises(tl.InputError, match="bake job with 'sice'; not a known key"):
+        bake_many([{**jobs[0], "sice": 3}])
+    with pytest.raises(tl.InputError, match="bake setting 'sise'; not a known setting"):
+        bake_many([{**jobs[0], "settings": {"sise": 3}}])
+    with pytest.raises(tl.InputError, match="bake job; no output"):
+        bake_many([{"model": "a.obj"}])
+    with pytest.raises(tl.InputError, match="0 processes; below 1"):
+        bake_many(jobs, workers=0)
+    with pytest.raises(tl.InputError, match="max_distance '0%'; not a share such as '10%'"):
+        bake_many([{**jobs[0], "settings": {"max_distance": "0%"}}])
+    with pytest.raises(tl.InputError, match="mode 'transmittance'; no medium"):
+        bake_many([{**jobs[0], "settings": {"mode": "transmittance"}}])
+    assert not list(Path(jobs[0]["output"]).parent.iterdir())
+
+
+def test_a_share_is_of_the_diagonal(make_jobs: Any) -> None:
+    (job,) = make_jobs(1, settings={**QUICK, "max_distance": "10%"})
+    record, results = bake_file(job)
+    (result,) = results.values()
+    assert record["settings"]["max_distance"] == pytest.approx(0.1 * result.mesh.diagonal)
+    assert result.values.max() <= np.float32(0.1 * result.mesh.diagonal)
+
+
+# Processes that die
+
+
+def die_or_double(number: int) -> int:
+    """In a process: 3 ends it, like a crash would."""
+    if number == 3:
+        os._exit(9)
+    return 2 * number
+
+
+def sleep_long(number: int) -> int:
+    """In a process."""
+    if number:
+        time.sleep(60)
+    return number
+
+
+@pytest.fixture
+def importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Lets spawned processes find the functions of this file."""
+    name = "test_bake_batch"
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.setitem(sys.modules, name, sys.modules[__name__])
+    for function in (die_or_double, sleep_long):
+        monkeypatch.setattr(function, "__module__", name)
+    return
+
+
+@pytest.mark.usefixtures("importable")
+def test_a_process_that_dies_takes_only_its_own_item_along() -> None:
+    found = sorted(in_processes(die_or_double, list(range(7)), 2, lambda item: -item))
+    assert found == [-3, 0, 2, 4, 8, 10, 12]
+
+
+@pytest.mark.usefixtures("importable")
+def test_processes_end_when_the_work_is_given_up() -> None:
+    began = time.perf_counter()
+    results = in_processes(sleep_long, [0, 1, 2], 2, lambda item: -item)
+    assert next(results) == 0
+    results.close()  # what an exception such as Ctrl-C does to it
+    assert time.perf_counter() - began < 30
+
+
+# Dask
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    distributed = pytest.importorskip("distributed", reason="the package distributed is not installed")
+    import logging
+
+    from distributed import LocalCluster
+
+    logging.getLogger("distributed").setLevel(logging.ERROR)
+    assert distributed
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, memory_limit=0) as made:
+        yield made
+
+
+@pytest.mark.filterwarnings("ignore")  # of Dask, about workers that end
+def test_dask_bakes_all_though_a_worker_is_killed(cluster: Any, make_jobs: Any, tmp_path: Path) -> None:
+    from distributed import Client
+
+    jobs, alone = make_jobs(50, suffix=".exr"), make_jobs(50, "alone", suffix=".exr")
+    killed = []
+    with Client(cluster) as client:
+        workers = client.run(os.getpid)
+
+        def kill(entry: Job) -> None:
+            done.append(entry)
+            if len(done) == 10:
+                killed.append(next(iter(workers.values())))
+                os.kill(killed[0], signal.SIGKILL)
+
+        done: list[Job] = []
+        report = bake_many(jobs, client.get_executor(), progress=kill)
+    assert killed
+    assert killed[0] not in [pid for pid in workers.values() if _lives(pid)]
+    # A job whose output was whole when its worker died is found done by the next one.
+    assert len(report.assets) == 50
+    assert {asset["status"] for asset in report.assets} <= {"baked", "skipped"}, str(report)
+    assert report.count("baked") >= 48
+    whole(jobs)
+    assert bake_many(alone, Serial()).count("baked") == 50
+    # The same bytes, but for the files' own names, which nothing in them tells.
+    assert contents(tmp_path / "maps") == contents(tmp_path / "alone")
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{pid}/stat")
+    return not (status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z")
+
+
+def test_the_command_line_hands_jobs_to_dask(
+    cluster: Any, make_jobs: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from translucent.cli import main
+
+    models = [job["model"] for job in make_jobs(3)]
+    options = ["--out-dir", str(tmp_path / "maps"), "--format", "npy", "--size", "16", "--rays", "4", "--json"]
+    assert main(["bake", *models, *options, "--dask", cluster.scheduler_address]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["baked"], found["failed"]) == (3, 0)
+    assert all(read_record(Path(asset["output"])) for asset in found["assets"])
+
+
+def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("distributed", reason="the package distributed is not installed")
+    from translucent.cli import main
+
+    assert main(["bake", "bear", "--out-dir", str(tmp_path), "--dask", "not an address"]) == 1
+    assert capsys.readouterr().err.startswith("error: --dask not an address; no scheduler answers")
+
+
+# Ctrl-C
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
+@pytest.mark.parametrize("many", [False, True])
+def test_ctrl_c_leaves_nothing(many: bool, tmp_path: Path) -> None:
+    where = ["--out-dir", str(tmp_path)] if many else ["-o", str(tmp_path / "bear.exr")]
+    command = [sys.executable, "-m", "translucent", "bake", "bear", *where, "--rays", "4096", "--size", "2048"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    timer = threading.Timer(4.0, process.send_signal, [signal.SIGINT])
+    timer.start()
+    _, error = process.communicate(timeout=60)
+    timer.cancel()
+    assert process.returncode == 130, error
+    assert error.strip().splitlines()[-1] == "error: interrupted"
+    assert not list(tmp_path.iterdir())

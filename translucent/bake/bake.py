@@ -1,0 +1,227 @@
+"""Baking a thickness map: from a mesh to an image, in metres."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from translucent.bake.canvas import Canvas, Checkpoint, bake_key
+from translucent.bake.high_low import Projection
+from translucent.bake.measure import Measure
+from translucent.bake.padding import pad
+from translucent.bake.settings import BakeSettings
+from translucent.bake.strips import Strips
+from translucent.bake.surface import Surface
+from translucent.bake.texels import Atlas
+from translucent.bake.thickness_map import BakeReport, ThicknessMap
+from translucent.bake.unwrap import Unwrapped, in_tile, unwrap
+from translucent.bake.work import Progress, bake_strips
+from translucent.cpu.threads import processors
+from translucent.errors import InputError, TranslucentWarning
+from translucent.medium import Medium
+from translucent.mesh import Mesh
+
+
+def bake_thickness(
+    mesh: Mesh,
+    size: int = 1024,
+    mode: str = "cone",
+    rays: int = 64,
+    spread: float = 180.0,
+    seed: int = 0,
+    *,
+    weighting: str = "cosine",
+    gaps: str = "first-exit",
+    max_distance: float | None = None,
+    ignore_back_faces: bool = False,
+    medium: Medium | None = None,
+    supersample: int = 1,
+    padding: int = 16,
+    tolerance: float | None = None,
+    tile: int | None = None,
+    high: Mesh | None = None,
+    cage: Mesh | None = None,
+    high_distance: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+) -> ThicknessMap:
+    """Bake how thick a mesh is under each texel of its texture coordinates.
+
+    Each texel shows the point of the mesh at its center, or the nearest point of a triangle that touches it. Rays go
+    from there into the mesh, around the inward smooth normal; the mode makes one number of their lengths d. With n the
+    outward normal, w the directions and p the density of the weighting:
+
+    - "normal": d(-n), one ray.
+    - "cone": the mean E[d] = integral p(w) d(w) dw over the cone.
+    - "transmittance": the d for which Y(exp(-sigma_t d)) = E[Y(exp(-sigma_t d(w)))], Y being the luminance: what a
+      shader needs to get the mean transmittance of the cone from one length.
+    - "inscribed": the diameter of the largest sphere inside that touches the surface at the point.
+    - "local": P(d(w) >= max_distance), one minus the ambient occlusion with inverted normals (Barre-Brisebois and
+      Bouchard 2011); 1 where the mesh is thick. The only one without a unit.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With uv, or xatlas makes them. It should be closed; see `ThicknessMap.escaped`.
+    size : int
+        Texels along each side of the map.
+    mode : str
+        As above.
+    rays : int
+        From each point, >= 2; powers of 2 are best. Modes "normal" and "inscribed" cast one.
+    spread : float
+        Full angle of the cone in degrees, 0 < spread <= 180.
+    seed : int
+        Of the directions. The result does not depend on the number of threads.
+    weighting : str
+        "cosine": p = cos(theta) / (pi sin^2(spread / 2)), or "uniform": p = 1 / (2 pi (1 - cos(spread / 2))).
+    gaps : str
+        "first-exit": d ends where the ray first leaves the mesh. "total": d is the whole length inside, beyond gaps.
+    max_distance : float, optional
+        In metres: d is at most this. Mode "local" takes a tenth of the diagonal where it is not given.
+    ignore_back_faces : bool
+        Seen from inside, as the rays do, the back of a face is its outer side: rays that meet one go on, where meshes
+        of overlapping parts would otherwise end them. "total" counts such parts once in any case.
+    medium : Medium, optional
+        Of mode "transmittance".
+    supersample : int
+        Points along each side of a texel; each has its own rays.
+    padding : int
+        Texels around each chart that get the value of the nearest texel with one.
+    tolerance : float, optional
+        Standard error in metres (mode "local": 1) to be reached: up to 64 times as many rays are cast where it is not.
+    tile : int, optional
+        UDIM tile to bake. Default: texture coordinates outside 0..1 repeat the map.
+    high : Mesh, optional
+        Detailed mesh whose thickness is baked to the texture coordinates of `mesh`.
+    cage : Mesh, optional
+        `mesh` with its vertices moved outwards: points of `high` are looked for from there, through the point of
+        `mesh`, and as far again behind it.
+    high_distance : float, optional
+        Instead of a cage, metres on either side of `mesh`, along its smooth normals. Default: 2 % of the diagonal.
+    threads : int, optional
+        Default: as many as there are processors.
+    progress : callable, optional
+        Called in this thread with (texels done, all texels of the map, rays traced).
+    checkpoint : Path, optional
+        File that keeps finished parts of the map, every few seconds, until it is done. A bake with the same mesh and
+        settings that finds it goes on from there.
+
+    Returns
+    -------
+    ThicknessMap
+
+    Raises
+    ------
+    InputError
+        If a setting is outside its range; if there are no texture coordinates and no xatlas, or they cannot be used; if
+        all faces look inwards or have no area; if the checkpoint is of another bake.
+    RenderError
+        If embreex is not installed, or the checkpoint cannot be written.
+
+    Warns
+    -----
+    TranslucentWarning
+        If rays escape through holes, texture coordinates overlap, or parts of the mesh get no value.
+    """
+    started = time.perf_counter()
+    settings = BakeSettings(
+        mode, size, rays, spread, weighting, gaps, max_distance, ignore_back_faces, medium,  # type: ignore[arg-type]
+        supersample, padding, seed, tolerance, tile, high_distance,
+    )  # fmt: skip
+    _check_high(high, cage, high_distance)
+    threads = check_threads(threads)
+    unwrapped = unwrap(mesh, size, tile)
+    strips = _strips(mesh, unwrapped, settings, high, cage)
+    canvas = Canvas(size, len(strips.low.faces), -(-size // strips.rows))
+    kept = None if checkpoint is None else Checkpoint(Path(checkpoint), bake_key(settings, mesh, high, cage))
+    if kept is not None:
+        kept.read(canvas)
+    before = canvas.count("traced")
+    bake_strips(strips, canvas, threads, progress, kept)
+    pad(canvas.values, canvas.valued, padding)
+    traced = canvas.count("traced") - before
+    report = _report(unwrapped, strips, canvas, traced, time.perf_counter() - started)
+    if kept is not None:
+        kept.remove()
+    for text in report.warnings:
+        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=2)
+    return ThicknessMap(canvas.values, canvas.coverage, canvas.errors, report.escaped, unwrapped.mesh, settings, report)
+
+
+def check_threads(threads: Any) -> int:
+    """How many threads to use; raises `InputError` for less than one."""
+    if threads is None:
+        return processors()
+    if not (hasattr(threads, "__index__") and threads >= 1):
+        raise InputError(f"threads {threads!r}", "not a whole number above 0", "leave it out to use all processors")
+    return int(threads)
+
+
+def escape_warnings(escaped: float, closed: bool) -> list[str]:
+    """What to say of rays that found no exit."""
+    if escaped == 0:
+        return []
+    reason = "the mesh has holes" if not closed else "faces are missing or look the wrong way"
+    return [f"{escaped:.2%} of the rays left the mesh without an exit ({reason}); they count as max_distance, or not"]
+
+
+def _check_high(high: Mesh | None, cage: Mesh | None, high_distance: float | None) -> None:
+    if high is None and (cage is not None or high_distance is not None):
+        raise InputError("a cage or a ray distance", "no high mesh", "give high=, or leave them out")
+    if cage is not None and high_distance is not None:
+        raise InputError("a cage and a ray distance", "both say where the high mesh is", "give one of them")
+
+
+def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh | None, cage: Mesh | None) -> Strips:
+    low = Surface.of(unwrapped.mesh)
+    uv = unwrapped.uv[low.faces]
+    shown = np.arange(len(uv)) if settings.tile is None else np.flatnonzero(in_tile(uv, settings.tile))
+    side = settings.size * settings.supersample
+    atlas = Atlas(uv[shown], side, side)
+    if high is None:
+        return Strips(low, shown, atlas, Measure.of(low, settings), None)
+    detailed = Surface.of(high)
+    projection = Projection.of(low, unwrapped, detailed, mesh, cage, settings.high_distance)
+    return Strips(low, shown, atlas, Measure.of(detailed, settings), projection)
+
+
+def _report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, seconds: float) -> BakeReport:
+    cast, samples = max(canvas.count("cast"), 1), max(canvas.count("samples"), 1)
+    errors = canvas.errors[canvas.valued]
+    escaped, missed = canvas.count("escaped") / cast, canvas.count("missed") / samples
+    degenerate = len(unwrapped.mesh.faces) - len(strips.low.faces)
+    said = list(unwrapped.warnings)
+    source = unwrapped.mesh if strips.projection is None else None
+    said += escape_warnings(escaped, source is None or source.diagnosis.closed)
+    if overlapping := canvas.count("overlapping"):
+        said.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
+    if missed:
+        said.append(f"{missed:.2%} of the samples found no surface of the high mesh; they get the value beside them")
+    if degenerate:
+        said.append(f"{degenerate} faces without area are left out")
+    if above := canvas.count("above"):
+        said.append(f"{above} samples stay above the tolerance with the most rays that they may have")
+    return BakeReport(
+        rays=traced,
+        seconds=seconds,
+        mrays_per_second=traced / seconds / 1e6,
+        samples=canvas.count("samples"),
+        texels=int(canvas.coverage.sum()),
+        overlapping_texels=overlapping,
+        faces_without_texel=len(strips.shown) - int(canvas.owners.sum()),
+        degenerate_faces=degenerate,
+        udim_tiles=tuple(tile for tile in unwrapped.tiles if tile),
+        uv_from=unwrapped.made_by,
+        escaped=escaped,
+        missed=missed,
+        mean_standard_error=float(errors.mean()) if errors.size else 0.0,
+        max_standard_error=float(errors.max()) if errors.size else 0.0,
+        above_tolerance=above,
+        warnings=tuple(said),
+    )

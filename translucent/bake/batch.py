@@ -1,0 +1,202 @@
+"""Many assets: each a job of its own, in any executor; what is done is skipped, and what fails stops nothing else."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
+from translucent.bake.local_pool import in_processes
+from translucent.bake.record import Record
+from translucent.cpu.threads import processors
+from translucent.errors import InputError, TranslucentError
+
+Status = Literal["baked", "skipped", "failed"]
+
+
+@dataclass(frozen=True)
+class BatchReport:
+    """What became of the jobs of a batch.
+
+    Attributes
+    ----------
+    assets : tuple of dict
+        Per job, in the order in which they were given: ``model``, ``output``, ``status`` (baked, skipped or failed),
+        ``seconds``, ``error`` (None, or one line) and of baked ones ``range``, ``rays`` and ``warnings``.
+    seconds : float
+        From the first to the last.
+    """
+
+    assets: tuple[Record, ...]
+    seconds: float
+
+    def count(self, status: Status) -> int:
+        """How many have this status."""
+        return sum(asset["status"] == status for asset in self.assets)
+
+    def summary(self) -> Record:
+        """The report in values that JSON can hold."""
+        counts = {status: self.count(status) for status in get_args(Status)}
+        return {**counts, "seconds": self.seconds, "assets": list(self.assets)}
+
+    def __str__(self) -> str:
+        name = max((len(Path(asset["model"]).name) for asset in self.assets), default=0)
+        lines = [_line(asset, name) for asset in self.assets]
+        total = f"{self.count('baked')} baked, {self.count('skipped')} skipped, {self.count('failed')} failed"
+        return "\n".join([*lines, f"{total} in {self.seconds:.1f} s"])
+
+
+def _line(asset: Record, width: int) -> str:
+    told = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
+    if asset["status"] == "failed":
+        return f"{told}  {asset['error']}"
+    if found := asset.get("range"):
+        told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
+    turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
+    return told + "".join(f"; {line}" for line in [*turned, *asset.get("warnings", [])])
+
+
+def bake_many(
+    jobs: Iterable[Job],
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Record], None] | None = None,
+) -> BatchReport:
+    """Bake many assets; a bad one does not stop the others.
+
+    Where an output is there already, whole, and made from the same meshes and settings by the same version, it is
+    skipped. Files appear complete or not at all, so a job may be done twice, or be killed, at any time.
+
+    Parameters
+    ----------
+    jobs : iterable of dict
+        See `translucent.bake.jobs`. Paths may be relative; an executor on other machines must see the same files.
+    executor : Executor, optional
+        Any of `concurrent.futures`, such as ``distributed.Client(...).get_executor()``. Default: processes here. They
+        are spawned, so a script calls this below ``if __name__ == "__main__":``.
+    workers : int, optional
+        Of the default: how many processes; default: one per processor.
+    progress : callable, optional
+        Gets the entry of each asset when it is finished.
+
+    Returns
+    -------
+    BatchReport
+
+    Raises
+    ------
+    InputError
+        If a job is malformed, two have one output, or `workers` is below 1. What is wrong with a single asset is
+        in the report.
+    """
+    given = [_absolute(job) for job in jobs]
+    _refuse_collisions(given)
+    if workers is not None and workers < 1:
+        raise InputError(f"{workers} processes", "below 1", "give 1 or more")
+    for job in given:
+        check_job(job)
+    started = time.perf_counter()
+    found: dict[str, Record] = {}
+    records = _in_executor(executor, given) if executor is not None else _here(given, workers or processors())
+    for record in records:
+        found[record["output"]] = record
+        if progress is not None:
+            progress(record)
+    return BatchReport(tuple(found[job["output"]] for job in given), time.perf_counter() - started)
+
+
+def _absolute(job: Job) -> Job:
+    paths = {key: str(Path(job[key]).absolute()) for key in ("model", "output", "high", "cage") if job.get(key)}
+    return {**job, **paths}
+
+
+def _refuse_collisions(jobs: list[Job]) -> None:
+    seen: dict[str, Job] = {}
+    for job in jobs:
+        key = str(job.get("output")).casefold()  # some file systems do not tell case
+        if key in seen:
+            both = f"{seen[key].get('model')!r} and {job.get('model')!r}"
+            raise InputError(f"output {job.get('output')!r}", f"it is that of {both}", "rename one of them")
+        seen[key] = job
+
+
+def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
+    workers = min(workers, max(len(jobs), 1))
+    share = max(processors() // workers, 1)
+    return in_processes(run_job, [{"threads": share, **job} for job in jobs], workers, _lost)
+
+
+def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
+    from translucent import __version__
+
+    # An executor has its own idea of how many run at a time on a machine.
+    futures = {executor.submit(run_job, {"threads": 1, **job}, __version__): job for job in jobs}
+    try:
+        for future in as_completed(futures):
+            job = futures[future]
+            try:
+                yield future.result()
+            except Exception as error:  # noqa: BLE001 - lost workers, other versions: each executor raises its own kinds
+                yield _entry(job, "failed", 0.0, error=f"its worker failed ({type(error).__name__}: {error})")
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _lost(job: Job) -> Record:
+    return _entry(job, "failed", 0.0, error="its process died; out of memory, or a crash; try a smaller --size")
+
+
+def run_job(job: Job, version: str | None = None) -> Record:
+    """Do one job of a batch; what goes wrong is in the entry that it returns.
+
+    A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
+    """
+    from translucent import __version__
+
+    started = time.perf_counter()
+    if version not in (None, __version__):
+        return _entry(
+            job, "failed", 0.0, error=f"its worker has version {__version__}, and not {version}; install that"
+        )
+    try:
+        content = content_hash(job)
+        if is_done(job, content):
+            return _entry(job, "skipped", time.perf_counter() - started)
+        record, results = bake_file(job)
+    except TranslucentError as error:
+        return _entry(job, "failed", time.perf_counter() - started, error=str(error))
+    except Exception as error:  # noqa: BLE001 - a defect of ours, or a full memory: the others go on
+        told = f"unexpected {type(error).__name__}; {error or 'no details'}"
+        return _entry(job, "failed", time.perf_counter() - started, error=told)
+    return _entry(job, "baked", time.perf_counter() - started, **told_of(record, results))
+
+
+def _entry(job: Job, status: Status, seconds: float, error: str | None = None, **more: Any) -> Record:
+    entry = {"model": job["model"], "output": job["output"], "status": status, "seconds": seconds, "error": error}
+    return {**entry, **more}
+
+
+def told_of(record: Record, results: Any) -> Record:
+    """Range, unit, rays and warnings of a bake, of all its parts together."""
+    parts = record.get("maps") or record.get("primitives") or [record]
+    ranges = [part["range"] for part in parts if part["range"] is not None]
+    warnings = [line for part in parts for line in (*part["report"]["warnings"], *part.get("warnings", []))]
+    repairs = [line for result in results.values() for line in result.mesh.repairs]
+    whole = {
+        "min": min((one["min"] for one in ranges), default=0.0),
+        "max": max((one["max"] for one in ranges), default=0.0),
+    }
+    return {
+        "unit": record["unit"],
+        "range": whole,
+        "rays": sum(part["report"]["rays"] for part in parts),
+        "parts": len(parts),
+        "warnings": list(dict.fromkeys(warnings)),
+        "repairs": list(dict.fromkeys(repairs)),
+        "hash": record.get("hash"),
+    }

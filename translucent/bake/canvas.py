@@ -1,0 +1,141 @@
+"""The map while it is made, and the file that keeps it if the bake is interrupted."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bake.settings import BakeSettings
+from translucent.bake.strips import COUNTS, Strip
+from translucent.errors import InputError
+from translucent.frame import write_atomically
+from translucent.mesh import Mesh
+
+#: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.
+EVERY, REST = 5.0, 20.0
+
+
+@dataclass(eq=False)
+class Canvas:
+    """Strips put together.
+
+    Parameters
+    ----------
+    size : int
+        Texels a side.
+    faces : int
+        Of the mesh.
+    strips : int
+    """
+
+    size: int
+    faces: int
+    strips: int
+    done: npt.NDArray[np.bool_] = field(init=False)
+    values: npt.NDArray[np.float32] = field(init=False)
+    errors: npt.NDArray[np.float32] = field(init=False)
+    coverage: npt.NDArray[np.bool_] = field(init=False)
+    valued: npt.NDArray[np.bool_] = field(init=False)
+    owners: npt.NDArray[np.bool_] = field(init=False)
+    counts: npt.NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = (self.size, self.size)
+        self.values, self.errors = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+        self.coverage, self.valued = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        self.done, self.owners = np.zeros(self.strips, dtype=bool), np.zeros(self.faces, dtype=bool)
+        self.counts = np.zeros(len(COUNTS), dtype=np.int64)
+
+    def put(self, number: int, row: int, strip: Strip) -> None:
+        """Add strip `number`, which begins at `row`."""
+        rows = slice(row, row + len(strip.values))
+        self.values[rows], self.errors[rows] = strip.values, strip.errors
+        self.coverage[rows], self.valued[rows] = strip.coverage, strip.valued
+        self.owners |= strip.owners
+        self.counts += strip.counts
+        self.done[number] = True
+
+    def count(self, name: str) -> int:
+        """One of `COUNTS`."""
+        return int(self.counts[COUNTS.index(name)])
+
+
+class Checkpoint:
+    """A file with the finished strips of a bake.
+
+    Parameters
+    ----------
+    path : Path
+    key : str
+        What the bake depends on; a file with another key is of another bake.
+    """
+
+    _ARRAYS = ("done", "values", "errors", "coverage", "valued", "owners", "counts")
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._path, self._key = path, key
+        self._next = time.monotonic() + EVERY
+
+    def read(self, canvas: Canvas) -> None:
+        """Fill `canvas` with what the file holds, if there is one.
+
+        Raises
+        ------
+        InputError
+            If the file is no checkpoint of this bake.
+        """
+        if not self._path.is_file():
+            return
+        asked = f"checkpoint {str(self._path)!r}"
+        try:
+            # Opened here, since NumPy leaves what it opens itself open where it is damaged.
+            with self._path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+                if str(data["key"]) != self._key:
+                    raise InputError(asked, "it is of another mesh or other settings", "remove it, or bake as before")
+                for name in self._ARRAYS:
+                    setattr(canvas, name, data[name])
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile, EOFError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(asked, f"it cannot be read ({error})", "remove it") from error
+
+    def keep(self, canvas: Canvas) -> None:
+        """Write `canvas` if the last time was long enough ago."""
+        if time.monotonic() >= self._next:
+            self.write(canvas)
+
+    def write(self, canvas: Canvas) -> None:
+        """Write `canvas`, wholly or not at all; raises `RenderError` if that fails."""
+        started = time.monotonic()
+        arrays = {name: getattr(canvas, name) for name in self._ARRAYS}
+
+        def save(path: Path) -> None:
+            with path.open("wb") as file:
+                np.savez(file, key=np.array(self._key), **arrays)
+
+        write_atomically(self._path, save)
+        ended = time.monotonic()
+        self._next = ended + max(EVERY, REST * (ended - started))
+
+    def remove(self) -> None:
+        """Delete the file, since the bake is done."""
+        self._path.unlink(missing_ok=True)
+
+
+def bake_key(settings: BakeSettings, *meshes: Mesh | None) -> str:
+    """A hash of all that decides the result of a bake."""
+    from importlib.metadata import version
+
+    digest = hashlib.sha256(f"{version('translucent-shading')} {sorted(settings.summary().items())}".encode())
+    for mesh in meshes:
+        for array in () if mesh is None else (mesh.vertices, mesh.faces, mesh.uv):
+            digest.update(b"-" if array is None else array.tobytes())
+            digest.update(b"|")
+        digest.update(b"#")
+    return digest.hexdigest()

@@ -1,0 +1,184 @@
+"""What a thickness map loses: a body as a glTF viewer shades it with the map, beside the body with its true thickness.
+
+A rasterising viewer looks the thickness up where the view ray meets the front of the surface, and takes it for the way
+of the light: t = map(uv of the first hit), whatever the direction of the view, and nothing for the bodies behind. The
+truth is the path inside along the ray. Both pass light by exp(-sigma_t t), straight on.
+
+Source of the lookup: KHR_materials_volume, "Thickness Texture"; as in rasterisers without refraction, since here too
+light goes straight.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.camera import Camera
+from translucent.cpu.embree import EmbreeMesh
+from translucent.cpu.renderer import CpuRenderer
+from translucent.errors import InputError
+from translucent.frame import Frame
+from translucent.materials.gltf_texture import sample
+from translucent.medium import Medium
+from translucent.mesh import Mesh
+from translucent.metrics import Errors, compare
+from translucent.plan import plan
+from translucent.showcase import showcase
+
+Array = npt.NDArray[np.float64]
+
+_REPEAT, _CLAMP = 10497, 33071
+
+
+@dataclass(frozen=True, eq=False)
+class MapCheck:
+    """A body shaded with its map and with its true thickness, from one view.
+
+    Attributes
+    ----------
+    baked, true : Frame
+    thickness, transmittance : Errors
+        Of `baked` against `true`: metres, and 0..1 over the three channels.
+    mean_thickness : float
+        True one, over the same pixels, in metres.
+    background : (h, w, 3)
+        Radiance without the body.
+    """
+
+    baked: Frame
+    true: Frame
+    thickness: Errors
+    transmittance: Errors
+    mean_thickness: float
+    background: Array
+
+    def summary(self) -> dict[str, Any]:
+        """The errors in values that JSON can hold."""
+        return {
+            "thickness": dataclasses.asdict(self.thickness),
+            "transmittance": dataclasses.asdict(self.transmittance),
+            "mean_thickness": self.mean_thickness,
+        }
+
+    def __str__(self) -> str:
+        share = 100.0 / self.mean_thickness
+        found, passed = self.thickness, self.transmittance
+        return (
+            f"thickness      rms {found.rms:.4g} m, {share * found.rms:.3g} % of the mean {self.mean_thickness:.4g} m; "
+            f"median {found.median:.4g} m, p99 {found.p99:.4g} m, bias {found.bias:+.4g} m\n"
+            f"transmittance  rms {passed.rms:.4g}, median {passed.median:.4g}, p99 {passed.p99:.4g}, "
+            f"bias {passed.bias:+.4g}"
+        )
+
+
+def check_map(
+    mesh: Mesh,
+    values: npt.ArrayLike,
+    medium: Medium | None = None,
+    size: tuple[int, int] = (480, 480),
+    camera: Camera | None = None,
+) -> MapCheck:
+    """Compare the look of a thickness map with the truth.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With the uv that the map belongs to.
+    values : array_like (h, w)
+        Thickness in metres; row 0 is v = 1. Read bilinearly; beyond 0..1 it repeats.
+    medium : Medium, optional
+        Default: that of `showcase`.
+    size : (width, height)
+        Of the picture in pixels.
+    camera : Camera, optional
+        Default: from the front right and above, the whole mesh in view.
+
+    Raises
+    ------
+    InputError
+        If the mesh has no uv, or no pixel shows both.
+    RenderError
+        If embreex is missing.
+    """
+    scene = showcase(mesh, medium, size, camera)
+    renderer = CpuRenderer()
+    true = renderer.render(scene, size, plan(scene, None, renderer.capabilities), 1)
+    renderer.close()
+    directions = scene.camera.rays(size)[1]
+    background = scene.environment.radiance(directions, _backdrop(size))
+    inside = scene.bodies[0].medium
+    assert inside is not None  # a showcase has one
+    seen = true.coverage & true.valid
+    found = first_uv(mesh, scene.camera, size)
+    covered = seen & np.isfinite(found).all(axis=-1)
+    thickness = np.zeros(covered.shape)
+    thickness[covered] = look_up(mesh, values, found[covered])
+    with np.errstate(under="ignore"):
+        depth = thickness[..., None] * inside.extinction
+        passed = np.exp(-depth)
+    baked = dataclasses.replace(
+        true,
+        thickness=thickness,
+        optical_depth=depth,
+        transmittance=passed,
+        radiance=background * passed,
+        coverage=covered,
+    )
+    errors = [compare(baked, true, quantity) for quantity in ("thickness", "transmittance")]
+    mean = float(true.thickness[covered].mean(dtype=np.float64))
+    return MapCheck(baked, true, errors[0], errors[1], mean, background)
+
+
+def look_up(mesh: Mesh, values: npt.ArrayLike, uv: Array) -> Array:
+    """(n,): a map at uv (n, 2), v upwards, as textures are read: between texels linearly."""
+    assert mesh.uv is not None
+    wrap = _CLAMP if mesh.uv.min() >= 0 and mesh.uv.max() <= 1 else _REPEAT
+    coordinates = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+    return sample(np.asarray(values, dtype=np.float64), coordinates, {"wrapS": wrap, "wrapT": wrap})
+
+
+def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> Array:
+    """(h, w, 2): uv where the ray of each pixel first meets the mesh, v upwards; NaN where it does not.
+
+    Raises
+    ------
+    InputError
+        If the mesh has no uv.
+    """
+    if mesh.uv is None:
+        raise InputError(f"mesh {mesh.name!r}", "it has no uv", "bake a map first; its mesh has them")
+    traced = EmbreeMesh(mesh)
+    origins, directions = (part.reshape(-1, 3) for part in camera.rays(size))
+    starts = (origins - traced.center) / traced.radius
+    # A far eye costs float32 its digits; begin where the ray comes near.
+    ahead = np.maximum(-np.einsum("ki,ki->k", starts, directions) - 1.01, 0.0)
+    face, distance = traced.first_hits(starts + ahead[:, None] * directions, directions)
+    hit = face >= 0
+    points = origins[hit] + traced.radius * (np.asarray(ahead[hit]) + distance[hit])[:, None] * directions[hit]
+    corners = mesh.faces[face[hit]]
+    weights = _barycentric(mesh.vertices[corners], points)
+    found = np.full((len(origins), 2), np.nan)
+    found[hit] = np.einsum("kc,kci->ki", weights, mesh.uv[corners])
+    return found.reshape(size[1], size[0], 2)
+
+
+def _barycentric(corners: Array, points: Array) -> Array:
+    """(k, 3): weights of the corners (k, 3, 3) at points (k, 3) of their triangles, each in 0..1."""
+    a, b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    aa, ab, bb = (np.einsum("ki,ki->k", x, y) for x, y in ((a, a), (a, b), (b, b)))
+    ca, cb = (np.einsum("ki,ki->k", c, x) for x in (a, b))
+    area = aa * bb - ab * ab
+    area[area <= 0] = np.inf  # Embree hits no triangle without area; the first corner would do
+    second, third = (bb * ca - ab * cb) / area, (aa * cb - ab * ca) / area
+    weights = np.clip(np.column_stack([1.0 - second - third, second, third]), 0.0, 1.0)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def _backdrop(size: tuple[int, int]) -> Array:
+    """(h, w, 2): where pixel centers are in the picture, in its heights."""
+    across, down = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
+    return np.stack([across, down], axis=-1) / size[1]

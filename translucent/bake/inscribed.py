@@ -1,0 +1,122 @@
+"""The largest sphere inside a mesh that touches the surface at a point (mode "inscribed").
+
+The sphere at p has its center c = p - r n on the inward normal, and r is the largest for which no point q of the
+surface is inside:
+
+    2 r(p) = min over q of |q - p|^2 / ((p - q) . n),  (p - q) . n > 0.
+
+It is found by shrinking a ball (Ma, Bae and Choi 2012): from half the distance to the exit along -n, the nearest point
+q to the center gives the next radius, until none is inside. Points seen from the center less than the crease angle away
+from p belong to the smooth surface around p, and do not count: each edge of a tessellation would end the ball.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bake.normals import CREASE
+from translucent.bake.surface import Points, Surface, blend
+from translucent.bake.texels import closest
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: About how many points of the surface the search tree holds, beyond one for each face, and how many of them are tried
+#: around a center. The center of a round body is as far from all points, so that a search looks at every one.
+TREE_POINTS, TRIED = 20_000, 6
+
+#: Larger trees are searched to this relative error of the distance only, for the same reason.
+LARGE_TREE, LARGE_TREE_ERROR = 50_000, 0.005
+
+#: Rounds of shrinking at most, and the share of the radius below which it has come to rest.
+ROUNDS, AT_REST = 32, 1e-7
+
+
+class InscribedSpheres:
+    """Finds inscribed spheres. Any number of threads may ask at once.
+
+    Parameters
+    ----------
+    surface : Surface
+    """
+
+    def __init__(self, surface: Surface) -> None:
+        from scipy.spatial import cKDTree
+
+        self._surface = surface
+        corners, normals = surface.corners, surface.planes[:, :3]
+        across = corners[:, 1] - corners[:, 0]
+        across = across / np.linalg.norm(across, axis=1, keepdims=True)
+        self._axes = np.stack([across, np.cross(normals, across)], axis=1)
+        self._flat = np.stack([_flatten(self._axes, corners[:, i] - corners[:, 0]) for i in range(3)], axis=1)
+        points, self._face = _spread(corners)
+        self._tree = cKDTree(points)
+        self._error = LARGE_TREE_ERROR if len(points) > LARGE_TREE else 0.0
+
+    def diameters(self, points: Points, exits: Array) -> Array:
+        """(k,): diameters in radii of the mesh; `exits` (k,) are the distances to the exits along -n."""
+        radius = 0.5 * np.minimum(exits, 2.0)
+        live = np.flatnonzero(radius > 0)
+        for _ in range(ROUNDS):
+            if not live.size:
+                break
+            point, normal, r = points.start[live], points.normal[live], radius[live]
+            center = point - r[:, None] * normal
+            nearest = self._nearest(center)
+            to_nearest, to_point = nearest - center, r[:, None] * normal
+            away = np.sqrt(_dot(to_nearest, to_nearest))
+            # What is on the other side of the point's plane is no part of the ball's surroundings.
+            height, square = _dot(point - nearest, normal), _dot(nearest - point, nearest - point)
+            beside = _dot(to_nearest, to_point) > math.cos(CREASE) * away * r
+            shrinks = (away < r * (1.0 - AT_REST)) & (height > 0) & ~beside
+            with np.errstate(all="ignore"):
+                smaller = np.where(shrinks, square / (2.0 * height), r)
+            radius[live] = np.minimum(r, smaller)
+            live = live[shrinks]
+        return 2.0 * radius
+
+    def _nearest(self, center: Array) -> Array:
+        """(k, 3): points of the surface nearest to centers (k, 3), of the faces whose tree points are nearest."""
+        _, found = self._tree.query(center, k=min(TRIED, self._tree.n), eps=self._error)
+        found = found.reshape(len(center), -1)
+        best, distance = np.zeros_like(center), np.full(len(center), np.inf)
+        for column in range(found.shape[1]):
+            face = self._face[found[:, column]]
+            corners = self._surface.corners[face]
+            _, barycentric = closest(self._flat[face], _flatten(self._axes[face], center - corners[:, 0]))
+            point = blend(corners, barycentric)
+            square = _dot(point - center, point - center)
+            nearer = square < distance
+            best[nearer], distance[nearer] = point[nearer], square[nearer]
+        return best
+
+
+def _flatten(axes: Array, vectors: Array) -> Array:
+    """(k, 2): vectors (k, 3) along two axes (k, 2, 3)."""
+    return np.stack([_dot(axes[:, 0], vectors), _dot(axes[:, 1], vectors)], axis=1)
+
+
+def _spread(corners: Array) -> tuple[Array, Integers]:
+    """Points (n, 3) all over the faces (m, 3, 3), about as dense everywhere, and the face (n,) of each."""
+    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    longest = length.argmax(axis=1)
+    order = (longest[:, None] + np.arange(3)) % 3
+    start, end, tip = np.take_along_axis(corners, order[..., None], axis=1).transpose(1, 0, 2)
+    base = length.max(axis=1)
+    twice_area = np.linalg.norm(np.cross(end - start, tip - start), axis=1)
+    spacing = math.sqrt(float(twice_area.sum()) / TREE_POINTS)
+    along = np.ceil(base / spacing).astype(np.int64)
+    count = along * np.ceil(twice_area / base / spacing).astype(np.int64)
+    face = np.repeat(np.arange(len(corners)), count)
+    number = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
+    u = (number % along[face] + 0.5) / along[face]
+    v = (number // along[face] + 0.5) / (count // along)[face]
+    level = start[face] + u[:, None] * (end - start)[face]
+    return level + v[:, None] * (tip[face] - level), face
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])

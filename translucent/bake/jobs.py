@@ -1,0 +1,241 @@
+"""One bake as a plain dict in, and files out: what a process on another machine can do as well.
+
+A job holds what JSON can hold, so it can be kept, sent and hashed:
+
+=============  ==========================================================================================
+``model``      path of a mesh or glTF file
+``output``     path of the file to write; its record goes beside it
+``unit``       of the model's coordinates (default m)
+``settings``   arguments of `bake_thickness` by name: mode, size, rays, ...; ``max_distance``, ``tolerance`` and
+               ``high_distance`` in metres, or as shares of the mesh's diagonal, such as ``"10%"``
+``medium``     extinction (r, g, b) in 1/m, for mode ``transmittance``
+``high``       path of the mesh that the details come from, and ``cage`` that of a cage around it, in the unit
+``vertices``   True: thickness per vertex instead of a map
+``unwrap``     True: new UVs, whatever the model has
+``normalize``  True: store shares of the largest value; ``invert``: 1 minus them
+``resume``     True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
+``threads``    how many (default: all processors); results do not depend on it
+=============  ==========================================================================================
+
+Only ``model`` and ``output`` are needed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from translucent.bake.record import Record, file_hash, read_record
+from translucent.bake.thickness_map import ThicknessMap, VertexThickness
+from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output, save_map, save_vertices
+from translucent.errors import InputError
+from translucent.gltf.load import SUFFIXES
+from translucent.medium import Medium
+from translucent.mesh import Mesh, load_mesh
+from translucent.units import metres_per_unit
+
+Job = dict[str, Any]
+#: Gets the share that is done, 0..1, and the rays traced so far.
+Progress = Callable[[float, int], None]
+
+KEYS = {
+    "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
+    "resume", "threads",
+}  # fmt: skip
+#: Keys that do not change what is written into the file.
+_HOW = {"output", "model", "high", "cage", "resume", "threads"}
+_LENGTHS = ("max_distance", "tolerance", "high_distance")
+#: What has no meaning for vertices: a mistake, and what merely has a default.
+_OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
+
+
+def check_job(job: Job) -> None:
+    """Raise `InputError` or `RenderError` where a job cannot be done, as far as can be told without any work."""
+    if unknown := sorted(set(job) - KEYS):
+        raise InputError(f"bake job with {unknown[0]!r}", "not a known key", f"use {', '.join(sorted(KEYS))}")
+    if missing := [key for key in ("model", "output") if not isinstance(job.get(key), str)]:
+        raise InputError("bake job", f"no {missing[0]}", "give a path as text")
+    metres_per_unit(job.get("unit", "m"))
+    suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
+    normalize, invert = bool(job.get("normalize")), bool(job.get("invert"))
+    output = Path(job["output"])
+    suffix = check_map_output(output, suffixes, normalize=normalize, invert=invert)
+    settings = job.get("settings", {})
+    of_maps = [key for key in (*_OF_MAPS, "normalize", "invert", "resume") if job.get(key) or settings.get(key)]
+    if job.get("vertices") and of_maps:
+        raise InputError("thickness per vertex", f"{of_maps[0]} is of maps", "leave one of the two out")
+    if suffix == ".glb" and settings.get("tile") is not None:
+        raise InputError(f"tile {settings['tile']!r}", "glTF has no tiles", "write another file, or leave it out")
+    if suffix == ".glb" and settings.get("mode") == "local" and not job.get("vertices"):
+        raise InputError(f"output {str(output)!r}", "mode 'local' has no unit", "write another file, or bake lengths")
+    _settings(job, 1.0)
+
+
+def _settings(job: Job, diagonal: float) -> Job:
+    """The arguments of a bake, checked; shares are of the diagonal in metres."""
+    from translucent.bake.settings import BakeSettings
+
+    given = dict(job.get("settings", {}))
+    for key in _LENGTHS:
+        if isinstance(given.get(key), str):
+            given[key] = diagonal * _share(key, given[key])
+    known = {field.name for field in dataclasses.fields(BakeSettings)} - {"medium"}
+    if unknown := sorted(set(given) - known):
+        raise InputError(f"bake setting {unknown[0]!r}", "not a known setting", f"use {', '.join(sorted(known))}")
+    if job.get("medium") is not None:
+        given["medium"] = Medium(absorption=job["medium"])
+    # A glTF material may bring the medium that this mode needs.
+    late = given.get("mode") == "transmittance" and _is_gltf(job) and "medium" not in given
+    BakeSettings(**({**given, "medium": Medium(absorption=1.0)} if late else given))
+    return given
+
+
+def _share(key: str, text: str) -> float:
+    try:
+        share = float(text.removesuffix("%")) / 100 if text.endswith("%") else float("nan")
+    except ValueError:
+        share = float("nan")
+    if not 0 < share < float("inf"):
+        raise InputError(f"{key} {text!r}", "not a share such as '10%'", "give one, or a number of metres")
+    return share
+
+
+def _is_gltf(job: Job) -> bool:
+    """Whether the model stays a glTF file with all that it has."""
+    return Path(job["output"]).suffix.lower() == ".glb" and Path(job["model"]).suffix.lower() in SUFFIXES
+
+
+def content_hash(job: Job) -> str:
+    """SHA-256 of all that the result depends on: the bytes of the meshes, the settings, and the version.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
+    """
+    from translucent import __version__
+
+    meant = {key: value for key, value in job.items() if key not in _HOW}
+    meant["suffix"] = Path(job["output"]).suffix.lower()
+    digest = hashlib.sha256(json.dumps([__version__, meant], sort_keys=True).encode())
+    for key in ("model", "high", "cage"):
+        if job.get(key) is not None:
+            for data in _parts(Path(job[key])):
+                digest.update(key.encode() + hashlib.sha256(data).digest())
+    return digest.hexdigest()
+
+
+def _parts(path: Path) -> list[bytes]:
+    """A file and, of a .gltf, what it links to."""
+    if not path.is_file():
+        raise InputError(f"mesh {str(path)!r}", "no such file", "check the path")
+    try:
+        data = [path.read_bytes()]
+    except OSError as error:
+        raise InputError(f"mesh {str(path)!r}", f"it cannot be read ({error.strerror})", "check its rights") from error
+    if path.suffix.lower() in SUFFIXES:
+        from translucent.materials.gltf_file import read_gltf
+
+        file = read_gltf(path)
+        holders = [*file.items("buffers"), *file.items("images")]
+        data += [file.resource(one) for one in holders if isinstance(one.get("uri"), str)]
+    return data
+
+
+def is_done(job: Job, content: str) -> bool:
+    """Whether the job's output is there, whole, and of this content."""
+    output = Path(job["output"])
+    record = read_record(output)
+    return (
+        record is not None
+        and record.get("hash") == content
+        and output.is_file()
+        and record.get("sha256") == file_hash(output)
+    )
+
+
+Results = dict[tuple[int, int], Any]
+
+
+def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Results]:
+    """Bake what a job asks for and write it.
+
+    Parameters
+    ----------
+    job : dict
+        See the module.
+    progress : callable, optional
+
+    Returns
+    -------
+    record : dict
+        As it was written beside the output.
+    results : dict
+        A `ThicknessMap` or `VertexThickness` per mesh and primitive of a glTF file; else one, for (0, 0).
+
+    Raises
+    ------
+    InputError
+        If the job or its model is wrong.
+    RenderError
+        If a file cannot be written, or a package is missing.
+    """
+    check_job(job)
+    output = Path(job["output"])
+    about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
+    if _is_gltf(job):
+        from translucent.bake.gltf_bake import bake_gltf
+
+        return bake_gltf(job, about, progress)
+    mesh = load_mesh(job["model"], unit=job.get("unit", "m"))
+    if job.get("unwrap"):
+        mesh = dataclasses.replace(mesh, uv=None)
+    result = bake_one(job, mesh, progress=progress)
+    if isinstance(result, VertexThickness):
+        record = save_vertices(result, output, about=about)
+    else:
+        normalize, invert = bool(job.get("normalize")), bool(job.get("invert"))
+        record = save_map(result, output, normalize=normalize, invert=invert, about=about)
+    return record, {(0, 0): result}
+
+
+def bake_one(
+    job: Job, mesh: Mesh, medium: Medium | None = None, progress: Progress | None = None, part: str = ""
+) -> ThicknessMap | VertexThickness:
+    """Bake one mesh as a job asks for.
+
+    Parameters
+    ----------
+    job : dict
+    mesh : Mesh
+    medium : Medium, optional
+        For mode ``transmittance``, if the job has none.
+    progress : callable, optional
+    part : str
+        Tells the parts of a job apart that keep what is finished.
+    """
+    from translucent.bake.bake import bake_thickness
+    from translucent.bake.vertices import bake_vertex_thickness
+
+    given = _settings(job, mesh.diagonal)
+    if given.get("mode") == "transmittance":
+        given.setdefault("medium", medium)
+    for key in ("high", "cage"):
+        if job.get(key) is not None:
+            given[key] = load_mesh(job[key], unit=job.get("unit", "m"))
+    tell = None
+    if progress is not None:
+
+        def tell(done: int, total: int, rays: int) -> None:
+            progress(done / max(total, 1), rays)
+
+    given |= {"threads": job.get("threads"), "progress": tell}
+    if job.get("vertices"):
+        return bake_vertex_thickness(mesh, **{key: value for key, value in given.items() if key not in _TEXELS})
+    if job.get("resume"):
+        given["checkpoint"] = Path(f"{job['output']}{part}.resume.npz")
+    return bake_thickness(mesh, **given)

@@ -1,0 +1,100 @@
+"""Jobs in processes of this machine, of which none takes the others along when it dies."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import sys
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+#: Seconds that a process has for tidying up when the work is given up.
+PATIENCE = 5.0
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def in_processes(
+    task: Callable[[Item], Result], items: list[Item], workers: int, lost: Callable[[Item], Result]
+) -> Iterator[Result]:
+    """Results of a task for each item, as they come.
+
+    Processes are spawned, not forked: OpenGL and threads do not survive a fork. When one dies (out of memory, or a
+    crash in a library), what was running is done again, one item at a time; `lost` makes the result of an item whose
+    process dies even then. Where the iteration is ended early, the processes end, too.
+
+    Parameters
+    ----------
+    task : callable
+        Found by its name in the processes, so it must be a function of a module.
+    items : list
+        What pickle can send.
+    workers : int
+        At most so many processes.
+    lost : callable
+    """
+    waiting = deque(items)
+    suspects: deque[Item] = deque()
+    while waiting or suspects:
+        # A suspect gets a process of its own, so that it can take nothing else along.
+        alone = bool(suspects)
+        running: dict[Future[Result], Item] = {}
+        with _Pool(1 if alone else workers) as pool:
+            source = deque([suspects.popleft()]) if alone else waiting
+            broken: list[Item] = []
+            while (source or running) and not broken:
+                while source and len(running) < workers and not broken:
+                    item = source.popleft()
+                    try:
+                        running[pool.submit(task, item)] = item
+                    except BrokenProcessPool:  # a process died of something else while it waited
+                        broken += [item, *running.values()]
+                        running.clear()
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    item = running.pop(future)
+                    if isinstance(future.exception(), BrokenProcessPool):
+                        broken.append(item)
+                    else:
+                        yield future.result()
+            broken += running.values()
+        if alone:
+            yield from map(lost, broken)
+        else:
+            suspects.extend(broken)
+
+
+class _Pool(ProcessPoolExecutor):
+    """Processes that end at once when the work is given up."""
+
+    def __init__(self, workers: int) -> None:
+        super().__init__(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+
+    def __exit__(self, kind: Any, error: Any, traceback: Any) -> None:
+        if kind is not None:
+            # Not public before Python 3.14, which has terminate_workers().
+            processes = list((self._processes or {}).values())
+            for process in processes:
+                process.terminate()
+            self.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.join(PATIENCE)
+                process.kill()  # one that was asked while it started may not have heard
+        self.shutdown(wait=True, cancel_futures=True)
+
+
+def _begin() -> None:
+    """In each process: the parent answers Ctrl-C, and ends this process so that its temporary files go."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end)
+    warnings.simplefilter("ignore")  # results tell their warnings
+
+
+def _end(*_: Any) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough; a second one would disturb the tidying
+    sys.exit(143)

@@ -1,0 +1,204 @@
+"""How far rays run inside a mesh: Embree finds the faces, float64 says where.
+
+Embree is asked for the first face only, from a start a little below the surface. A ray that so finds the face through
+which it leaves the body has its exit, at the crossing of its line with that face's plane, in float64. All others, few
+on most meshes, are followed face by face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bake.settings import BakeSettings
+from translucent.bake.surface import Points, Surface
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Integers = npt.NDArray[np.int64]
+
+#: Rays start this far below the surface, in radii of the mesh: beyond the rounding of float32, below the distance at
+#: which `load_mesh` takes vertices for one.
+OFFSET = 5e-7
+
+#: The face on which a ray starts, and those beside it, may be found up to here; also the step behind a face.
+NEAR = 2e-6
+
+#: A ray that meets a face at a smaller cosine runs along it, as far as float32 directions tell.
+GRAZING = 1e-6
+
+#: What lies less than this behind the start is at it: rounding of float64, for all but the flattest angles.
+BEHIND = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Follows rays into a surface. Any number of threads may ask at once.
+
+    Parameters
+    ----------
+    surface : Surface
+    gaps : str
+        "first-exit" or "total".
+    pass_entries : bool
+        Whether rays pass faces through which they enter once more, rather than stop at them.
+    reach : float
+        How far rays are followed, in radii; may be infinite.
+    """
+
+    surface: Surface
+    gaps: str
+    pass_entries: bool
+    reach: float
+
+    @classmethod
+    def of(cls, surface: Surface, settings: BakeSettings, reach: float) -> Rays:
+        """Rays of a bake; `reach` as above."""
+        return cls(surface, settings.gaps, settings.ignore_back_faces, reach)
+
+    def distances(self, points: Points, directions: Floats) -> tuple[Array, int]:
+        """(k, r): length inside the mesh from points (k) along directions (3, k, r), and how many rays Embree traced.
+
+        In radii; infinite where a ray finds no exit. What lies beyond `reach` is some number at least as large.
+        """
+        rays = directions.shape[2]
+        distance, cosine, face = self._first(points, directions)
+        # NaN, where no face was found, is not above it either.
+        doubtful = ~(cosine > GRAZING)
+        ray = np.flatnonzero(doubtful if self.gaps == "first-exit" else ~(distance >= self.reach))
+        traced = len(face)
+        if ray.size:
+            walk = _Walk.of(points.start[ray // rays], directions.reshape(3, -1)[:, ray].T.astype(np.float64))
+            walk.pass_exit(~doubtful[ray], distance[ray], face[ray])
+            traced += self._follow(walk)
+            distance[ray] = walk.length
+        return np.maximum(distance, 0.0, out=distance).reshape(-1, rays), traced
+
+    def _first(self, points: Points, directions: Floats) -> tuple[Array, Array, npt.NDArray[np.int32]]:
+        """(k r,): distance to the plane of the first face, cosine at it, above 0 where the ray leaves, and the face."""
+        count, rays = directions.shape[1:]
+        origins = np.empty((3, count, rays), dtype=np.float32)
+        origins[:] = self.starts(points).T[:, :, None]
+        face = self._trace(origins.reshape(3, -1), directions.reshape(3, -1)).reshape(count, rays)
+        # Index -1 takes some face; the ray is doubtful all the same.
+        plane = np.take(self.surface.planes, face, axis=0, mode="clip")
+        distance, cosine = plane[..., 3].copy(), np.empty((count, rays))
+        np.multiply(plane[..., 0], directions[0], out=cosine)
+        product = np.multiply(plane[..., 0], points.start[:, 0, None])
+        distance -= product
+        for axis in (1, 2):
+            np.multiply(plane[..., axis], directions[axis], out=product)
+            cosine += product
+            np.multiply(plane[..., axis], points.start[:, axis, None], out=product)
+            distance -= product
+        cosine[face < 0] = np.nan
+        with np.errstate(all="ignore"):
+            distance /= cosine
+        return distance.reshape(-1), cosine.reshape(-1), face.reshape(-1)
+
+    def starts(self, points: Points) -> Floats:
+        """(k, 3): where rays from points (k) begin, a little below the surface."""
+        return (points.start - OFFSET * self.surface.planes[points.face, :3]).astype(np.float32)
+
+    def _trace(self, origins: Floats, directions: Floats) -> npt.NDArray[np.int32]:
+        """(n,): first face on rays (3, n), -1 where there is none."""
+        found: npt.NDArray[np.int32] = self.surface.embree.scene.run(origins.T, directions.T)
+        return found
+
+    def _follow(self, walk: _Walk) -> int:
+        """Follow rays to their ends, and tell how many rays Embree traced for that."""
+        traced = 0
+        while walk.live.size:
+            live = walk.live
+            start = walk.origin[live] + walk.position[live, None] * walk.direction[live]
+            hits = self.surface.embree.scene.run(
+                start.astype(np.float32), walk.direction[live].astype(np.float32), output=True
+            )
+            traced += live.size
+            self._step(walk, hits)
+        return traced
+
+    def _step(self, walk: _Walk, hits: dict[str, Any]) -> None:
+        """Move the live rays of a walk behind the face that each has found, or end them."""
+        missed = hits["primID"] < 0
+        walk.end(missed, np.where(walk.depth[walk.live] > 0, np.inf, walk.length[walk.live]))
+        live = walk.live
+        face, seen = hits["primID"][~missed].astype(np.int64), hits["tfar"][~missed].astype(np.float64)
+        distance, cosine = self._cross(walk, face, walk.position[live] + seen)
+        again = face == walk.last[live]
+        walk.gap[live] = np.where(again, 2.0 * walk.gap[live], NEAR)
+        walk.last[live] = face
+        walk.position[live] = np.maximum(walk.position[live] + seen, distance) + walk.gap[live]
+        leaves = (cosine > GRAZING) & (distance >= -BEHIND) & ~again
+        # On the way in, the face of the start and its neighbors are behind; farther off, another part begins.
+        enters = (cosine < -GRAZING) & (distance > NEAR) & ~again
+        self._cross_surface(walk, np.maximum(distance, 0.0), leaves, enters)
+
+    def _cross(self, walk: _Walk, face: Integers, seen: Array) -> tuple[Array, Array]:
+        """Distance to the planes of faces, and cosine at them; along a plane, the distance that Embree has `seen`."""
+        plane, origin, direction = self.surface.planes[face], walk.origin[walk.live], walk.direction[walk.live]
+        cosine = plane[:, 0] * direction[:, 0] + plane[:, 1] * direction[:, 1] + plane[:, 2] * direction[:, 2]
+        height = plane[:, 3] - plane[:, 0] * origin[:, 0] - plane[:, 1] * origin[:, 1] - plane[:, 2] * origin[:, 2]
+        across = np.abs(cosine) > GRAZING
+        return np.where(across, height / np.where(across, cosine, 1.0), seen), cosine
+
+    def _cross_surface(
+        self, walk: _Walk, distance: Array, leaves: npt.NDArray[np.bool_], enters: npt.NDArray[np.bool_]
+    ) -> None:
+        """Count what the live rays cross, and end those that are through."""
+        live = walk.live
+        if self.gaps == "first-exit":
+            walk.end(leaves | (enters & (not self.pass_entries)), distance)
+            return
+        was, entered = walk.depth[live], walk.entered[live]
+        cut = walk.length[live] + np.where(was > 0, self.reach - entered, 0.0)
+        walk.depth[live] = np.maximum(was + enters.astype(np.int64) - leaves, 0)
+        walk.length[live] += np.where((was == 1) & leaves, distance - entered, 0.0)
+        walk.entered[live] = np.where((was == 0) & enters, distance, entered)
+        walk.end(distance >= self.reach, cut)
+
+
+@dataclass(eq=False)
+class _Walk:
+    """Rays under way, one per row; `live` has the indices of those that are not at their end."""
+
+    origin: Array
+    direction: Array
+    live: Integers
+    position: Array
+    gap: Array
+    last: Integers
+    depth: Integers
+    entered: Array
+    length: Array
+
+    @classmethod
+    def of(cls, origin: Array, direction: Array) -> _Walk:
+        """Rays (n, 3) that begin inside a body, a step before their start."""
+        count = len(origin)
+        return cls(
+            origin,
+            direction,
+            np.arange(count),
+            np.full(count, -NEAR),
+            np.full(count, NEAR),
+            np.full(count, -1),
+            np.ones(count, dtype=np.int64),
+            np.zeros(count),
+            np.zeros(count),
+        )
+
+    def pass_exit(self, rays: npt.NDArray[np.bool_], distance: Array, face: npt.NDArray[np.int32]) -> None:
+        """Let some of the rays begin behind the exit that has been found for them at `distance`."""
+        self.position[rays] = distance[rays] + NEAR
+        self.last[rays] = face[rays]
+        self.depth[rays] = 0
+        self.length[rays] = np.maximum(distance[rays], 0.0)
+
+    def end(self, done: npt.NDArray[np.bool_], length: Array) -> None:
+        """End some of the live rays, with their lengths (live,)."""
+        self.length[self.live[done]] = length[done]
+        self.live = self.live[~done]

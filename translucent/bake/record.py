@@ -1,0 +1,124 @@
+"""What is written about a bake beside it, as JSON: ``thickness.exr`` has ``thickness.exr.json``."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from translucent.frame import write_atomically
+
+if TYPE_CHECKING:
+    from translucent.bake.encoding import Encoding
+    from translucent.bake.thickness_map import ThicknessMap, VertexThickness
+
+Record = dict[str, Any]
+
+#: What the values of each mode are; the equations are in ``docs/baking.md``.
+DEFINITIONS = {
+    "normal": "distance from the surface to the exit along the inward normal",
+    "cone": "mean distance from the surface to the exit over the directions of a cone around the inward normal",
+    "transmittance": "the distance at which the medium lets through as much as the mean over the cone",
+    "inscribed": "diameter of the largest sphere inside that touches the surface there",
+    "local": "share of the directions of a cone around the inward normal that go farther than the maximum distance",
+}
+
+
+def unit_of(mode: str) -> str:
+    """Unit of the values of a mode: ``"m"``, or ``"1"`` for the one that has none."""
+    return "1" if mode == "local" else "m"
+
+
+def sidecar_of(path: Path) -> Path:
+    """Where the record of a file is."""
+    return path.with_name(f"{path.name}.json")
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON can hold it: NumPy's numbers become Python's, infinity and NaN null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def describe(result: ThicknessMap | VertexThickness, encoding: Encoding) -> Record:
+    """What a bake is: definition, unit, range, encoding, settings, report and mesh."""
+    values, settings = np.asarray(result.values), result.settings
+    coverage = getattr(result, "coverage", None)
+    seen = values[coverage] if coverage is not None else values
+    known: Record = {
+        "kind": "vertex thickness" if coverage is None else "thickness map",
+        "mode": settings.mode,
+        "definition": DEFINITIONS[settings.mode],
+        "unit": unit_of(settings.mode),
+        "range": _range(seen),
+        "encoding": encoding.summary(),
+        "settings": plain(settings.summary()),
+        "report": plain(result.report.summary()),
+        "mesh": {"name": result.mesh.name, "vertices": len(result.mesh.vertices), "faces": len(result.mesh.faces)},
+    }
+    if coverage is not None:
+        known["size"] = [values.shape[1], values.shape[0]]
+        known["covered_texels"] = int(np.count_nonzero(coverage))
+    if hasattr(result, "escaped"):
+        known["escaped"] = float(result.escaped)
+    return known
+
+
+def _range(values: Any) -> Record | None:
+    if not values.size:
+        return None
+    return {"min": float(values.min()), "median": float(np.median(values)), "max": float(values.max())}
+
+
+def provenance() -> dict[str, str]:
+    """Versions of all that the numbers depend on."""
+    from translucent.cpu.embree import embree_versions
+
+    return {
+        "translucent": version("translucent-shading"),
+        "numpy": np.__version__,
+        **embree_versions(),
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+    }
+
+
+def write_record(path: Path, record: Record) -> Record:
+    """Write the record of the file at `path` beside it, with the file's hash; what was written.
+
+    It is written after the file, so that a record whose hash is that of its file vouches for both.
+    """
+    full = {"file": path.name, "sha256": file_hash(path), **record, "provenance": provenance()}
+    text = json.dumps(full, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomically(sidecar_of(path), lambda temporary: _fill(temporary, text))
+    return full
+
+
+def _fill(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def read_record(path: Path) -> Record | None:
+    """The record of a file, if there is one and it is whole."""
+    try:
+        found = json.loads(sidecar_of(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None

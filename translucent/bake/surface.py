@@ -1,0 +1,145 @@
+"""A mesh made ready for baking: Embree's scene, exact planes of the faces, and smooth normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bake.normals import CREASE, corner_normals
+from translucent.cpu.embree import EmbreeMesh
+from translucent.errors import InputError
+from translucent.mesh import Mesh
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: Rays start this far from the edges of their triangle at least, as a share of its height: a ray that runs down an
+#: adjacent wall would otherwise run in it.
+INSET = 1e-3
+
+#: Triangles with less than this share of the squared diagonal have no area that float64 could tell from rounding.
+NO_AREA = 1e-24
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Where rays start: points of a surface, in the unit ball around it.
+
+    Attributes
+    ----------
+    face : (k,) int64
+    exact : (k, 3) float64
+        The point itself; points on a seam are equal from both sides.
+    start : (k, 3) float64
+        The point, kept off the edges of its face.
+    normal : (k, 3) float64
+        Smooth, of unit length, outwards.
+    """
+
+    face: Integers
+    exact: Array
+    start: Array
+    normal: Array
+
+    def __len__(self) -> int:
+        return len(self.face)
+
+    def __getitem__(self, index: slice | Integers) -> Points:
+        return Points(self.face[index], self.exact[index], self.start[index], self.normal[index])
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What rays and points need of a mesh. Lengths are in the unit ball around it.
+
+    Attributes
+    ----------
+    embree : EmbreeMesh
+    faces : (m,) int64
+        Indices of the mesh's faces that have an area; everywhere else a face is an index into this.
+    corners : (m, 3, 3) float64
+    planes : (m, 4) float64
+        Unit normal and offset: n . p = w on the face.
+    normals : (m, 3, 3) float64
+        Smooth, at the corners.
+    """
+
+    embree: EmbreeMesh
+    faces: Integers
+    corners: Array
+    planes: Array
+    normals: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh, crease: float = CREASE) -> Surface:
+        """Prepare a mesh.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        crease : float
+            Angle in radians from which on an edge is not smooth.
+
+        Raises
+        ------
+        InputError
+            If the mesh is not finite, has no area, or all its faces look inwards.
+        RenderError
+            If embreex cannot be imported.
+        """
+        mesh.require_finite()
+        if mesh.diagnosis.inverted:
+            raise InputError(
+                f"mesh {mesh.name!r}", "all its faces look inwards", "turn it (tl.load_mesh does), or export it again"
+            )
+        corners = (mesh.vertices[mesh.faces] - mesh.center) / (0.5 * mesh.diagonal)
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        twice_area = np.linalg.norm(cross, axis=1)
+        faces = np.flatnonzero(twice_area > NO_AREA)
+        if not faces.size:
+            raise InputError(f"mesh {mesh.name!r}", "no face has an area", "give a triangle mesh")
+        corners, normals = corners[faces], cross[faces] / twice_area[faces, None]
+        offset = (normals * corners.mean(axis=1)).sum(axis=1)
+        with_area = Mesh(mesh.vertices, mesh.faces[faces], name=mesh.name)
+        return cls(
+            EmbreeMesh(with_area),
+            faces,
+            corners,
+            np.column_stack([normals, offset]),
+            corner_normals(mesh.vertices, mesh.faces[faces], normals, crease),
+        )
+
+    @property
+    def radius(self) -> float:
+        """Metres per unit of length."""
+        return self.embree.radius
+
+    def points(self, face: Integers, barycentric: Array) -> Points:
+        """Points of faces (k,) with barycentric weights (k, 3)."""
+        inset = INSET + (1.0 - 3.0 * INSET) * barycentric
+        corners = self.corners[face]
+        return Points(
+            face,
+            blend(corners, barycentric),
+            blend(corners, np.where((barycentric < INSET).any(axis=1, keepdims=True), inset, barycentric)),
+            self.smooth_normals(face, barycentric),
+        )
+
+    def smooth_normals(self, face: Integers, barycentric: Array) -> Array:
+        """(k, 3): unit normals; the face's own where the smooth one does not look to its outside."""
+        smooth, own = blend(self.normals[face], barycentric), self.planes[face, :3]
+        length = np.linalg.norm(smooth, axis=1, keepdims=True)
+        usable = (smooth * own).sum(axis=1, keepdims=True) > 1e-3 * length
+        return np.where(usable, smooth / np.where(usable, length, 1.0), own)
+
+
+def blend(corners: Array, barycentric: Array) -> Array:
+    """(k, 3): what (k, 3, 3) is at barycentric weights (k, 3).
+
+    Written out: sums of products over arrays may round according to where an element stands.
+    """
+    return np.asarray(
+        corners[:, 0] * barycentric[:, :1] + corners[:, 1] * barycentric[:, 1:2] + corners[:, 2] * barycentric[:, 2:]
+    )

@@ -1,0 +1,187 @@
+"""Which point of the surface each texel of a map shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: A texel's center is inside a triangle, or on its edge, by more or less than this share of a texel.
+ON_EDGE = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Texels:
+    """Texels of a strip of a map, and the points that they show.
+
+    Attributes
+    ----------
+    row, column : (k,) int64
+        Each texel once, row by row.
+    face : (k,) int64
+        The face that has the center of the texel, or is nearest to it among those that touch the texel.
+    barycentric : (k, 3) float64
+        The point of the face that is nearest to the texel's center in UV.
+    inside : (k,) bool
+        Whether that is the center itself.
+    overlapping : (k,) bool
+        Whether the center is inside several faces.
+    """
+
+    row: Integers
+    column: Integers
+    face: Integers
+    barycentric: Array
+    inside: Mask
+    overlapping: Mask
+
+
+class Atlas:
+    """Triangles in a map, ready to tell which texels they touch.
+
+    Parameters
+    ----------
+    uv : (m, 3, 2) float64
+        Texture coordinates at the corners of the faces, v upwards; beyond 0..1 the map repeats.
+    width, height : int
+        Of the map, in texels.
+    """
+
+    def __init__(self, uv: Array, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        shifted = uv - np.floor(uv.min(axis=1, keepdims=True))
+        # Column and row as real numbers: texel (i, j) is the square from (j, i) to (j + 1, i + 1).
+        self.corners = np.stack([shifted[..., 0] * width, (1.0 - shifted[..., 1]) * height], axis=-1)
+        self._top, self._bottom = _cells(self.corners[..., 1].min(axis=1), self.corners[..., 1].max(axis=1))
+
+    def strip(self, begin: int, end: int) -> Texels:
+        """The texels of rows `begin` to `end` that any face touches."""
+        face, row = self._face_rows(begin, end)
+        left, right = self._spans(face, row)
+        count = right - left
+        pair = np.repeat(np.arange(len(face)), count)
+        column = np.arange(len(pair)) - np.repeat(np.cumsum(count) - count, count) + left[pair]
+        return self._nearest(face[pair], row[pair], column)
+
+    def _face_rows(self, begin: int, end: int) -> tuple[Integers, Integers]:
+        """Pairs of a face and a row, not yet wrapped, of the faces that touch the strip or a repetition of it."""
+        faces, rows = [], []
+        lowest, highest = int(self._top.min()) // self.height, (int(self._bottom.max()) - 1) // self.height
+        for turn in range(lowest, highest + 1):
+            first, last = begin + turn * self.height, end + turn * self.height
+            face = np.flatnonzero((self._top < last) & (self._bottom > first))
+            top = np.maximum(self._top[face], first)
+            count = np.minimum(self._bottom[face], last) - top
+            faces.append(np.repeat(face, count))
+            rows.append(np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + np.repeat(top, count))
+        return np.concatenate(faces), np.concatenate(rows)
+
+    def _spans(self, face: Integers, row: Integers) -> tuple[Integers, Integers]:
+        """First and last column + 1 in which faces (n,) touch rows (n,): the span of what the row cuts out of them."""
+        start = self.corners[face]
+        low, high = np.full(len(face), np.inf), np.full(len(face), -np.inf)
+        for i in range(3):
+            a, b = start[:, i], start[:, (i + 1) % 3]
+            rise = b[:, 1] - a[:, 1]
+            level = rise == 0
+            # Where the edge meets the upper and lower border of the row, as a share of its length.
+            with np.errstate(over="ignore", under="ignore"):
+                ends = (row[:, None] + (0.0, 1.0) - a[:, 1:]) / np.where(level, 1.0, rise)[:, None]
+            ends = np.where(level[:, None], (0.0, 1.0), np.clip(ends, 0.0, 1.0))
+            meets = (np.minimum(a[:, 1], b[:, 1]) <= row + 1) & (np.maximum(a[:, 1], b[:, 1]) >= row)
+            with np.errstate(under="ignore"):
+                across = a[:, :1] + ends * (b[:, :1] - a[:, :1])
+            low = np.where(meets, np.minimum(low, across.min(axis=1)), low)
+            high = np.where(meets, np.maximum(high, across.max(axis=1)), high)
+        met = low <= high
+        left, right = _cells(np.where(met, low, 0.0), np.where(met, high, 0.0))
+        return left, np.where(met, right, left)
+
+    def _nearest(self, face: Integers, row: Integers, column: Integers) -> Texels:
+        """Of all pairs of a face and a texel that it touches, the best for each texel."""
+        center = np.stack([column, row], axis=1).astype(np.float64) + 0.5
+        distance, barycentric = closest(self.corners[face], center)
+        texel = (row % self.height) * self.width + column % self.width
+        order = np.lexsort((face, distance, texel))
+        texel = texel[order]
+        first = np.flatnonzero(np.diff(texel, prepend=-1))
+        overlapping = self._overlapping(first, face[order], center[order], distance[order] == 0)
+        best = order[first]
+        rows, columns = np.divmod(texel[first], self.width)
+        return Texels(rows, columns, face[best], barycentric[best], distance[best] == 0, overlapping)
+
+    def _overlapping(self, first: Integers, face: Integers, center: Array, inside: Mask) -> Mask:
+        """(k,): whether several faces have the center of a texel; its pairs begin at `first` (k,)."""
+        if not len(first):
+            return np.empty(0, dtype=bool)
+        several = np.add.reduceat(inside.astype(np.int64), first) > 1
+        # Most of these are on an edge that two faces share.
+        pairs = np.flatnonzero(inside & np.repeat(several, np.diff(first, append=len(inside))))
+        within = np.zeros(len(inside), dtype=np.int64)
+        within[pairs] = self._depth(face[pairs], center[pairs]) > ON_EDGE
+        return np.asarray(np.add.reduceat(within, first) > 1)
+
+    def _depth(self, face: Integers, center: Array) -> Array:
+        """(n,): how far inside their faces the centers are, in texels; below 0 outside."""
+        corners = self.corners[face]
+        depth = np.full(len(face), np.inf)
+        turn = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for i in range(3):
+            along = corners[:, (i + 1) % 3] - corners[:, i]
+            length = np.hypot(along[:, 0], along[:, 1])
+            offset = np.sign(turn) * _cross(along, center - corners[:, i])
+            depth = np.minimum(depth, offset / np.where(length > 0, length, 1.0))
+        return depth
+
+
+def _cells(low: Array, high: Array) -> tuple[Integers, Integers]:
+    """First cell, and last + 1, of closed ranges; those that end on a border do not touch the cell behind it."""
+    first = np.floor(low).astype(np.int64)
+    return first, np.maximum(np.ceil(high).astype(np.int64), first + 1)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def closest(corners: Array, point: Array) -> tuple[Array, Array]:
+    """Squared distance (n,) of points (n, 2) to triangles (n, 3, 2), and barycentric weights of the nearest point."""
+    with np.errstate(under="ignore"):
+        edge = corners[:, (2, 0, 1)] - corners[:, (1, 2, 0)]
+        # Twice the areas opposite to the corners.
+        area = _cross(edge, point[:, None] - corners[:, (1, 2, 0)])
+        total = area.sum(axis=1)
+        inside = ((area >= 0) == (total > 0)[:, None]).all(axis=1) | ((area <= 0) == (total < 0)[:, None]).all(axis=1)
+        inside &= total != 0
+        distance = np.zeros(len(point))
+        barycentric = np.where(inside[:, None], area / np.where(total != 0, total, 1.0)[:, None], 0.0)
+        rest = np.flatnonzero(~inside)
+        if rest.size:
+            distance[rest], barycentric[rest] = _closest_on_edges(corners[rest], point[rest])
+    return distance, barycentric
+
+
+def _closest_on_edges(corners: Array, point: Array) -> tuple[Array, Array]:
+    """As `closest`, for points outside their triangles."""
+    distance, barycentric = np.full(len(point), np.inf), np.zeros((len(point), 3))
+    for i in range(3):
+        j = (i + 1) % 3
+        along = corners[:, j] - corners[:, i]
+        square = (along * along).sum(axis=1)
+        share = ((point - corners[:, i]) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
+        share = np.clip(np.where(square > 0, share, 0.0), 0.0, 1.0)
+        offset = corners[:, i] + share[:, None] * along - point
+        away = (offset * offset).sum(axis=1)
+        # Above 0, lest the texel passes for one whose center is inside.
+        away = np.maximum(away, np.finfo(np.float64).tiny)
+        nearer = away < distance
+        distance = np.where(nearer, away, distance)
+        weights = np.zeros_like(barycentric)
+        weights[:, i], weights[:, j] = 1.0 - share, share
+        barycentric = np.where(nearer[:, None], weights, barycentric)
+    return distance, barycentric

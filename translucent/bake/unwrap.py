@@ -1,0 +1,144 @@
+"""Texture coordinates of a bake: the mesh's own, checked, or new ones from xatlas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.mesh import Mesh
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: Texels between the charts that xatlas makes, and the share of a small map's side that this is at most.
+CHART_GAP, GAP_SHARE = 4, 1 / 128
+
+#: Texture coordinates this close to a whole number are that number: float32 near 1 rounds by half of it.
+WHOLE = 1e-7
+
+#: The most tiles that one triangle may cover; more repeat a texture, which no thickness does.
+MOST_TILES = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Unwrapped:
+    """A mesh with texture coordinates.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    uv : (m, 3, 2) float64
+        At the corners of its faces.
+    vertex : (n,) int64
+        Vertex of the mesh that was given, for each vertex of this one.
+    made_by : str
+        "mesh" or "xatlas".
+    tiles : tuple of int
+        UDIM tiles in which there are faces.
+    warnings : tuple of str
+    """
+
+    mesh: Mesh
+    uv: Array
+    vertex: Integers
+    made_by: str
+    tiles: tuple[int, ...]
+    warnings: tuple[str, ...]
+
+
+def unwrap(mesh: Mesh, size: int, tile: int | None) -> Unwrapped:
+    """Texture coordinates for a map of `size` texels a side.
+
+    Raises
+    ------
+    InputError
+        If there are none and xatlas is not installed; if they are not finite, repeat a texture or have no area; or if
+        no face lies in the UDIM tile that is asked for.
+    """
+    vertex = np.arange(len(mesh.vertices))
+    made_by = "mesh"
+    if mesh.uv is None:
+        mesh, vertex = _new_uv(mesh, size)
+        made_by = "xatlas"
+    assert mesh.uv is not None
+    _check(mesh, mesh.uv)
+    near = np.round(mesh.uv)
+    uv = np.where(np.abs(mesh.uv - near) <= WHOLE, near, mesh.uv)[mesh.faces]
+    number, crossing = _tiles(uv)
+    tiles = tuple(np.unique(number).tolist())
+    return Unwrapped(mesh, uv, vertex, made_by, tiles, _doubts(mesh, uv, tiles, crossing, tile))
+
+
+def in_tile(uv: Array, tile: int) -> npt.NDArray[np.bool_]:
+    """(m,): which faces (m, 3, 2) lie in a UDIM tile."""
+    return np.asarray(_tiles(uv)[0] == tile)
+
+
+def _new_uv(mesh: Mesh, size: int) -> tuple[Mesh, Integers]:
+    try:
+        import xatlas
+    except ImportError:
+        raise InputError(
+            f"mesh {mesh.name!r}",
+            "it has no texture coordinates, and xatlas, which makes them, is not installed",
+            "unwrap it in a modelling tool, or pip install 'translucent-shading[bake]'",
+        ) from None
+    mesh.require_finite()
+    unit = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).astype(np.float32)
+    gap = max(1, min(CHART_GAP, round(GAP_SHARE * size)))
+    atlas, options = xatlas.Atlas(), xatlas.PackOptions()
+    atlas.add_mesh(unit, mesh.faces.astype(np.uint32))
+    options.resolution, options.padding, options.bilinear = size, gap, True
+    atlas.generate(pack_options=options)
+    vertex, faces, uv = atlas[0]
+    vertex = vertex.astype(np.int64)
+    made = Mesh(mesh.vertices[vertex], faces.astype(np.int32), uv.astype(np.float64), mesh.name, mesh.repairs)
+    return made, vertex
+
+
+def _check(mesh: Mesh, uv: Array) -> None:
+    if bad := int((~np.isfinite(uv)).any(axis=1).sum()):
+        raise InputError(f"mesh {mesh.name!r}", f"{bad} texture coordinates are not finite", "export the mesh again")
+    corners = uv[mesh.faces]
+    span = corners.max(axis=1) - corners.min(axis=1)
+    if float(span.max()) > MOST_TILES:
+        face = int(span.max(axis=1).argmax())
+        raise InputError(
+            f"mesh {mesh.name!r}",
+            f"face {face} covers {span.max():.3g} tiles in UV: a texture repeats on it",
+            "give texture coordinates that use each place of the map once, or none",
+        )
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    with np.errstate(under="ignore"):
+        if not (a[:, 0] * b[:, 1] != a[:, 1] * b[:, 0]).any():
+            raise InputError(
+                f"mesh {mesh.name!r}", "no face has an area in UV", "unwrap it in a modelling tool, or leave out the uv"
+            )
+
+
+def _tiles(uv: Array) -> tuple[Integers, npt.NDArray[np.bool_]]:
+    """(m,): UDIM tile of each face, by its middle, 0 where there is none; and whether the face leaves its tile."""
+    tile = np.floor(uv.mean(axis=1)).astype(np.int64)
+    crossing = ((uv < tile[:, None]) | (uv > tile[:, None] + 1)).any(axis=(1, 2))
+    u, v = tile.T
+    numbered = (u >= 0) & (u < 10) & (v >= 0) & (v < 900)
+    return np.where(numbered, 1001 + u + 10 * v, 0), crossing
+
+
+def _doubts(
+    mesh: Mesh, uv: Array, tiles: tuple[int, ...], crossing: npt.NDArray[np.bool_], tile: int | None
+) -> tuple[str, ...]:
+    """What to warn of; raises where a tile is asked for in which there is nothing."""
+    listed = ", ".join(map(str, tiles))
+    if tile is not None:
+        if tile not in tiles:
+            raise InputError(f"UDIM tile {tile}", f"mesh {mesh.name!r} has faces in {listed}", "ask for one of these")
+        return ()
+    if len(tiles) > 1 and 0 not in tiles and not crossing.any():
+        return (f"the texture coordinates use the UDIM tiles {listed}, which one map lays over one another: bake each",)
+    if outside := int(((uv < 0) | (uv > 1)).any(axis=(1, 2)).sum()):
+        return (f"{outside} of {len(uv)} faces have texture coordinates outside 0..1, where the map repeats",)
+    return ()

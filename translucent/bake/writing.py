@@ -1,0 +1,242 @@
+"""Thickness maps and thickness per vertex as files; each appears complete, with its record beside it, or not at all.
+
+==========  =========================================================================================
+file        holds
+==========  =========================================================================================
+.exr        float32: ``Y`` the values, ``standard_error.Y``, ``coverage.Y``; unit, mode, settings in its header
+.npy        float32: the values
+.npz        ``values``, ``standard_error``, ``coverage``, ``scale``, ``offset``
+.png        16-bit grey; scale, offset, unit and mode in its text chunks
+.glb        the mesh with its UVs and a volume material, 8 bits in the G channel of the thickness texture
+.ply        of thickness per vertex: the mesh with a float property ``thickness``
+==========  =========================================================================================
+
+Row 0 is the top of the image. How stored numbers become metres: `translucent.bake.encoding`. The record
+(``thickness.exr.json``): `translucent.bake.record`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from translucent.bake.encoding import Encoding
+from translucent.bake.record import DEFINITIONS, Record, describe, plain, unit_of, write_record
+from translucent.errors import InputError, RenderError
+from translucent.frame import write_atomically
+
+if TYPE_CHECKING:
+    from translucent.bake.thickness_map import ThicknessMap, VertexThickness
+
+MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
+VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
+
+#: Largest level of a 16-bit PNG.
+PNG_LEVELS = 65535
+#: How its text chunks begin.
+PNG_PREFIX = "translucent:"
+
+
+@dataclass(frozen=True)
+class _Task:
+    result: ThicknessMap
+    encoding: Encoding
+
+
+def save_map(
+    result: ThicknessMap,
+    path: str | Path,
+    *,
+    normalize: bool = False,
+    invert: bool = False,
+    about: Record | None = None,
+) -> Record:
+    """Write a thickness map, and its record beside it.
+
+    Parameters
+    ----------
+    result : ThicknessMap
+    path : path
+        One of the module's table, not ``.ply``.
+    normalize : bool
+        Store shares of the largest value. A PNG always does; what turns them into metres is in file and record.
+    invert : bool
+        Store 1 minus that share, the translucency that some engines want.
+    about : dict, optional
+        More for the record, such as where the mesh is from.
+
+    Returns
+    -------
+    dict
+        The record.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another one, the folder is missing, or the file cannot hold what is asked.
+    RenderError
+        If a file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
+    """
+    path = Path(path)
+    suffix = check_map_output(path, normalize=normalize, invert=invert)
+    unit = unit_of(result.settings.mode)
+    if suffix == ".glb":
+        from translucent.bake.gltf_export import mesh_file
+        from translucent.bake.gltf_maps import write_maps
+
+        return write_maps(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
+    levels = PNG_LEVELS if suffix == ".png" else 0
+    encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=unit)
+    write_atomically(path, partial(_WRITERS[suffix], _Task(result, encoding)))
+    return write_record(path, {**(about or {}), **describe(result, encoding)})
+
+
+def check_map_output(
+    path: Path, suffixes: tuple[str, ...] = MAP_SUFFIXES, *, normalize: bool = False, invert: bool = False
+) -> str:
+    """The suffix in lower case; raises as `save_map` does, before any work is done."""
+    asked, suffix = f"output {str(path)!r}", path.suffix.lower()
+    if suffix not in suffixes:
+        raise InputError(asked, f"suffix {path.suffix!r}", f"use {', '.join(suffixes[:-1])} or {suffixes[-1]}")
+    if not os.path.isdir(path.parent):  # False, too, for a name that no folder can have
+        raise InputError(asked, f"no folder {str(path.parent)!r}", "make the folder first")
+    if os.path.isdir(path):
+        raise InputError(asked, "a folder of that name is there", "choose another name")
+    if not os.access(path.parent, os.W_OK):
+        raise RenderError(asked, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
+    if suffix == ".glb" and (normalize or invert):
+        raise InputError(asked, "glTF stores t / max and the max", "leave --normalize and --invert out")
+    if suffix == ".exr":
+        try:
+            import OpenEXR  # noqa: F401
+        except ImportError:
+            raise RenderError(asked, "the OpenEXR package is not installed", "pip install openexr") from None
+    return suffix
+
+
+def _write_exr(task: _Task, path: Path) -> None:
+    import OpenEXR
+
+    result, encoding = task.result, task.encoding
+    channels = {
+        "Y": encoding.encode(result.values),
+        "standard_error.Y": np.ascontiguousarray(result.standard_error, dtype=np.float32),
+        "coverage.Y": result.coverage.astype(np.float32),
+    }
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "comments": f"{DEFINITIONS[result.settings.mode]}; value = offset + scale * Y in {encoding.unit}",
+        **_stated(task),
+    }
+    try:
+        with OpenEXR.File(header, channels) as file:
+            file.write(str(path))
+    except RuntimeError as error:  # what OpenEXR makes of a full disk
+        raise OSError(str(error).replace(str(path), "the file").rstrip(".")) from error
+
+
+def _stated(task: _Task) -> dict[str, Any]:
+    """What a file says of itself."""
+    settings = task.result.settings
+    return {
+        "unit": task.encoding.unit,
+        "mode": settings.mode,
+        # OpenEXR keeps a Python float as a float32; text has all digits.
+        "scale": repr(task.encoding.scale),
+        "offset": repr(task.encoding.offset),
+        "seed": int(settings.seed),
+        "settings": json.dumps(plain(settings.summary()), ensure_ascii=False),
+    }
+
+
+def _write_npy(task: _Task, path: Path) -> None:
+    with path.open("wb") as stream:
+        np.save(stream, task.encoding.encode(task.result.values), allow_pickle=False)
+
+
+def _write_npz(task: _Task, path: Path) -> None:
+    result, encoding = task.result, task.encoding
+    arrays = {"standard_error": result.standard_error, "coverage": result.coverage}
+    with path.open("wb") as stream:
+        np.savez_compressed(
+            stream,
+            allow_pickle=False,
+            values=encoding.encode(result.values),
+            scale=np.float64(encoding.scale),
+            offset=np.float64(encoding.offset),
+            **arrays,
+        )
+
+
+def _write_png(task: _Task, path: Path) -> None:
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    text = PngInfo()
+    text.add_text("Description", DEFINITIONS[task.result.settings.mode])
+    for key, value in _stated(task).items():
+        text.add_text(PNG_PREFIX + key, str(value))
+    Image.fromarray(task.encoding.encode(task.result.values)).save(path, format="PNG", pnginfo=text)
+
+
+_WRITERS: dict[str, Callable[[_Task, Path], None]] = {
+    ".exr": _write_exr,
+    ".npy": _write_npy,
+    ".npz": _write_npz,
+    ".png": _write_png,
+}
+
+
+def save_vertices(result: VertexThickness, path: str | Path, *, about: Record | None = None) -> Record:
+    """Write thickness per vertex, and its record beside it.
+
+    Parameters
+    ----------
+    result : VertexThickness
+    path : path
+        ``.ply``: the mesh with a property ``thickness``; ``.glb``: with an attribute ``_THICKNESS``; both float32.
+        ``.npy``: (n,) float32.
+    about : dict, optional
+        More for the record.
+
+    Raises
+    ------
+    InputError, RenderError
+        As `save_map`.
+    """
+    path = Path(path)
+    suffix = check_map_output(path, VERTEX_SUFFIXES)
+    if suffix == ".glb":
+        from translucent.bake.gltf_export import mesh_file
+        from translucent.bake.gltf_vertices import write_vertices
+
+        return write_vertices(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
+    values = np.ascontiguousarray(result.values, dtype=np.float32)
+
+    def fill(temporary: Path) -> None:
+        if suffix == ".npy":
+            with temporary.open("wb") as stream:
+                np.save(stream, values, allow_pickle=False)
+        else:
+            temporary.write_bytes(_ply(result, values))
+
+    write_atomically(path, fill)
+    encoding = Encoding(unit=unit_of(result.settings.mode))
+    return write_record(path, {**(about or {}), **describe(result, encoding)})
+
+
+def _ply(result: VertexThickness, values: Any) -> bytes:
+    import trimesh
+
+    mesh = trimesh.Trimesh(result.mesh.vertices, result.mesh.faces, process=False)
+    mesh.vertex_attributes["thickness"] = values
+    with np.errstate(all="ignore"):
+        return bytes(mesh.export(file_type="ply", include_attributes=True))
