@@ -1,0 +1,70 @@
+"""What to use for a scene, read off its rows by a rule that the page prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from translucent.bench.frontier import ERROR_FLOOR, TIME_MARGIN, error_of
+from translucent.bench.record import CaseRecord, Quantity, Row
+
+#: RMS error up to which a method is good enough for a picture: in light, one step of an 8-bit display; in thickness,
+#: a tenth of a millimeter on a body of a meter.
+GOOD_ENOUGH: Mapping[Quantity, float] = {"thickness": 1e-4, "transmittance": 1 / 255, "radiance": 1 / 255}
+
+#: Share of the covered pixels that a method may mark as invalid and still be advised.
+MAX_INVALID = 1e-3
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to use for a scene.
+
+    Attributes
+    ----------
+    row : Row
+        The cheapest method that is good enough; where none is, the most accurate one.
+    good_enough : bool
+    cheaper : Row or None
+        The most accurate of what clearly costs less than that, shortcuts included.
+    constant : Row or None
+        One thickness for all pixels, as viewers of glTF files take it.
+    times_better : float or None
+        RMS error of `constant` by that of `row`, where errors below float32's own count as those.
+    """
+
+    row: Row
+    good_enough: bool
+    cheaper: Row | None
+    constant: Row | None
+    times_better: float | None
+
+
+def advise(case: CaseRecord) -> Advice | None:
+    """What to use for the scene of a case; None where nothing was measured."""
+    measured = [row for row in case.rows if row.ratio is not None and error_of(row, case.quantity) is not None]
+    usable = [row for row in measured if row.kind == "method" and (row.invalid or 0.0) <= MAX_INVALID]
+    good = [row for row in usable if _error(row, case) <= GOOD_ENOUGH[case.quantity]]
+    if not usable:
+        return None
+    chosen = min(good, key=_cost) if good else min(usable, key=lambda row: _error(row, case))
+    cheaper = [row for row in measured if row.kind != "cpu" and _cost(row) * TIME_MARGIN < _cost(chosen)]
+    constant = next((row for row in measured if row.family == "ConstantThickness"), None)
+    return Advice(
+        row=chosen,
+        good_enough=bool(good),
+        cheaper=min(cheaper, key=lambda row: _error(row, case), default=None),
+        constant=constant,
+        times_better=None if constant is None else _error(constant, case) / max(_error(chosen, case), ERROR_FLOOR),
+    )
+
+
+def _cost(row: Row) -> float:
+    assert row.ratio is not None, "measured"
+    return row.ratio.median
+
+
+def _error(row: Row, case: CaseRecord) -> float:
+    error = error_of(row, case.quantity)
+    assert error is not None, "measured"
+    return error
