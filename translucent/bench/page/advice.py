@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from translucent.bench.frontier import ERROR_FLOOR, TIME_MARGIN, error_of
@@ -57,6 +57,38 @@ def advise(case: CaseRecord) -> Advice | None:
         constant=constant,
         times_better=None if constant is None else _error(constant, case) / max(_error(chosen, case), ERROR_FLOOR),
     )
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One line of the answer: in these scenes, this method.
+
+    Attributes
+    ----------
+    row : Row
+        One of those advised.
+    titles : tuple of str
+        Of the scenes.
+    ratios : (low, high)
+        Its cost in them.
+    """
+
+    row: Row
+    titles: tuple[str, ...]
+    ratios: tuple[float, float]
+
+
+def summarize(cases: Sequence[tuple[CaseRecord, Advice | None]]) -> list[Summary]:
+    """The methods that are good enough, those for the most scenes first."""
+    by_method: dict[str, list[tuple[CaseRecord, Row]]] = {}
+    for case, advice in cases:
+        if advice is not None and advice.good_enough:
+            by_method.setdefault(advice.row.method, []).append((case, advice.row))
+    found = []
+    for members in sorted(by_method.values(), key=len, reverse=True):
+        costs = [_cost(row) for _, row in members]
+        found.append(Summary(members[0][1], tuple(case.title for case, _ in members), (min(costs), max(costs))))
+    return found
 
 
 def _cost(row: Row) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 
 from translucent.bench.frontier import ERROR_FLOOR, error_of
 from translucent.bench.page import numbers
-from translucent.bench.page.advice import GOOD_ENOUGH, MAX_INVALID, advise
+from translucent.bench.page.advice import GOOD_ENOUGH, MAX_INVALID, advise, summarize
 from translucent.bench.page.figure import require_packages
 from translucent.bench.page.pareto import UNITS, identifier, pareto_svg, plotted
 from translucent.bench.page.pictures import data_address, heat_map, scale_colors
@@ -48,11 +48,13 @@ def build_page(report: Report) -> str:
 
     template = _environment().get_template("page.html.j2")
     style = css_variables() + "\n" + _resource("page.css")
+    cases = [_case(case, f"{n}-{identifier(case.name)}") for n, case in enumerate(report.cases, start=1)]
     text: str = template.render(
         report=report,
         provenance=report.provenance,
         style=Markup(style),
-        cases=[_case(case, f"{n}-{identifier(case.name)}") for n, case in enumerate(report.cases, start=1)],
+        cases=cases,
+        answers=summarize([(case["record"], case["advice"]) for case in cases]),
         scaling=[
             {"axis": axis, "label": AXES[axis], "series": group, "svg": Markup(scaling_svg(axis, group))}
             for axis, group in axis_groups(report.scaling).items()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 from translucent.bench.page.theme import COLORS, css_variables, placeholder
 from translucent.errors import RenderError
@@ -13,10 +15,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Arguments = ParamSpec("Arguments")
+
 #: Of labels, in units of the SVG. Layout measures the widest of the common fonts, which comes with matplotlib.
 FONT_SIZE = 12.0
 
+#: Characters of a name.
+_LONGEST = 40
+
 _FONT = "system-ui, 'Segoe UI', 'DejaVu Sans', 'Liberation Sans', sans-serif"
+
+
+#: Labels stay legible on lines.
+_HALO = "text { paint-order: stroke; stroke: var(--paper); stroke-width: 3px; stroke-linejoin: round; }"
 
 
 def require_packages() -> None:
@@ -32,19 +43,37 @@ def require_packages() -> None:
         ) from None
 
 
+def drawing(draw: Callable[Arguments, str]) -> Callable[Arguments, str]:
+    """Decorate a function that makes a figure: it draws under the page's settings, whatever the user's are."""
+
+    @functools.wraps(draw)
+    def under_settings(*args: Arguments.args, **kwargs: Arguments.kwargs) -> str:
+        import matplotlib
+
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(_settings())
+            return draw(*args, **kwargs)
+
+    return under_settings
+
+
+def shortened(text: str) -> str:
+    """A name that fits into a plot; tables and tooltips have all of it."""
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
 def new_figure(width: float, height: float) -> tuple[Figure, Axes]:
     """An empty figure of this size in units of the SVG, with one pair of axes."""
-    import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_settings()):
-        figure = Figure(figsize=(width / 72, height / 72), dpi=72)
-        FigureCanvasAgg(figure)
-        axes = figure.add_subplot()
-        axes.grid(True, which="major")
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
+    figure = Figure(figsize=(width / 72, height / 72), dpi=72)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.grid(True, which="major")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
     return figure, axes
 
 
@@ -62,12 +91,10 @@ def to_svg(figure: Figure, name: str, description: str, tooltips: dict[str, str]
     tooltips : dict of str to str, optional
         What a browser shows over the artist of this gid.
     """
-    import matplotlib
     from markupsafe import escape
 
     stream = io.StringIO()
-    with matplotlib.rc_context(_settings()):
-        figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
@@ -87,7 +114,9 @@ def to_svg(figure: Figure, name: str, description: str, tooltips: dict[str, str]
 
 def standalone(svg: str) -> str:
     """The ``<svg>`` element as a file of its own, with its colors, on a card that follows the reader's theme."""
-    style = f'<style>{css_variables()}</style><rect width="100%" height="100%" rx="8" style="fill: var(--paper)"/>'
+    style = (
+        f'<style>{css_variables()}\n{_HALO}</style><rect width="100%" height="100%" rx="8" style="fill: var(--paper)"/>'
+    )
     end = svg.index(">") + 1
     return f"{svg[:end]}{style}{svg[end:]}\n"
 
@@ -100,6 +129,7 @@ def _settings() -> dict[str, Any]:
         "font.size": FONT_SIZE,
         "svg.fonttype": "none",
         "svg.hashsalt": "translucent",
+        "text.parse_math": False,
         "text.color": ink,
         "axes.labelcolor": ink,
         "axes.edgecolor": muted,

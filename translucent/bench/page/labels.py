@@ -40,7 +40,8 @@ def place_labels(points: Array, sizes: Array, bounds: tuple[float, float, float,
             places = _places(points[i], sizes[i], radii[i])
             others = np.arange(count) != i
             known = others & np.isfinite(centers[:, 0])
-            costs = np.hypot(*(places - points[i]).T) + 0.01 * np.arange(len(places))
+            beyond = np.maximum(np.abs(places - points[i]) - sizes[i] / 2, 0.0)
+            costs = np.hypot(*beyond.T) + 0.05 * np.arange(len(places))
             costs += _ON_LABEL * _overlaps(places, sizes[i] + 2.0, centers[known], sizes[known]).sum(axis=1)
             costs += _ON_POINT * _overlaps(places, sizes[i], points, spots).sum(axis=1)
             middles = 0.5 * (places + points[i])  # where a leader would cross another label

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from translucent.bench.frontier import ERROR_FLOOR, error_of
-from translucent.bench.page.figure import FONT_SIZE, new_figure, to_svg
+from translucent.bench.page.figure import FONT_SIZE, drawing, new_figure, shortened, to_svg
 from translucent.bench.page.labels import place_labels
 from translucent.bench.page.numbers import error_text, power_text, ratio_text
 from translucent.bench.page.theme import placeholder, style_of
@@ -43,7 +43,10 @@ def plotted(case: CaseRecord) -> list[Row]:
     return sorted(rows, key=lambda row: (families[row.family], row.family, *_setting(row), _cost(row), row.method))
 
 
-def pareto_svg(case: CaseRecord, names: Mapping[str, str], name: str, size: tuple[float, float] = (760, 520)) -> str:
+@drawing
+def pareto_svg(
+    case: CaseRecord, names: Mapping[str, str], name: str, size: tuple[float, float] = (760, 520), title: str = ""
+) -> str:
     """The plot of a case as an ``<svg>`` element; a note where there is nothing to draw is the page's.
 
     Parameters
@@ -55,6 +58,8 @@ def pareto_svg(case: CaseRecord, names: Mapping[str, str], name: str, size: tupl
     name : str
         Of the figure, unique within the page.
     size : (width, height)
+    title : str
+        Above the plot.
     """
     rows = plotted(case)
     figure, axes = new_figure(*size)
@@ -67,7 +72,9 @@ def pareto_svg(case: CaseRecord, names: Mapping[str, str], name: str, size: tupl
     _series(axes, rows, places)
     for i, (row, place) in enumerate(zip(rows, places, strict=True)):
         _symbol(axes, row, place, f"point{i}")
-    figure.subplots_adjust(left=0.1, right=0.985, bottom=0.115, top=0.9 if _floor_ms(case) else 0.97)
+    above = (34.0 if _floor_ms(case) else 10.0) + (28.0 if title else 0.0)
+    figure.subplots_adjust(left=72 / size[0], right=1 - 12 / size[0], bottom=56 / size[1], top=1 - above / size[1])
+    figure.text(12 / size[0], 1 - 20 / size[1], title, weight="bold", size=FONT_SIZE + 2, va="center")
     _labels(axes, rows, places, names)
     tooltips = {f"point{i}": tooltip(row, case.quantity) for i, row in enumerate(rows)}
     return to_svg(figure, name, f"Cost against error: {case.title}", tooltips)
@@ -162,7 +169,7 @@ def _frontier(axes: Axes, rows: Sequence[Row], places: np.ndarray) -> None:
     on = np.array([row.pareto for row in rows], dtype=bool)
     if not on.any():
         return
-    chosen = places[on]
+    chosen = places[on][np.argsort(places[on][:, 0], kind="stable")]
     x = np.append(chosen[:, 0], axes.get_xlim()[1])
     y = np.minimum.accumulate(chosen[:, 1])
     x, y = np.insert(x, 0, x[0]), np.concatenate([[axes.get_ylim()[1]], y, y[-1:]])
@@ -209,11 +216,11 @@ def _labels(axes: Axes, rows: Sequence[Row], places: np.ndarray, names: Mapping[
     points = axes.transData.transform(places)
     texts = [
         axes.text(
-            *(0.0, 0.0, names[row.method]),
+            *(0.0, 0.0, shortened(names[row.method])),
             ha="center",
             va="center",
-            color=placeholder("ink"),
             weight="bold" if row.pareto else "normal",
+            size=FONT_SIZE - 1,
             zorder=6,
         )
         for row in rows

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from translucent.bench.page.figure import FONT_SIZE, new_figure, to_svg
+from translucent.bench.page.figure import FONT_SIZE, drawing, new_figure, shortened, to_svg
 from translucent.bench.page.labels import spread
 from translucent.bench.page.theme import placeholder, style_of
 from translucent.bench.record import Series
@@ -33,6 +33,7 @@ def axis_groups(scaling: Sequence[Series]) -> dict[str, list[Series]]:
     return {axis: series for axis, series in groups.items() if series}
 
 
+@drawing
 def scaling_svg(axis: str, group: Sequence[Series], size: tuple[float, float] = (620, 400)) -> str:
     """Milliseconds of each method along one axis, both logarithmic."""
     figure, axes = new_figure(*size)
@@ -41,7 +42,7 @@ def scaling_svg(axis: str, group: Sequence[Series], size: tuple[float, float] = 
         x, y = np.array([(p.x, p.wall.median) for p in series.points if p.wall is not None]).T
         style = style_of(series.family)
         color = placeholder(style.color)
-        dashes = (0, (4, 3)) if series.family == "depth-only" or "floor" in series.family else "-"
+        dashes = (0, (4, 3)) if series.family == "floor" else "-"
         axes.plot(x, y, linestyle=dashes, color=color, marker=style.marker, markersize=6, linewidth=1.5)
         ends.append((series.method, style.color, float(x[-1]), float(y[-1])))
     axes.set_xscale("log")
@@ -88,7 +89,9 @@ def _end_labels(axes: Axes, ends: Sequence[tuple[str, str, float, float]]) -> No
     figure = axes.get_figure(root=True)
     assert figure is not None, "made with one"
     texts = [
-        axes.text(0, 0, name, ha="left", va="center", color=placeholder(color), size=FONT_SIZE, clip_on=False)
+        axes.text(
+            0, 0, shortened(name), ha="left", va="center", color=placeholder(color), size=FONT_SIZE, clip_on=False
+        )
         for name, color, *_ in ends
     ]
     widest = max(text.get_window_extent().width for text in texts)

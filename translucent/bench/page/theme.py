@@ -33,7 +33,7 @@ class Style:
 
 
 FAMILIES = {
-    "depth-only": Style("muted", "|"),
+    "floor": Style("muted", "|"),
     "SignedDepth": Style("green", "o"),
     "BackFaceDepth": Style("orange", "s"),
     "ThinLayer": Style("pink", "D"),
@@ -41,8 +41,8 @@ FAMILIES = {
     "DepthPeeling": Style("blue", "^"),
     "KBuffer": Style("sky", "v"),
     "RayMarched": Style("olive", "*"),
-    "constant": Style("vermilion", "X"),
-    "sphere": Style("vermilion", "p"),
+    "ConstantThickness": Style("vermilion", "X"),
+    "SphereAssumption": Style("vermilion", "p"),
     "cpu": Style("muted", "h"),
 }
 
