@@ -59,7 +59,7 @@ PROVENANCE = Provenance(
     quick=False,
 )
 
-FAMILIES = ("SignedDepth", "BackFaceDepth", "ConstantThickness", "KBuffer", "FragmentLists", "something new")
+FAMILIES = ("SignedDepth", "BackFaceDepth", "constant thickness", "KBuffer", "FragmentLists", "something new")
 
 
 def unlike() -> Iterator[float]:
@@ -114,7 +114,7 @@ def case(name: str = "knot", title: str = "A knot", **more: Any) -> CaseRecord:
             for i, family in enumerate(FAMILIES)
         ),
         measured("marking", "KBuffer", 1.02, 1e-7, values, invalid=0.25),
-        measured("on the processor", "cpu", 400.0, 0.0, values, kind="cpu"),
+        measured("on the processor", "cpu backend", 400.0, 0.0, values, kind="cpu"),
         Row("refusing", "ThinLayer", "", "method", "", False, refusal="no sheets here"),
         Row("breaking", "RayMarched", "", "method", "", False, failure="a shader that does not compile"),
     ]

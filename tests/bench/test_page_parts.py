@@ -32,7 +32,7 @@ def scene(*rows: Row) -> CaseRecord:
 
 
 SIGNED, LISTS = row("SignedDepth", 1.1, 3e-8), row("FragmentLists", 5.0, 2e-8)
-CONSTANT, HALF = row("ConstantThickness", 0.5, 0.2, "counter-example"), row("float16", 1.0, 3e-5, "counter-example")
+CONSTANT, HALF = row("constant thickness", 0.5, 0.2, "counter-example"), row("float16", 1.0, 3e-5, "counter-example")
 
 
 def test_the_cheapest_that_is_good_enough_is_advised() -> None:

@@ -49,7 +49,7 @@ def advise(case: CaseRecord) -> Advice | None:
         return None
     chosen = min(good, key=_cost) if good else min(usable, key=lambda row: _error(row, case))
     cheaper = [row for row in measured if row.kind != "cpu" and _cost(row) * TIME_MARGIN < _cost(chosen)]
-    constant = next((row for row in measured if row.family == "ConstantThickness"), None)
+    constant = next((row for row in measured if row.family == "constant thickness"), None)
     return Advice(
         row=chosen,
         good_enough=bool(good),

@@ -12,7 +12,7 @@ from translucent.errors import InputError
 from translucent.frame import write_atomically
 
 #: Left out: the backend without OpenGL, which is off the scale, and methods for what this scene does not have.
-_LEFT_OUT = {"cpu", "RayMarched"}
+_LEFT_OUT = {"cpu backend", "RayMarched on the CPU", "RayMarched"}
 
 
 def write_overview(report: Report, path: Path) -> None:
@@ -34,8 +34,7 @@ def write_overview(report: Report, path: Path) -> None:
 def overview_svg(report: Report) -> str:
     """Cost against error on the first closed, concave scene that only absorbs, with the names of the methods."""
     require_packages()
-    cases = [_reduced(case) for case in report.cases]
-    cases = [case for case in cases if plotted(case)]
+    cases = _shown(report)
     if not cases:
         raise InputError("the figure of the report", "no scene in it has numbers", "measure at least one")
     wanted = [case for case in cases if case.closed and case.absorption_only and not case.convex]
@@ -44,6 +43,16 @@ def overview_svg(report: Report) -> str:
     device = "software rasteriser" if report.provenance.software else report.provenance.renderer
     title = f"{case.title}, {case.size[0]} × {case.size[1]}, {device}"
     return standalone(pareto_svg(case, names, "overview", (900, 520), title))
+
+
+def has_overview(report: Report) -> bool:
+    """Whether there is anything to draw."""
+    return bool(_shown(report))
+
+
+def _shown(report: Report) -> list[CaseRecord]:
+    """The cases with anything to draw."""
+    return [case for case in map(_reduced, report.cases) if plotted(case)]
 
 
 def _reduced(case: CaseRecord) -> CaseRecord:

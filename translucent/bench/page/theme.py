@@ -41,9 +41,10 @@ FAMILIES = {
     "DepthPeeling": Style("blue", "^"),
     "KBuffer": Style("sky", "v"),
     "RayMarched": Style("olive", "*"),
-    "ConstantThickness": Style("vermilion", "X"),
-    "SphereAssumption": Style("vermilion", "p"),
-    "cpu": Style("muted", "h"),
+    "constant thickness": Style("vermilion", "X"),
+    "sphere assumption": Style("vermilion", "p"),
+    "cpu backend": Style("muted", "h"),
+    "RayMarched on the CPU": Style("muted", "H"),
 }
 
 _OTHERS = (Style("ink", "<"), Style("vermilion", ">"), Style("blue", "d"), Style("olive", "8"))
