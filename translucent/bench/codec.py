@@ -45,7 +45,7 @@ class Packed:
 
     @classmethod
     def of(cls, array: npt.NDArray[Any]) -> Packed:
-        """Pack booleans as they are, and floats as float16 with 7 of its 11 bits, relative to the largest."""
+        """Pack booleans as they are, and floats as float16 with 5 of its 11 bits, relative to the largest."""
         height, width = array.shape
         if array.dtype == np.bool_:
             return cls((height, width), "bool", 1.0, _deflate(np.packbits(array).tobytes()))
@@ -54,8 +54,8 @@ class Packed:
         with np.errstate(under="ignore"):
             shares = np.where(finite, array / scale, np.nan).astype(np.float16)
         bits = shares.view(np.uint16)
-        # A picture shows no more than 1 % of an error, and zeros compress.
-        rounded = np.where(np.isnan(shares), bits, bits & np.uint16(0xFFF0))
+        # A picture shows no more than some percent of an error, and zeros compress.
+        rounded = np.where(np.isnan(shares), bits, bits & np.uint16(0xFFC0))
         return cls((height, width), "float16", scale, _deflate(rounded.tobytes()))
 
     def array(self) -> npt.NDArray[Any]:

@@ -42,7 +42,7 @@ def scaling_svg(axis: str, group: Sequence[Series], size: tuple[float, float] = 
         x, y = np.array([(p.x, p.wall.median) for p in series.points if p.wall is not None]).T
         style = style_of(series.family)
         color = placeholder(style.color)
-        dashes = (0, (4, 3)) if series.family == "floor" else "-"
+        dashes = (0, (4, 3)) if series.family == "depth only" else "-"
         axes.plot(x, y, linestyle=dashes, color=color, marker=style.marker, markersize=6, linewidth=1.5)
         ends.append((series.method, style.color, float(x[-1]), float(y[-1])))
     axes.set_xscale("log")

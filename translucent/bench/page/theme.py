@@ -33,7 +33,7 @@ class Style:
 
 
 FAMILIES = {
-    "floor": Style("muted", "|"),
+    "depth only": Style("muted", "|"),
     "SignedDepth": Style("green", "o"),
     "BackFaceDepth": Style("orange", "s"),
     "ThinLayer": Style("pink", "D"),
