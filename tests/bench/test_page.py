@@ -108,7 +108,7 @@ def png() -> str:
 def case(name: str = "knot", title: str = "A knot", **more: Any) -> CaseRecord:
     values = unlike()
     rows = [
-        Row("depth-only", "floor", "", "floor", "", True, wall=Timing(9.87, 10.1, 0.21, 11)),
+        Row("depth only", "depth only", "", "floor", "", True, wall=Timing(9.87, 10.1, 0.21, 11)),
         *(
             measured(f"{family}, 4 of them", family, 1.1 + i, 10.0 ** (i - 8), values)
             for i, family in enumerate(FAMILIES)
@@ -261,7 +261,7 @@ def test_every_number_of_a_row_is_in_a_table(page: str) -> None:
 def test_texts_of_the_record_are_shown(page: str) -> None:
     text = " ".join(" ".join(Elements(page).text).split())
     for shown in (
-        "A knot", "12 holes", "breaking: a shader that does not compile", "refusing: no sheets here", "out of memory",
+        "A knot", "12 holes", "breaking: a shader that does not compile", "refusing : no sheets here", "out of memory",
         "broken: 12 holes", "knot / breaking: a shader", "H01", "a traceback", "1.5e-7", "of the diagonal", "2.0e-6",
         "1 of 2 keep", "it is exact", "does not hold", "not checked", "0123abc", "changes that are not committed",
         "translucent report -o out", "what marking promises", "777 pixels", "20 160 triangles",
@@ -344,7 +344,7 @@ def test_little_makes_a_page_too(more: dict[str, Any]) -> None:
 
 def test_a_long_list_of_methods_stands_below_its_plot() -> None:
     values = unlike()
-    rows = [measured(f"RayMarched, {2**i} steps", "RayMarched", 2.0 + i, 0.5**i, values) for i in range(30)]
+    rows = [measured(f"RayMarched, {2**i} steps", "RayMarched", 2.0 + 7 * i % 30, 0.5**i, values) for i in range(30)]
     page = build_page(report(cases=(case(rows=tuple(rows)),)))
     assert 'class="plot tall"' in page
     assert 'class="plot tall"' not in build_page(report())
@@ -371,6 +371,14 @@ def test_the_figure_names_its_methods_and_is_a_file_of_its_own() -> None:
     assert "prefers-color-scheme: dark" in text
     with pytest.raises(InputError, match="no scene in it has numbers; measure at least one"):
         overview_svg(report(cases=()))
+
+
+def test_names_are_no_formulas_and_long_ones_are_cut() -> None:
+    values = unlike()
+    rows = (measured("$k^2$ layers", "KBuffer", 2.0, 1e-3, values), measured("x" * 200, "KBuffer", 3.0, 1e-4, values))
+    text = "".join(ElementTree.fromstring(overview_svg(report(cases=(case(rows=rows),)))).itertext())
+    assert "$k^2$ layers" in text
+    assert "x" * 39 + "…" in text
 
 
 def test_no_opengl_is_needed() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import io
 import math
 from typing import Any
@@ -40,9 +41,26 @@ def test_the_cheapest_that_is_good_enough_is_advised() -> None:
     assert advice is not None
     assert advice.row == SIGNED
     assert advice.good_enough
-    assert advice.cheaper == HALF
+    assert advice.cheaper is None, "what takes shortcuts is no advice"
     assert advice.constant == CONSTANT
     assert advice.times_better == pytest.approx(0.2 / 1e-6)
+
+
+def test_among_equals_the_exact_one_is_advised() -> None:
+    limited = dataclasses.replace(row("KBuffer", 4.9, 2e-8), exact=False)
+    exact = dataclasses.replace(LISTS, exact=True)
+    for rows in ((limited, exact), (exact, limited)):
+        advice = advise(scene(*rows))
+        assert advice is not None
+        assert advice.row == exact
+
+
+def test_the_processor_is_advised_where_nothing_else_runs() -> None:
+    one, other = row("march, 8", 90.0, 0.1, "cpu"), row("march, 64", 300.0, 1e-5, "cpu")
+    advice = advise(scene(one, other))
+    assert advice is not None
+    assert advice.row == other
+    assert advice.cheaper == one
 
 
 def test_shortcuts_and_methods_that_mark_pixels_are_not_advised() -> None:
@@ -172,6 +190,7 @@ def test_numbers_as_text() -> None:
         *("0", "< 0.01 %", "1.23 %", "10.0 %", "16.0 %", "100.0 %"),
     ]
     assert [numbers.power_text(x) for x in (1e-8, 0.1, 10.0, 1e4)] == ["10⁻⁸", "0.1", "10", "10⁴"]
+    assert numbers.rounded_text(121399.2) == "120\u202f000"
     assert numbers.count_text(1234567) == "1\u202f234\u202f567"
     assert [numbers.limit_text(x) for x in (1e-4, 1e-6)] == ["1e-4", "1e-6"]
     assert [short_count(x) for x in (4, 65536, 1e6)] == ["4", "65.5k", "1M"]

@@ -23,10 +23,11 @@ class Advice:
     Attributes
     ----------
     row : Row
-        The cheapest method that is good enough; where none is, the most accurate one.
+        The cheapest method that is good enough; among equally cheap ones, one that the planner calls exact, and the
+        more accurate. Where none is good enough, the most accurate one.
     good_enough : bool
     cheaper : Row or None
-        The most accurate of what clearly costs less than that, shortcuts included.
+        The most accurate method of those that clearly cost less.
     constant : Row or None
         One thickness for all pixels, as viewers of glTF files take it.
     times_better : float or None
@@ -43,12 +44,19 @@ class Advice:
 def advise(case: CaseRecord) -> Advice | None:
     """What to use for the scene of a case; None where nothing was measured."""
     measured = [row for row in case.rows if row.ratio is not None and error_of(row, case.quantity) is not None]
-    usable = [row for row in measured if row.kind == "method" and (row.invalid or 0.0) <= MAX_INVALID]
+    kept = [row for row in measured if (row.invalid or 0.0) <= MAX_INVALID]
+    # Without OpenGL only where nothing else runs.
+    usable = [row for row in kept if row.kind == "method"] or [row for row in kept if row.kind == "cpu"]
     good = [row for row in usable if _error(row, case) <= GOOD_ENOUGH[case.quantity]]
     if not usable:
         return None
-    chosen = min(good, key=_cost) if good else min(usable, key=lambda row: _error(row, case))
-    cheaper = [row for row in measured if row.kind != "cpu" and _cost(row) * TIME_MARGIN < _cost(chosen)]
+    if good:
+        equal = min(map(_cost, good)) * TIME_MARGIN
+        best = [row for row in good if _cost(row) <= equal]
+        chosen = min(best, key=lambda row: (not row.exact, max(_error(row, case), ERROR_FLOOR), _cost(row)))
+    else:
+        chosen = min(usable, key=lambda row: _error(row, case))
+    cheaper = [row for row in usable if _cost(row) * TIME_MARGIN < _cost(chosen)]
     constant = next((row for row in measured if row.family == "constant thickness"), None)
     return Advice(
         row=chosen,

@@ -87,6 +87,7 @@ def _environment() -> Any:
         ms=numbers.ms_text,
         share=numbers.share_text,
         count=numbers.count_text,
+        rounded=numbers.rounded_text,
         data=data_address,
     )
     environment.globals.update(swatch=swatch)
@@ -110,7 +111,7 @@ def _case(case: CaseRecord, name: str) -> dict[str, Any]:
         "pictures": [(picture, by_method.get(picture.method), heat_map(picture)) for picture in case.pictures],
         "picture_columns": _columns(len(case.pictures)),
         "measured": [row for row in case.rows if row.refusal is None and row.failure is None],
-        "refused": [row for row in case.rows if row.refusal is not None],
+        "refused": _refusals(case),
         "failed": [row for row in case.rows if row.failure is not None],
         "errors": [
             (row, quantity, row.errors(quantity))
@@ -119,6 +120,15 @@ def _case(case: CaseRecord, name: str) -> dict[str, Any]:
             if row.errors(quantity) is not None
         ],
     }
+
+
+def _refusals(case: CaseRecord) -> dict[str, list[str]]:
+    """The methods that each reason keeps from this scene."""
+    found: dict[str, list[str]] = {}
+    for row in case.rows:
+        if row.refusal is not None:
+            found.setdefault(row.refusal, []).append(row.method)
+    return found
 
 
 def _parts(rows: list[Any], count: int) -> list[list[Any]]:

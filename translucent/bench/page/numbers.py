@@ -55,6 +55,11 @@ def count_text(value: float | None) -> str:
     return "–" if value is None else f"{value:,.0f}".replace(",", "\u202f")
 
 
+def rounded_text(value: float) -> str:
+    """A whole number to two significant digits: ``121 399`` is ``120 000``."""
+    return count_text(float(f"{value:.1e}"))
+
+
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

@@ -26,7 +26,7 @@ UNITS: Mapping[Quantity, str] = {
     "radiance": "in radiance, share of its mean",
 }
 
-#: Where an error of exactly zero is drawn.
+#: Where errors below it are drawn, and those of zero.
 _ZERO = 1e-9
 _SYMBOL = 9.0
 
@@ -133,7 +133,9 @@ def _ticks(axes: Axes) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}×"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_locator(LogLocator(10, numticks=12))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: "0" if value <= _ZERO else power_text(value)))
+    axes.yaxis.set_major_formatter(
+        FuncFormatter(lambda value, _: f"≤ {power_text(_ZERO)}" if value <= _ZERO else power_text(value))
+    )
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
@@ -145,11 +147,8 @@ def _guides(axes: Axes, case: CaseRecord) -> None:
     axes.axvline(1.0, color=placeholder("muted"), linewidth=1.2, linestyle=(0, (4, 3)))
     if bottom < ERROR_FLOOR:
         axes.axhspan(bottom, ERROR_FLOOR, color=placeholder("panel"), zorder=0, linewidth=0)
-        at = (0.995, ERROR_FLOOR / 1.25)
-        text = "as exact as float32 paths are"
-        axes.text(
-            *at, text, transform=axes.get_yaxis_transform(), ha="right", va="top", color=placeholder("muted"), size=11
-        )
+        note = "as exact as float32 paths are"
+        axes.text(0.008, 0.012, note, transform=axes.transAxes, color=placeholder("muted"), size=FONT_SIZE - 1)
     floor = _floor_ms(case)
     if floor is None:
         return
