@@ -168,13 +168,18 @@ def test_uncovered_pixels_are_transparent_and_invalid_ones_striped() -> None:
 
 
 def test_numbers_as_text() -> None:
-    assert [numbers.error_text(x) for x in (3.94e-8, 0.0, None, 0.217, -2e-5)] == [
-        "3.9e-8",
-        "0",
-        "–",
-        "2.2e-1",
-        "-2.0e-5",
-    ]
+    texts = {
+        3.94e-8: "3.9e-8",
+        0.0: "0",
+        None: "–",
+        -2e-5: "-2.0e-5",
+        0.02: "0.02",
+        0.217: "0.22",
+        12.3: "12",
+        123.4: "123",
+        4e5: "4.0e5",
+    }
+    assert {x: numbers.error_text(x) for x in texts} == texts
     assert [numbers.signed_error_text(x) for x in (1e-3, -1e-3, 0.0, None)] == ["+1.0e-3", "-1.0e-3", "0", "–"]
     assert [numbers.ratio_text(x) for x in (1.116, 9.999, 16.32, 99.96, 240.4)] == [
         "1.12",

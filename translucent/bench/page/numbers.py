@@ -6,11 +6,13 @@ import math
 
 
 def error_text(value: float | None) -> str:
-    """Two significant digits: ``3.9e-8``; ``0`` is exactly that, a dash is not measured."""
+    """Two significant digits: ``3.9e-8``, ``0.21``; ``0`` is exactly that, a dash is not measured."""
     if value is None:
         return "–"
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
+    if 0.00995 <= abs(value) < 999.5:
+        return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"{mantissa}e{int(exponent)}"
 
