@@ -46,6 +46,10 @@ class Case:
         What its media do: methods differ in what they can render.
     quick : bool
         Measured with ``--quick``, too.
+    brief : bool
+        Only the contenders of ``--quick``: another case of this kind has them all.
+    shrink : int
+        Timed at this part of the width and height: many steps along each ray take long.
     compared : int
         Largest width or height at which it is held against the reference, which takes its time for some.
     tolerance : float
@@ -58,6 +62,8 @@ class Case:
     scene: Callable[[Size], Scene]
     effect: Effect = "absorption"
     quick: bool = True
+    brief: bool = False
+    shrink: int = 1
     compared: int = 256
     tolerance: float = 1e-4
 
@@ -159,14 +165,24 @@ CASES: tuple[Case, ...] = (
         partial(_far, lambda: subdivided("knot", 80_000)),
         quick=False,
     ),
-    Case("emission", "Glowing knot", "one medium that emits light", _emission, "emission"),
-    Case("two emitters", "Two glowing bodies", "emission in order", _two_emitters, "emission", quick=False),
+    Case("emission", "Glowing knot", "one medium that emits light", _emission, "emission", shrink=2),
+    Case(
+        "two emitters",
+        "Two glowing bodies",
+        "emission in order",
+        _two_emitters,
+        "emission",
+        quick=False,
+        brief=True,
+        shrink=2,
+    ),
     Case(
         "scattering",
         "Milky sphere",
         "light of a lamp and of the sky, scattered once",
         lambda size: _scattering(Sphere().tessellate(128), 8.0, size),
         "scattering",
+        shrink=2,
         compared=112,
     ),
     Case(
@@ -176,7 +192,9 @@ CASES: tuple[Case, ...] = (
         lambda size: _scattering(Torus().tessellate(96), 8.0, size),
         "scattering",
         quick=False,
+        brief=True,
+        shrink=2,
         compared=112,
     ),
-    Case("density", "Cloud", "density that varies from place to place", _density, "density", compared=192),
+    Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),
 )

@@ -44,8 +44,7 @@ def drawing(
 ) -> Drawing:
     """The contender's frame, ready to be drawn; `size` is the thickness that a shortcut assumes, in metres."""
     if contender.technique in ("cpu", "march"):
-        if cpu is None:
-            raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
+        assert cpu is not None, "there is a plan for it"
         march = contender.method if isinstance(contender.method, RayMarched) else None
         return OnProcessor(cpu, scene, targets.size, march)
     if contender.technique == "plan":
@@ -60,10 +59,14 @@ def drawing(
     return Short(studio, scene, targets, plan, shortcut)
 
 
-def plan_of(studio: Studio, contender: Contender, scene: Scene) -> RenderPlan:
+def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | None = None) -> RenderPlan:
     """What runs, or what lends a shortcut its shading; raises `InputError` where the planner refuses."""
-    if contender.technique in ("plan", "march", "cpu"):
-        return studio.renderer.plan(scene, contender.method if contender.technique == "plan" else None)
+    if contender.technique in ("cpu", "march"):
+        if cpu is None:
+            raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
+        return cpu.plan(scene)
+    if contender.technique == "plan":
+        return studio.renderer.plan(scene, contender.method)
     return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 from translucent.bench.record import Quantity, Row
 
-#: Times closer than this are equal: runs on the same machine differ by as much.
+#: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much.
 TIME_MARGIN = 1.05
+NOISES = 2.0
 
 #: Errors closer than this are equal, as are all below `ERROR_FLOOR`: float32 of a path has no more to say.
 ERROR_MARGIN = 1.5
@@ -40,14 +42,16 @@ def beats(one: Row, other: Row, quantity: Quantity) -> bool:
     a, b = _place(one, quantity), _place(other, quantity)
     if a is None or b is None or (one.invalid or 0.0) > (other.invalid or 0.0) + 1e-3:
         return False
-    faster, slower = a[0] * TIME_MARGIN < b[0], a[0] > b[0] * TIME_MARGIN
-    better, worse = a[1] * ERROR_MARGIN < b[1], a[1] > b[1] * ERROR_MARGIN
+    (time_a, noise_a, error_a), (time_b, noise_b, error_b) = a, b
+    margin = max((TIME_MARGIN - 1.0) * min(time_a, time_b), NOISES * math.hypot(noise_a, noise_b))
+    faster, slower = time_a + margin < time_b, time_a > time_b + margin
+    better, worse = error_a * ERROR_MARGIN < error_b, error_a > error_b * ERROR_MARGIN
     return (faster and not worse) or (better and not slower)
 
 
-def _place(row: Row, quantity: Quantity) -> tuple[float, float] | None:
-    """Time and error."""
+def _place(row: Row, quantity: Quantity) -> tuple[float, float, float] | None:
+    """Time, its noise, and error."""
     error = error_of(row, quantity)
-    if row.ratio is None or error is None:
+    if row.ratio is None or error is None or row.kind == "floor":
         return None
-    return row.ratio.median, max(error, ERROR_FLOOR)
+    return row.ratio.median, row.ratio.noise, max(error, ERROR_FLOOR)

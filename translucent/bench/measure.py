@@ -28,9 +28,10 @@ from translucent.errors import InputError, TranslucentError, TranslucentWarning
 from translucent.frame import Frame
 from translucent.gpu.targets import Targets
 from translucent.metrics import compare, interior
+from translucent.render_plan import RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Scene
-from translucent.thickness import DepthPeeling
+from translucent.scene import Object, Scene
+from translucent.thickness import DepthPeeling, RayMarched
 
 #: By which quantity the methods of a case are ranked.
 QUANTITY: dict[str, Quantity] = {
@@ -114,6 +115,7 @@ class CaseRun:
     def measure(self, contenders: Sequence[Contender]) -> CaseRecord:
         """All rows and pictures of the case. What fails is a row with its reason; the rest goes on."""
         case = self.case
+        self.size = self.size[0] // case.shrink or 1, self.size[1] // case.shrink or 1
         blank = CaseRecord(case.name, case.title, case.why, QUANTITY[case.effect], size=self.size)
         try:
             scene = case.scene(self.size)
@@ -122,6 +124,8 @@ class CaseRun:
         except Exception as error:  # noqa: BLE001 - a scene that cannot be traced leaves the other cases alone
             return dataclasses.replace(blank, failure=one_line(error))
         blank = _described(blank, scene, truth, small)
+        if not blank.compared_pixels:
+            return dataclasses.replace(blank, failure=_untrusted(scene))
         pictures = [_picture("reference", truth.frame, None, blank)]
         for contender in contenders:
             entry = self._compared(contender, scene, truth, small, blank)
@@ -142,13 +146,15 @@ class CaseRun:
             return entry
         targets = Targets(self.studio.gl, size)
         try:
-            plan = plan_of(self.studio, contender, seen)
+            plan = plan_of(self.studio, contender, seen, self.cpu)
             entry.contender, entry.assumed = fitted(self.studio, contender, seen, truth.frame, size)
-            plan = plan_of(self.studio, entry.contender, seen)
+            plan = plan_of(self.studio, entry.contender, seen, self.cpu)
             drawn = drawing(self.studio, entry.contender, seen, plan, targets, entry.assumed, self.cpu)
             try:
-                drawn.draw()
-                entry.frame = drawn.read()
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", TranslucentWarning)  # rows tell what pixels are not valid
+                    drawn.draw()
+                    entry.frame = drawn.read()
                 entry.row = _against(row, entry, drawn, truth, case, plan)
             finally:
                 drawn.release()
@@ -171,7 +177,7 @@ class CaseRun:
             drawings: dict[str, Callable[[], Any]] = {}
             for entry in ready:
                 try:
-                    plan = plan_of(studio, entry.contender, entry.scene)
+                    plan = plan_of(studio, entry.contender, entry.scene, self.cpu)
                     entry.drawn = drawing(studio, entry.contender, entry.scene, plan, targets, entry.assumed, self.cpu)
                     drawings[entry.row.method] = entry.drawn.draw
                 except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
@@ -225,6 +231,16 @@ def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> Ca
     )
 
 
+def _untrusted(scene: Scene) -> str:
+    """Why there is nothing to compare."""
+    problems = [f"{body.mesh.name!r}: {'; '.join(body.mesh.diagnosis.problems)}" for body in scene.bodies]
+    return (
+        f"no pixel of the reference can be trusted; {', '.join(problems)}; close the mesh, or declare it a sheet"
+        if any(body.mesh.diagnosis.problems for body in scene.bodies)
+        else "no pixel is away from silhouettes; ask for a larger --size"
+    )
+
+
 def _parameters(contender: Contender) -> str:
     return {
         "constant": "best constant in metres",
@@ -237,16 +253,17 @@ def _parameters(contender: Contender) -> str:
     }[contender.technique]
 
 
-def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRecord, plan: Any) -> Row:
+def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRecord, plan: RenderPlan) -> Row:
     """The row with what the planner promises and what the frame shows."""
     assert entry.frame is not None
     contender, frame = entry.contender, entry.frame
     parameters = row.parameters
     if entry.assumed:
         parameters = f"{entry.assumed:.4g} m, of least squared error"
-    promise, exact = _promise(contender, plan)
+    promise, exact = _promise(contender, plan, entry.scene)
     found: dict[str, Any] = {}
-    for quantity, scale in (("thickness", case.diagonal), ("transmittance", 1.0), ("radiance", None)):
+    scales: dict[Quantity, float | None] = {"thickness": case.diagonal, "transmittance": 1.0, "radiance": None}
+    for quantity, scale in scales.items():
         errors = _errors(frame, truth, quantity, scale)
         found[quantity] = None if errors is None else errors[0]
         if errors is not None:
@@ -270,7 +287,7 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
     )
 
 
-def _promise(contender: Contender, plan: Any) -> tuple[str, bool]:
+def _promise(contender: Contender, plan: RenderPlan, scene: Scene) -> tuple[str, bool]:
     if contender.technique in ("constant", "ball"):
         return "none: the nearest face alone, with the best thickness that there is", False
     if contender.technique == "unmarked":
@@ -279,9 +296,20 @@ def _promise(contender: Contender, plan: Any) -> tuple[str, bool]:
         return "none: 11 bits for sums of signed distances", False
     if contender.technique == "march":
         return f"sums over {getattr(contender.method, 'steps', 0)} steps in each interval", False
+    if isinstance(contender.method, RayMarched) and any(map(_shines, scene.bodies)):
+        return f"sums over {contender.method.steps} steps in each interval", False
+    if any(step.name == "light_views" for step in plan.passes):
+        points = getattr(contender.method, "light_points", 0)
+        return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
     missing = [effect for effect in plan.unmodelled if not effect.startswith(("light scattered more", "refraction"))]
     limits = [*plan.limits, *missing]
     return "; ".join(limits) or "exact", not limits
+
+
+def _shines(body: Object) -> bool:
+    """Whether steps through the body add something up."""
+    medium = body.medium
+    return medium is not None and (medium.emits or medium.scatters or body.density is not None)
 
 
 def _errors(
@@ -341,7 +369,11 @@ def _with_times(row: Row, samples: Samples | None, failures: dict[str, str]) -> 
 
 
 def _floor_row(found: Sequence[Samples]) -> Row:
+    """The floor; its time is over all draws of it beside the others."""
     floor = [seconds for samples in found for seconds in samples.floor]
-    promise = "the cost of drawing the geometry: no thickness"
-    ones = ratio(floor, floor)
-    return Row("depth only", "depth only", "", "floor", promise, False, wall=timing(floor), ratio=ones, passes=1)
+    row = Row(
+        "depth only", "depth only", "", "floor", "the cost of drawing the geometry: no thickness", False, passes=1
+    )
+    if not floor:
+        return dataclasses.replace(row, refusal="nothing else has been timed on this scene")
+    return dataclasses.replace(row, wall=timing(floor), ratio=ratio(floor, floor))

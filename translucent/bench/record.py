@@ -1,6 +1,6 @@
 """What a report knows: frozen values, written to and read from ``report.json``. Pages are made from these alone.
 
-All times are milliseconds. Errors are result minus reference, on pixels whose 3 x 3 neighborhood crosses equally many
+Times are milliseconds. Errors are result minus reference, on pixels whose 3 x 3 neighborhood crosses equally many
 surfaces and that the method calls valid: in thickness as shares of the diagonal of the scene's bounds, in transmittance
 absolute (0 to 1), in radiance as shares of the root mean square of the reference's radiance over the same pixels.
 """
@@ -140,7 +140,7 @@ class Row:
     ms_per_layer : float, optional
         `wall` by these, for methods that draw the geometry again for each.
     bytes_per_pixel : int, optional
-        Of the targets and buffers that the method itself takes.
+        Of all targets and buffers of its frames; 53 of them hold the result.
     thickness, transmittance, radiance : Errors, optional
         None where there is no pixel that can be compared.
     invalid : float, optional

@@ -5,10 +5,14 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.assets import mesh_path
 from translucent.mesh import Mesh, load_mesh
 from translucent.solids import Box, Sphere
+
+Vertices = npt.NDArray[np.float64]
+Faces = npt.NDArray[np.int32]
 
 
 def subdivided(name: str, triangles: int) -> Mesh:
@@ -50,7 +54,7 @@ def nested_shells(shells: int = 6, segments: int = 96) -> Mesh:
     """Hollow balls within each other: every second sphere is wound inwards."""
     radii = np.linspace(1.0, 0.15, 2 * shells)
     parts = [Sphere(radius=float(radius)).tessellate(segments) for radius in radii]
-    return _joined([(p.vertices, p.faces if i % 2 == 0 else p.faces[:, ::-1]) for i, p in enumerate(parts)], "shells")
+    return joined([(p.vertices, p.faces if i % 2 == 0 else p.faces[:, ::-1]) for i, p in enumerate(parts)], "shells")
 
 
 def plates(layers: int, gap: float = 0.5) -> Mesh:
@@ -58,10 +62,11 @@ def plates(layers: int, gap: float = 0.5) -> Mesh:
     count = layers // 2
     pitch = 1.0 / count
     plate = Box((-0.5, -0.5, -pitch * (1 - gap)), (0.5, 0.5, 0.0)).tessellate()
-    return _joined([(plate.vertices - (0, 0, i * pitch), plate.faces) for i in range(count)], "plates")
+    return joined([(plate.vertices - (0, 0, i * pitch), plate.faces) for i in range(count)], "plates")
 
 
-def _joined(parts: list[tuple[np.ndarray, np.ndarray]], name: str) -> Mesh:  # type: ignore[type-arg]
+def joined(parts: list[tuple[Vertices, Faces]], name: str) -> Mesh:
+    """One mesh of several, each as vertices and faces."""
     offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
     faces = np.concatenate([faces + offset for (_, faces), offset in zip(parts, offsets, strict=True)])
     return Mesh(np.concatenate([vertices for vertices, _ in parts]), faces, name=name)

@@ -22,8 +22,9 @@ Sample = tuple[float, float, float | None]
 #: Rounds that even the slowest takes part in, and that the fastest needs no more than.
 FEWEST, MOST = 3, 60
 
-#: A drawing of seconds is not repeated more often than this: its own noise averages out within it.
-FEWEST_LONG, LONG = 2, 0.8
+#: A drawing of so many seconds needs no more rounds than this: its own noise averages out within it.
+FEWEST_LONG, LONG = 2, 0.3
+FEWEST_LONGEST, LONGEST = 1, 2.0
 
 #: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
 FLOOR_SHARE, MOST_FLOORS = 0.15, 6
@@ -111,7 +112,8 @@ def _floor(floor: Callable[[], Sample], typical: float, beside: float) -> float:
 
 def _enough(samples: Samples, share: float) -> bool:
     rounds = len(samples.wall)
-    fewest = FEWEST_LONG if rounds and samples.frame[0] > LONG else FEWEST
+    first = samples.frame[0] if rounds else 0.0
+    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > LONG else FEWEST
     return rounds >= MOST or (rounds >= fewest and samples.spent >= share)
 
 
