@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from translucent.bench.frontier import error_of
+from translucent.bench.frontier import NOISES, error_of
 from translucent.bench.record import CaseRecord, Claim, HardCase, Row
 
 #: Times the floor, within which signed depth stays.
@@ -57,14 +57,18 @@ Check = Callable[[CaseRecord], tuple[bool | None, str]]
 
 
 def _over(text: str, cases: Sequence[CaseRecord], check: Check) -> Claim:
-    """A claim over several cases: held where it holds on all of them, None where none has the numbers."""
+    """A claim over several cases: held where it holds on all that decide it; None where none does.
+
+    A check gives no verdict (None) where the case has not the numbers, or they are too noisy, which it tells in words.
+    """
     found = [(case, *check(case)) for case in cases]
     known = [(case, held, words) for case, held, words in found if held is not None]
+    undecided = [f"undecided on {case.name!r}: {words}" for case, held, words in found if held is None and words]
     if not known:
-        return Claim(text, None, "no case in this run to check it on")
+        return Claim(text, None, "; ".join(undecided) or "no case in this run to check it on")
     wrong = [f"not on {case.name!r}: {words}" for case, held, words in known if not held]
     right = [f"{case.name}: {words}" for case, held, words in known if held]
-    return Claim(text, not wrong, "; ".join([*wrong, *right]))
+    return Claim(text, not wrong, "; ".join([*wrong, *undecided, *right]))
 
 
 def _row(case: CaseRecord, method: str) -> Row | None:
@@ -89,6 +93,8 @@ def _near_floor(case: CaseRecord) -> tuple[bool | None, str]:
         words += (
             f" ({case.layers} layers: the floor's depth test skips hidden surfaces, and signed depth adds them all)"
         )
+    if row.ratio.median > MOST_OF_FLOOR >= row.ratio.median - NOISES * row.ratio.noise:
+        return None, words
     return row.ratio.median <= MOST_OF_FLOOR, words
 
 

@@ -100,8 +100,8 @@ class CaseRun:
         Of the timed frames.
     seconds : float
         For timing.
-    compared : int
-        Largest width or height of frames that are held against the reference, unless the case has less.
+    compared : float
+        Width and height of the frames that are held against the reference, as a share of what the case wants.
     """
 
     studio: Studio
@@ -109,7 +109,7 @@ class CaseRun:
     case: Case
     size: Size
     seconds: float
-    compared: int = 256
+    compared: float = 1.0
     _entries: list[_Entry] = field(default_factory=list)
 
     def measure(self, contenders: Sequence[Contender]) -> CaseRecord:
@@ -119,7 +119,7 @@ class CaseRun:
         blank = CaseRecord(case.name, case.title, case.why, QUANTITY[case.effect], size=self.size)
         try:
             scene = case.scene(self.size)
-            small = scaled(self.size, min(case.compared, self.compared))
+            small = scaled(self.size, round(case.compared * self.compared))
             truth = Truth.of(scene, small, case.tolerance)
         except Exception as error:  # noqa: BLE001 - a scene that cannot be traced leaves the other cases alone
             return dataclasses.replace(blank, failure=one_line(error))

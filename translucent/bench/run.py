@@ -33,17 +33,17 @@ class Effort:
     ----------
     case_seconds, step_seconds : float
         Of timing, for each case and for each step of a scaling axis.
-    compared : int
-        Largest width or height of frames that are held against the reference.
+    compared : float
+        Width and height of the frames that are held against the reference, as a share of what the case wants.
     """
 
     case_seconds: float
     step_seconds: float
-    compared: int
+    compared: float
 
 
-FULL = Effort(12.0, 2.5, 240)
-QUICK = Effort(1.5, 0.3, 160)
+FULL = Effort(12.0, 2.5, 1.0)
+QUICK = Effort(1.5, 0.25, 0.6)
 
 #: Told what is being measured, and how many steps of how many are done.
 Progress = Callable[[str, int, int], None]
