@@ -11,8 +11,13 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from translucent.assets import mesh_path
+from translucent.bench.models import effect_of, model_cases
 from translucent.bench.record import CaseRecord, Errors, Provenance, Ratio, Report, Row, Timing
 from translucent.cli import main
+from translucent.medium import Medium
+from translucent.mesh import load_mesh
+from translucent.showcase import showcase
 
 
 class Result(NamedTuple):
@@ -229,6 +234,32 @@ def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypat
     assert "model knot: RuntimeError: no luck" in result.err
     assert "model bear" in result.out
     assert "no luck" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.usefixtures("nothing_else")
+def test_a_model_that_is_no_solid_is_a_row_that_failed(run: Run, tmp_path: Path) -> None:
+    result = run("leaf", "bear", "-o", tmp_path, *SMALL)
+    assert result.code == 1
+    assert "measuring 'leaf'; no method can treat it as solid" in result.err
+    assert "246 open edges" in result.err
+    assert "model bear" in result.out
+    assert "246 open edges" in (tmp_path / "report.html").read_text()
+
+
+def test_models_of_one_name_are_told_apart() -> None:
+    scene = showcase(load_mesh(mesh_path("bear")))
+    cases = model_cases({"a/x.stl": scene, "b/x.stl": scene, "c/y.stl": scene})
+    assert [case.title for case in cases] == ["a/x.stl", "b/x.stl", "y.stl"]
+    assert {case.effect for case in cases} == {"absorption"}
+
+
+def test_media_decide_what_is_worth_measuring() -> None:
+    mesh = load_mesh(mesh_path("bear"))
+    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), scattering=(1, 1, 1)))) == "scattering"
+    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), emission=(1, 1, 1)))) == "emission"
+    scene = showcase(mesh)
+    sheet = dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], sheet_thickness=1e-3)])
+    assert effect_of(sheet) == "sheet"
 
 
 @pytest.mark.parametrize(

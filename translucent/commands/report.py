@@ -90,15 +90,13 @@ def _measured(
 ) -> Report:
     """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
     from translucent.bench.files import write_report
-    from translucent.bench.models import model_case
+    from translucent.bench.models import model_cases
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
-    cases = []
-    for model in dict.fromkeys(models):
-        scene = read_scene(model, unit, None, size=pixels)
+    scenes = {model: read_scene(model, unit, None, size=pixels) for model in models}
+    for model, scene in scenes.items():
         require_translucent(model, scene)
-        cases.append(model_case(model, scene))
 
     def keep(part: Report) -> None:
         if output is not None:
@@ -111,7 +109,7 @@ def _measured(
             bar.update(done - bar.pos, what)
 
         return measure_all(
-            cases,
+            model_cases(scenes),
             size=pixels,
             methods=[] if methods is None else [name.strip() for name in methods.split(",")],
             quick=quick,
