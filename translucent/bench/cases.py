@@ -11,7 +11,7 @@ import numpy as np
 
 from translucent.assets import mesh_path
 from translucent.bench.contenders import Effect
-from translucent.bench.shapes import menger_sponge, nested_shells, subdivided
+from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, subdivided
 from translucent.camera import Camera
 from translucent.density import DensityGrid
 from translucent.lights import DirectionalLight, Environment, PointLight
@@ -129,8 +129,8 @@ def _scattering(mesh: Mesh, optical_depth: float, size: Size) -> Scene:
 
 def _density(size: Size) -> Scene:
     """A cloud in a torus: smooth blobs, and places where there is nothing."""
-    mesh = Torus(0.7, 0.3).tessellate(160)
-    x, y, z = np.meshgrid(*(np.linspace(0, 1, count) for count in (20, 20, 10)), indexing="ij")
+    mesh = lying_torus(160, 0.7, 0.3)
+    x, y, z = np.meshgrid(*(np.linspace(0, 1, count) for count in (20, 10, 20)), indexing="ij")
     blobs = np.sin(9 * x + 1) * np.sin(8 * y) + np.cos(7 * x * y + 4 * z)
     density = DensityGrid(np.clip(1.0 + blobs, 0.0, None))
     glowing = Medium(absorption=(1.2, 2.2, 3.0), emission=(1.6, 0.7, 0.2))
@@ -140,7 +140,7 @@ def _density(size: Size) -> Scene:
 
 CASES: tuple[Case, ...] = (
     Case("sphere", "Sphere", "convex: two surfaces on every ray", partial(_shown, lambda: Sphere().tessellate(316))),
-    Case("torus", "Torus", "concave: up to four", partial(_shown, lambda: Torus().tessellate(316)), quick=False),
+    Case("torus", "Torus", "concave: up to four", partial(_shown, lambda: lying_torus(316)), quick=False),
     Case("knot", "Knot", "concave, and seen through itself", partial(_shown, lambda: subdivided("knot", 80_000))),
     Case("bear", "Gummy bear", "a figure with limbs", partial(_shown, lambda: subdivided("bear", 80_000)), quick=False),
     Case("sponge", "Menger sponge", "many layers, and walls that coincide", partial(_shown, menger_sponge)),
@@ -181,7 +181,7 @@ CASES: tuple[Case, ...] = (
         "scattering",
         "Milky torus",
         "light of a lamp and of the sky, scattered once; shadows that the body throws into itself",
-        lambda size: _scattering(Torus().tessellate(96), 8.0, size),
+        lambda size: _scattering(lying_torus(96), 8.0, size),
         "scattering",
         shrink=2,
         compared=96,

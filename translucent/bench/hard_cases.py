@@ -49,7 +49,7 @@ class Checks:
     def error(self, what: str, value: float) -> None:
         """Note an error, which has to stay within the limit; NaN does not."""
         value = abs(float(value))
-        self.worst = value if self.worst is None or not value <= self.worst else self.worst
+        self.worst = value if self.worst is None else float(np.maximum(self.worst, value))
         self._note(f"{what} {value:.1e}", value <= self.limit)
 
     def holds(self, what: str, held: bool | np.bool_) -> None:

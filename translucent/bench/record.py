@@ -36,7 +36,7 @@ class Provenance:
     platform, processor : str
     processors : int
     backend, renderer, driver : str
-        Of OpenGL: how the context was made, the device, and the version string of its driver.
+        How the OpenGL context was made, the device, and its driver's version.
     software : bool
         The device is the CPU: times say nothing about a GPU, ratios and errors do.
     versions : dict of str to str
@@ -81,8 +81,8 @@ class Timing:
 class Ratio:
     """Time as a multiple of the depth-only floor's.
 
-    Each round measures method and floor one after the other, and their quotient is one sample: what disturbs the
-    machine for longer than a round cancels.
+    Each round measures the method between two floors, and their quotient is one sample: what disturbs the machine for
+    longer than that cancels.
 
     Attributes
     ----------
@@ -127,8 +127,8 @@ class Row:
     exact : bool
         The planner calls the method exact on this case.
     wall, gpu : Timing, optional
-        Milliseconds from the first draw to the last having finished, by the clock and by the GPU's timer: of the part
-        that finds thickness or intervals (passes over geometry and what belongs to them).
+        From the first draw to the last having finished, by the clock and by the GPU's timer: of the part that finds
+        thickness or intervals.
     frame : Timing, optional
         By the clock, the whole frame: that and the shading of every pixel.
     ratio, frame_ratio : Ratio, optional
@@ -148,7 +148,7 @@ class Row:
     coverage_mismatch : float, optional
         Share of the covered pixels that only the method, or only the reference, covers.
     pareto : bool
-        No row of the case is both faster and more accurate (see `translucent.bench.frontier`).
+        No row of the case beats it (see `translucent.bench.frontier`).
     refusal : str, optional
         Why the planner does not run this method on this scene, which is an answer and no failure; there are no numbers.
     failure : str, optional
@@ -224,7 +224,7 @@ class CaseRecord:
     size : (width, height)
         Of the timed frames, in pixels.
     compared_size : (width, height)
-        Of the frames that are held against the reference, in pixels.
+        Of those that are held against the reference.
     diagonal : float
         Of the scene's bounds, in metres.
     compared_pixels : int
@@ -267,10 +267,8 @@ class ScalePoint:
     ----------
     x : int
         Of the series' axis.
-    wall : Timing, optional
-        Of the part that finds thickness.
-    ratio : Ratio, optional
-        To the floor at the same x.
+    wall, ratio : Timing and Ratio, optional
+        As in a `Row`, to the floor at the same x.
     failure : str, optional
         Why there are no numbers.
     """
@@ -293,7 +291,6 @@ class Series:
     fixed : str
         What stays the same along the axis.
     points : tuple of ScalePoint
-        With x increasing.
     """
 
     axis: Literal["triangles", "pixels", "layers", "media"]
@@ -356,11 +353,7 @@ class Report:
 
     Attributes
     ----------
-    provenance : Provenance
-    cases : tuple of CaseRecord
-    scaling : tuple of Series
-    hard_cases : tuple of HardCase
-    claims : tuple of Claim
+    provenance, cases, scaling, hard_cases, claims
     seconds : float
         That the measurements took so far.
     complete : bool

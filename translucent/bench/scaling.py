@@ -12,7 +12,7 @@ import numpy as np
 from translucent.bench.drawing import Floor, Planned, Size, Studio
 from translucent.bench.measure import one_line
 from translucent.bench.record import ScalePoint, Series
-from translucent.bench.shapes import plates
+from translucent.bench.shapes import lying_torus, plates
 from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.camera import Camera
 from translucent.gpu.targets import Targets
@@ -21,7 +21,7 @@ from translucent.medium import Medium
 from translucent.scene import Object, Scene
 from translucent.showcase import framing, showcase
 from translucent.slots import MAX_SLOTS
-from translucent.solids import Sphere, Torus
+from translucent.solids import Sphere
 from translucent.thickness import MAX_LAYERS, DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth
 
 Axis = Literal["triangles", "pixels", "layers", "media"]
@@ -170,7 +170,7 @@ def _thinned(ladder: Ladder) -> Ladder:
 
 
 def _torus(segments: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
-    return lambda: (showcase(Torus().tessellate(segments), size=size), size)
+    return lambda: (showcase(lying_torus(segments), size=size), size)
 
 
 def _plates(layers: int) -> Callable[[], tuple[Scene, Size]]:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from translucent.assets import mesh_path
 from translucent.mesh import Mesh, load_mesh
-from translucent.solids import Box, Sphere
+from translucent.solids import Box, Sphere, Torus
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
@@ -24,6 +24,12 @@ def subdivided(name: str, triangles: int) -> Mesh:
     while len(faces) < triangles:
         vertices, faces = subdivide(vertices, faces)
     return Mesh(vertices, faces, name=name)
+
+
+def lying_torus(segments: int, major: float = 1.0, minor: float = 0.35) -> Mesh:
+    """A ring around the y axis: seen from the front, rays go through it twice."""
+    mesh = Torus(major, minor).tessellate(segments)
+    return Mesh(mesh.vertices[:, [1, 2, 0]], mesh.faces, name="torus")
 
 
 def menger_sponge(level: int = 3) -> Mesh:
