@@ -183,7 +183,7 @@ CASES: tuple[Case, ...] = (
         "light of a lamp and of the sky, scattered once; shadows that the body throws into itself",
         lambda size: _scattering(lying_torus(96), 8.0, size),
         "scattering",
-        shrink=2,
+        shrink=4,
         compared=96,
     ),
     Case(
@@ -194,7 +194,7 @@ CASES: tuple[Case, ...] = (
         "scattering",
         quick=False,
         brief=True,
-        shrink=2,
+        shrink=4,
         compared=80,
         tolerance=3e-4,
     ),
