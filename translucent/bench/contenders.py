@@ -33,6 +33,7 @@ Effect = Literal["absorption", "emission", "scattering", "density", "sheet"]
 #: Refraction index of the thin layers that bend rays.
 REFRACTED_IOR = 1.5
 
+_ALL: tuple[Effect, ...] = get_args(Effect)
 _STEPS = (8, 16, 32, 64, 128, 256, 512)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 
@@ -57,8 +58,8 @@ class Contender:
         Cases in which it is measured.
     quick : bool
         Measured with ``--quick``, too.
-    pictured : bool
-        The report shows its picture.
+    pictured : tuple of str
+        Cases of which the report shows its picture.
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1, or else of `REFRACTED_IOR` where they have none of their own.
     """
@@ -68,9 +69,9 @@ class Contender:
     method: Method
     technique: Technique = "plan"
     kind: Kind = "method"
-    effects: tuple[Effect, ...] = get_args(Effect)
+    effects: tuple[Effect, ...] = _ALL
     quick: bool = True
-    pictured: bool = False
+    pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
 
     @property
@@ -93,12 +94,11 @@ def _ordered() -> Iterable[Contender]:
             "DepthPeeling",
             DepthPeeling(max_layers=layers),
             quick=layers in (2, 8),
-            pictured=layers == 4,
         )
     yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
     for k in (2, 4, 8):
         yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), quick=k == 8)
-    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=True)
+    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=_SOURCES)
 
 
 def _light_points() -> Iterable[Contender]:
@@ -118,7 +118,7 @@ def _marched() -> Iterable[Contender]:
             RayMarched(steps=steps),
             effects=_SOURCES if steps <= _MOST_LIT_STEPS else ("emission", "density"),
             quick=quick,
-            pictured=steps == 8,
+            pictured=_SOURCES if steps == 8 else (),
         )
         yield Contender(
             f"RayMarched on the CPU, {steps} steps",
@@ -128,6 +128,7 @@ def _marched() -> Iterable[Contender]:
             "cpu",
             ("density",),
             quick,
+            ("density",) if steps == 8 else (),
         )
     for rule in get_args(Quadrature):
         if rule != "midpoint":
@@ -138,19 +139,30 @@ def _marched() -> Iterable[Contender]:
 
 
 CONTENDERS: tuple[Contender, ...] = (
-    Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=True),
+    Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
     Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
     Contender("ThinLayer", "ThinLayer", ThinLayer(), ior="matched"),
     Contender("ThinLayer, refracted", "ThinLayer", ThinLayer(), quick=False, ior="refracted"),
     Contender("BackFaceDepth", "BackFaceDepth", BackFaceDepth()),
     Contender(
-        "BackFaceDepth, unmarked", "BackFaceDepth", BackFaceDepth(), "unmarked", "counter-example", pictured=True
+        "BackFaceDepth, unmarked",
+        "BackFaceDepth",
+        BackFaceDepth(),
+        "unmarked",
+        "counter-example",
+        pictured=("absorption", "emission"),
     ),
-    Contender("SignedDepth", "SignedDepth", SignedDepth(), pictured=True),
+    Contender("SignedDepth", "SignedDepth", SignedDepth(), pictured=_ALL),
     Contender(
-        "SignedDepth from the camera", "SignedDepth", SignedDepth(anchored=False), kind="counter-example", pictured=True
+        "SignedDepth from the camera",
+        "SignedDepth",
+        SignedDepth(anchored=False),
+        kind="counter-example",
+        pictured=("absorption",),
     ),
-    Contender("SignedDepth in float16", "SignedDepth", SignedDepth(), "half", "counter-example", pictured=True),
+    Contender(
+        "SignedDepth in float16", "SignedDepth", SignedDepth(), "half", "counter-example", pictured=("absorption",)
+    ),
     *_ordered(),
     *_light_points(),
     *_marched(),

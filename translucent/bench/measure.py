@@ -42,6 +42,9 @@ QUANTITY: dict[str, Quantity] = {
     "density": "radiance",
 }
 
+#: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
+INVISIBLE = 5e-8
+
 
 @dataclass
 class _Entry:
@@ -129,7 +132,7 @@ class CaseRun:
         pictures = [_picture("reference", truth.frame, None, blank)]
         for contender in contenders:
             entry = self._compared(contender, scene, truth, small, blank)
-            if entry.frame is not None and contender.pictured:
+            if entry.frame is not None and case.effect in contender.pictured:
                 pictures.append(_picture(contender.name, entry.frame, truth.frame, blank))
             entry.frame = None
             self._entries.append(entry)
@@ -341,7 +344,9 @@ def _picture(name: str, frame: Frame, truth: Frame | None, case: CaseRecord) -> 
         worst = np.abs(error).argmax(axis=-1)[..., None]
         error = np.take_along_axis(error, worst, axis=-1)[..., 0]
     covered = frame.coverage | truth.coverage
-    error = np.where(covered & frame.valid & truth.valid, error / _scale(truth, case), np.nan)
+    error = error / _scale(truth, case)
+    error = np.where(np.abs(error) < INVISIBLE, 0.0, error)
+    error = np.where(covered & frame.valid & truth.valid, error, np.nan)
     return Picture(name, png, Packed.of(error), Packed.of(covered & ~frame.valid))
 
 

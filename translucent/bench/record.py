@@ -196,7 +196,7 @@ class Picture:
         The sRGB picture as a PNG file in base64.
     error : Packed, optional
         Signed error in the case's quantity, in its unit, as floats: of radiance and transmittance, of the channel that
-        is farthest off. NaN where nothing is covered, or the method calls the pixel invalid.
+        is farthest off; 0 below 5e-8. NaN where nothing is covered, or the method calls the pixel invalid.
     invalid : Packed, optional
         Booleans: pixels that the method marks.
     """
