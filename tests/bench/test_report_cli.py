@@ -76,6 +76,13 @@ def test_a_page_is_made_again_from_its_record(run: Run, new: Path, tmp_path: Pat
     assert str(folder / "report.html") in result.out
 
 
+def test_without_a_folder_the_table_is_printed(run: Run, new: Path) -> None:
+    result = run("--from", new)
+    assert result.code == 0
+    assert "SignedDepth" in result.out
+    assert "÷ floor" in result.out
+
+
 def test_json_is_one_object(run: Run, new: Path, tmp_path: Path) -> None:
     result = run("--from", new, "-o", tmp_path, "--json")
     found = json.loads(result.out)
@@ -148,12 +155,11 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "neither -o nor --compare is given; add -o DIR"),
         (["--from", "x.json", "-o", "out", "--quick"], "nothing is measured"),
         (["--from", "x.json", "-o", "out", "knot"], "nothing is measured"),
         (["--from", "absent.json", "-o", "out"], "it cannot be read"),
     ],
-    ids=["nothing asked", "from and quick", "from and a model", "no such file"],
+    ids=["from and quick", "from and a model", "no such file"],
 )
 def test_bad_usage(
     run: Run, arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

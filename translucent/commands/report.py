@@ -46,13 +46,13 @@ def report(
     """Measure what each method costs and how wrong it is, on the toolkit's scenes and on each MODEL.
 
     A MODEL is a file, or a mesh of the toolkit by name. Interrupted with Ctrl-C, the finished scenes are written.
+    Without -o and --compare, all numbers are printed, and nothing is kept.
     """
     from translucent.bench.comparison import compare_reports, machines_differ
     from translucent.bench.files import read_report
     from translucent.bench.output import check_folder, write_outputs
+    from translucent.bench.table import table
 
-    if output is None and old is None:
-        raise InputError("report", "neither -o nor --compare is given", "add -o DIR for the page")
     if source is not None and (models or quick or size or methods or backend):
         raise InputError(
             f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
@@ -71,6 +71,8 @@ def report(
         click.echo(json.dumps(_summary(made, files, changes)))
     else:
         _tell(made, files, changes)
+    if output is None and old is None and not as_json:
+        click.echo(table(made))
     if not made.complete and source is None:
         raise click.exceptions.Abort
     if made.failures:
