@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -83,6 +82,8 @@ class Contender:
         """Why it is not measured on a scene though the planner would run it."""
         if self.technique in ("constant", "ball", "unmarked", "half") and scene.opaque:
             return "the shortcuts are drawn without opaque objects"
+        if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
+            return "signed distances of a sheet mean nothing"
         return None
 
 
@@ -191,11 +192,6 @@ def check_names(names: Iterable[str]) -> None:
             close = difflib.get_close_matches(_slug(name), sorted(known), n=1)
             do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(families)}"
             raise InputError(f"method {name!r}", "not one that is measured", do)
-
-
-def with_thickness(contender: Contender, metres: float) -> Contender:
-    """The contender with another thickness of its sheets."""
-    return dataclasses.replace(contender, method=ThinLayer(metres))
 
 
 def _slug(name: str) -> str:

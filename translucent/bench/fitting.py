@@ -76,11 +76,11 @@ def fitted(studio: Studio, contender: Contender, scene: Scene, truth: Frame, siz
     Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t> over
     all pixels that truth or picture cover.
     """
-    if not contender.fitted or all(body.sheet_thickness is not None for body in scene.bodies):
+    told = contender.technique == "plan" and all(body.sheet_thickness is not None for body in scene.bodies)
+    if told or not contender.fitted:
         return contender, 0.0
     probe = float(scene.diagonal)
-    if isinstance(contender.method, ThinLayer):
-        contender = dataclasses.replace(contender, method=ThinLayer(probe))
+    contender = dataclasses.replace(contender, method=ThinLayer(probe))
     targets = Targets(studio.gl, size)
     try:
         drawn = drawing(studio, contender, scene, plan_of(studio, contender, scene), targets, probe, None)
