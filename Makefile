@@ -1,11 +1,13 @@
 # Everything happens in .venv of this checkout. Needs make and a Python 3.11 to 3.13 with venv, nothing else.
 # Another Python: make PYTHON=/path/to/python3.12 test     Arguments for pytest: make test PYTEST_ARGS="-k optics"
+# What changed since an old report: make bench BENCH_ARGS="--compare docs/reports/software.json"
 
 # The first that runs (a pyenv shim may exist and fail), has the right version and can make environments.
 PYTHON ?= $(shell for python in python3.13 python3.12 python3.11 python3; do \
     if $$python -c 'import ensurepip, sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' >/dev/null 2>&1; \
     then echo $$python; exit; fi; done; echo python3)
 PYTEST_ARGS ?=
+BENCH_ARGS ?=
 
 BOOTSTRAP = @$(PYTHON) tools/bootstrap.py
 BIN = .venv/bin
@@ -35,10 +37,9 @@ lint: ## check style, types and the layers of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: ## measure speed and error of every method into out/bench.json
-	$(BOOTSTRAP)
-	@mkdir -p out
-	$(BIN)/python -m translucent.bench --json out/bench.json
+bench: ## measure speed and error of every method into out/report/, in ten minutes; BENCH_ARGS=--quick: in one
+	$(BOOTSTRAP) --group test
+	$(BIN)/translucent report -o out/report $(BENCH_ARGS)
 
 meshes: ## regenerate the files in meshes/
 	$(BOOTSTRAP) --group meshes

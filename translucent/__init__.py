@@ -143,4 +143,8 @@ def __getattr__(name: str) -> Any:
         from translucent.renderer import Renderer
 
         return Renderer
+    if name == "bench":
+        from importlib import import_module
+
+        return import_module("translucent.bench")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,6 +16,7 @@ from translucent.commands.extinction import extinction
 from translucent.commands.material import material
 from translucent.commands.presets import presets
 from translucent.commands.render import render
+from translucent.commands.report import report
 from translucent.errors import InputError, TranslucentError
 
 
@@ -58,7 +59,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, bake, explain, extinction, presets, material, doctor):
+for command in (render, bake, explain, extinction, presets, material, report, doctor):
     cli.add_command(command)
 
 

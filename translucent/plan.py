@@ -40,7 +40,7 @@ from translucent.thickness import (
 FALLBACK_SHEET = 0.01
 
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasteriser
-#: (`python -m translucent.bench`). Peeling: for each pass, of which one finds two layers.
+#: (`translucent report`). Peeling: for each pass, of which one finds two layers.
 COSTS = {
     "opaque": 2.8,
     "signed_depth": 1.1,

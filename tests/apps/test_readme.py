@@ -23,9 +23,21 @@ def test_python_snippets_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, re
     assert (tmp_path / "knot.png").stat().st_size > 1000
 
 
+@pytest.fixture
+def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A report of one scene besides the model: all of them take a minute."""
+    from translucent.bench import run
+
+    monkeypatch.setattr(run, "QUICK", run.Effort(0.0, 0.0, 0.3))
+    monkeypatch.setattr(run, "CASES", run.CASES[:1])
+    monkeypatch.setattr(run.ScalingRun, "ladders", lambda _: [])
+    monkeypatch.setattr(run, "measure_hard_cases", lambda _: iter(()))
+
+
 COMMANDS = [line.removeprefix("$ translucent ") for line in README.splitlines() if line.startswith("$ translucent ")]
 
 
+@pytest.mark.usefixtures("one_scene")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
     import trimesh
@@ -40,11 +52,13 @@ def test_all_verbs_are_shown() -> None:
     assert {command.split()[0] for command in COMMANDS} == set(cli.commands)
 
 
+@pytest.mark.usefixtures("one_scene")
 def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
     import trimesh
 
     monkeypatch.chdir(tmp_path)
     trimesh.creation.icosphere(subdivisions=1).export("model.glb")
+    trimesh.creation.icosphere(subdivisions=1).export("model.stl")
     for command in cli.commands.values():
         assert command.epilog is not None
         example = command.epilog.removeprefix("Example: translucent ")

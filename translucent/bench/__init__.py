@@ -1,1 +1,23 @@
-"""Speed against error, measured in one run."""
+"""Speed against error, measured in one run: `measure_all` makes a `Report`, `write_outputs` its page and tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from translucent.bench.comparison import Change, compare_reports
+from translucent.bench.files import read_report, write_csv, write_report
+from translucent.bench.record import Report
+
+if TYPE_CHECKING:
+    from translucent.bench.run import measure_all
+
+__all__ = ["Change", "Report", "compare_reports", "measure_all", "read_report", "write_csv", "write_report"]
+
+
+def __getattr__(name: str) -> Any:
+    # Reading and comparing reports needs no OpenGL, so it does not load it.
+    if name == "measure_all":
+        from translucent.bench.run import measure_all
+
+        return measure_all
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,58 +1,202 @@
-"""What is measured: scenes and methods, as data."""
+"""Scenes that are measured, as data: each hard on something."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
 
 from translucent.assets import mesh_path
+from translucent.bench.contenders import Effect
+from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, subdivided
+from translucent.camera import Camera
+from translucent.density import DensityGrid
+from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
-from translucent.solids import Sphere, Torus
-from translucent.thickness import BackFaceDepth, DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth, ThinLayer
+from translucent.scene import Object, Scene
+from translucent.showcase import framing, showcase
+from translucent.solids import Box, Sphere, Torus
+
+Size = tuple[int, int]
+
+#: How far away a far body is, in its own diameters.
+FAR = 1e4
+
+#: Thickness of the thin slab as a share of its width.
+THIN = 1e-3
+
+#: What is behind scenes in which light is to be seen: nearly nothing.
+DUSK = Environment.constant((0.02, 0.02, 0.025))
 
 
 @dataclass(frozen=True)
 class Case:
-    """A mesh to measure on.
+    """A scene to measure on.
 
     Attributes
     ----------
-    name : str
-    why : str
-        What it is hard on.
-    mesh : callable
-        Makes it.
+    name, title, why : str
+    scene : callable
+        Makes it for a picture of a size.
+    effect : str
+        What its media do: methods differ in what they can render.
+    quick : bool
+        Measured with ``--quick``, too.
+    brief : bool
+        Only the contenders of ``--quick``: another case of this kind has them all.
+    shrink : int
+        Timed at this part of the width and height: many steps along each ray take long.
+    compared : int
+        Largest width or height at which it is held against the reference, which takes its time for some; less with
+        ``--quick``.
+    tolerance : float
+        Relative error of scattered light in the reference.
     """
 
     name: str
+    title: str
     why: str
-    mesh: Callable[[], Mesh]
+    scene: Callable[[Size], Scene]
+    effect: Effect = "absorption"
+    quick: bool = True
+    brief: bool = False
+    shrink: int = 1
+    compared: int = 240
+    tolerance: float = 1e-4
 
 
-def _subdivided(name: str, triangles: int) -> Mesh:
-    """A mesh of the toolkit with each face cut in four until it has at least this many."""
-    from trimesh.remesh import subdivide
-
-    mesh = load_mesh(mesh_path(name))
-    vertices, faces = mesh.vertices, mesh.faces
-    while len(faces) < triangles:
-        vertices, faces = subdivide(vertices, faces)
-    return Mesh(vertices, faces, name=f"{name} subdivided")
+def _shown(make: Callable[[], Mesh], size: Size) -> Scene:
+    return showcase(make(), size=size)
 
 
-CASES = (
-    Case("sphere-100k", "convex, two layers", lambda: Sphere().tessellate(316)),
-    Case("torus-100k", "concave, up to four layers", lambda: Torus().tessellate(316)),
-    Case("knot", "concave, up to eight layers", lambda: _subdivided("knot", 80_000)),
+def _toolkit(name: str) -> Mesh:
+    return load_mesh(mesh_path(name))
+
+
+def _far(make: Callable[[], Mesh], size: Size) -> Scene:
+    """The picture of a body from `FAR` diameters away, through a lens that shows it as large as ever."""
+    near = showcase(make(), size=size)
+    center, eye = near.objects[0].mesh.center, near.camera.pose[:3, 3]
+    away = (eye - center) / np.linalg.norm(eye - center)
+    fov = 2 * np.degrees(np.arctan(0.55 / FAR / min(1.0, size[0] / size[1])))
+    camera = Camera.look_at(center + away * FAR * near.diagonal, center, fov_y=float(fov))
+    return dataclasses.replace(near, camera=camera)
+
+
+def _two_media(size: Size) -> Scene:
+    glass = Medium.from_color((0.82, 0.9, 0.86), distance=0.01)
+    wine = Medium.from_color((0.6, 0.05, 0.12), distance=0.02)
+    objects = [Object(_toolkit("goblet"), glass), Object(_toolkit("wine"), wine)]
+    return Scene(objects, framing(objects, size), environment=showcase(objects[0].mesh).environment)
+
+
+def _sheet(size: Size) -> Scene:
+    green = Medium.from_color((0.25, 0.6, 0.12), distance=4e-4)
+    leaf = Object(_toolkit("leaf"), dataclasses.replace(green, ior=1.4), sheet_thickness=4e-4)
+    return Scene([leaf], framing([leaf], size), environment=showcase(leaf.mesh).environment)
+
+
+def _emission(size: Size) -> Scene:
+    mesh = subdivided("knot", 80_000)
+    reach = 0.1 * mesh.diagonal
+    glowing = Medium(absorption=np.array([1.5, 0.6, 0.3]) / reach, emission=np.array([0.2, 0.6, 1.2]) / reach)
+    return showcase(mesh, glowing, size, environment=DUSK)
+
+
+def _two_emitters(size: Size) -> Scene:
+    hot = Medium(absorption=(1.0, 2.0, 4.0), emission=(3.0, 1.2, 0.2))
+    cold = Medium(absorption=(3.0, 1.5, 0.6), emission=(0.1, 0.5, 2.0))
+    shifted = np.eye(4)
+    shifted[:3, 3] = (0.9, 0.25, 0.5)
+    ring, ball = Torus(0.7, 0.3).tessellate(200), Sphere(radius=0.6).tessellate(160)
+    objects = [Object(ring, hot), Object(ball, cold, shifted)]
+    return Scene(objects, framing(objects, size), environment=DUSK)
+
+
+def _scattering(mesh: Mesh, optical_depth: float, size: Size) -> Scene:
+    """Lit by a lamp from behind and by the sky."""
+    extinction = optical_depth / mesh.diagonal
+    milky = Medium(absorption=(0.1 * extinction,) * 3, scattering=(0.9 * extinction,) * 3, anisotropy=0.3)
+    reach = mesh.diagonal
+    lamp = PointLight(mesh.center + np.array([0.7, 0.5, -0.8]) * reach, (3.0 * reach**2,) * 3)
+    sky = DirectionalLight((0.4, -0.8, -0.5), (2.0, 2.2, 2.6))
+    return showcase(mesh, milky, size, environment=DUSK, lights=[lamp, sky])
+
+
+def _density(size: Size) -> Scene:
+    """A cloud in a torus: smooth blobs, and places where there is nothing."""
+    mesh = lying_torus(160, 0.7, 0.3)
+    x, y, z = np.meshgrid(*(np.linspace(0, 1, count) for count in (20, 10, 20)), indexing="ij")
+    blobs = np.sin(9 * x + 1) * np.sin(8 * y) + np.cos(7 * x * y + 4 * z)
+    density = DensityGrid(np.clip(1.0 + blobs, 0.0, None))
+    glowing = Medium(absorption=(1.2, 2.2, 3.0), emission=(1.6, 0.7, 0.2))
+    cloud = Object(mesh, glowing, density=density)
+    return Scene([cloud], framing([cloud], size), environment=DUSK)
+
+
+CASES: tuple[Case, ...] = (
+    Case("sphere", "Sphere", "convex: two surfaces on every ray", partial(_shown, lambda: Sphere().tessellate(316))),
+    Case("torus", "Torus", "concave: up to four", partial(_shown, lambda: lying_torus(316)), quick=False),
+    Case("knot", "Knot", "concave, and seen through itself", partial(_shown, lambda: subdivided("knot", 80_000))),
+    Case("bear", "Gummy bear", "a figure with limbs", partial(_shown, lambda: subdivided("bear", 80_000)), quick=False),
+    Case("sponge", "Menger sponge", "many layers, and walls that coincide", partial(_shown, menger_sponge)),
+    Case("shells", "Nested shells", "hollow balls within each other", partial(_shown, nested_shells), quick=False),
+    Case("two media", "Wine in a glass", "two media that share a face exactly", _two_media),
+    Case("sheet", "Leaf", "an open sheet, declared thin", _sheet, "sheet", quick=False),
+    Case(
+        "slab",
+        "Thin slab",
+        "a closed body a thousand times as wide as thick",
+        partial(_shown, lambda: Box.slab(thickness=THIN).tessellate()),
+    ),
+    Case(
+        "far slab",
+        "Thin slab, far away",
+        "the same from 10,000 diameters",
+        partial(_far, lambda: Box.slab(thickness=THIN).tessellate()),
+    ),
+    Case(
+        "far knot",
+        "Knot, far away",
+        "concave, from 10,000 diameters",
+        partial(_far, lambda: subdivided("knot", 80_000)),
+        quick=False,
+    ),
+    Case("emission", "Glowing knot", "one medium that emits light", _emission, "emission", shrink=2),
+    Case(
+        "two emitters",
+        "Two glowing bodies",
+        "emission in order",
+        _two_emitters,
+        "emission",
+        quick=False,
+        brief=True,
+        shrink=2,
+    ),
+    Case(
+        "scattering",
+        "Milky torus",
+        "light of a lamp and of the sky, scattered once; shadows that the body throws into itself",
+        lambda size: _scattering(lying_torus(96), 8.0, size),
+        "scattering",
+        shrink=4,
+        compared=96,
+    ),
+    Case(
+        "deep scattering",
+        "Milky sphere",
+        "the same through a depth that hardly any light crosses",
+        lambda size: _scattering(Sphere().tessellate(128), 12.0, size),
+        "scattering",
+        quick=False,
+        brief=True,
+        shrink=4,
+        compared=80,
+        tolerance=3e-4,
+    ),
+    Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),
 )
-
-METHODS: dict[str, Method] = {
-    "signed-depth": SignedDepth(),
-    "signed-depth from the camera": SignedDepth(anchored=False),
-    "back-face-depth": BackFaceDepth(),
-    "thin-layer": ThinLayer(),
-    "fragment-lists": FragmentLists(),
-    "depth-peeling": DepthPeeling(),
-    "depth-peeling, 8 layers": DepthPeeling(max_layers=8),
-    "k-buffer, 8": KBuffer(k=8),
-}

@@ -1,204 +1,384 @@
-"""Interleaved timing, with the error from the same run, and against a depth-only pass over the same geometry."""
+"""From a case to its record: every contender drawn, timed and held against the reference."""
 
 from __future__ import annotations
 
-import platform
+import base64
+import dataclasses
+import io
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent import reference
+from translucent.bench import record
 from translucent.bench.cases import Case
-from translucent.camera import check_size
-from translucent.errors import TranslucentWarning
-from translucent.gpu.passes.depth_only import DepthOnlyPass
+from translucent.bench.codec import Packed
+from translucent.bench.contenders import Contender
+from translucent.bench.drawing import Drawing, Floor, Size, Studio
+from translucent.bench.fitting import drawing, fitted, plan_of, seen_by
+from translucent.bench.frontier import mark_frontier
+from translucent.bench.record import CaseRecord, Picture, Quantity, Row
+from translucent.bench.timing import Samples, interleaved, ratio, timing
+from translucent.errors import InputError, TranslucentError, TranslucentWarning
+from translucent.frame import Frame
+from translucent.gpu.targets import Targets
 from translucent.metrics import compare, interior
+from translucent.render_plan import RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Scene
-from translucent.showcase import showcase
-from translucent.solids import Sphere
-from translucent.thickness import Method, SignedDepth
+from translucent.scene import Object, Scene
+from translucent.thickness import DepthPeeling, RayMarched
 
-Timings = dict[str, list[float]]
+#: By which quantity the methods of a case are ranked.
+QUANTITY: dict[str, Quantity] = {
+    "absorption": "thickness",
+    "sheet": "thickness",
+    "emission": "radiance",
+    "scattering": "radiance",
+    "density": "radiance",
+}
+
+#: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
+INVISIBLE = 5e-8
 
 
-def measure(
-    cases: Sequence[Case],
-    methods: dict[str, Method],
-    size: tuple[int, int] = (1024, 1024),
-    seconds: float = 4.0,
-    backend: str | None = None,
-) -> dict[str, Any]:
-    """Time and error of each method on each case.
+@dataclass
+class _Entry:
+    """A contender under way."""
+
+    contender: Contender
+    row: Row
+    scene: Scene
+    assumed: float = 0.0
+    drawn: Drawing | None = None
+    frame: Frame | None = None
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What all are held against.
+
+    Attributes
+    ----------
+    frame : Frame
+        Of the reference.
+    inside : (h, w) bool
+        Pixels away from silhouettes.
+    layers : int
+        The most surfaces on one ray.
+    seconds : float
+        That the frame took.
+    """
+
+    frame: Frame
+    inside: npt.NDArray[np.bool_]
+    layers: int
+    seconds: float
+
+    @classmethod
+    def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
+        """Trace the scene."""
+        begin = time.perf_counter()
+        frame = reference.render(scene, size, tolerance=tolerance)
+        seconds = time.perf_counter() - begin
+        counts = reference.hit_counts(scene, size)
+        return cls(frame, interior(counts), int(counts.max()), seconds)
+
+
+@dataclass
+class CaseRun:
+    """One case being measured.
 
     Parameters
     ----------
-    cases, methods
+    studio : Studio
+    cpu : Renderer, optional
+        Of the backend ``cpu``, where it works.
+    case : Case
     size : (width, height)
+        Of the timed frames.
     seconds : float
-        Time to spend on each case, a quarter of it for warming up.
-    backend : str, optional
-
-    Returns
-    -------
-    dict
-        ``machine`` and ``rows``: JSON-ready. In a row, ``ms`` is the thickness part (the passes over geometry),
-        ``frame_ms`` that and the shading; ``ratio`` and ``frame_ratio`` are the medians, over the rounds, of these to
-        the depth-only pass of the same round. Errors are thickness errors as shares of the diagonal, on pixels whose
-        3 x 3 neighbourhood has equal hit counts.
+        For timing.
+    compared : float
+        Width and height of the frames that are held against the reference, as a share of what the case wants.
     """
-    size = check_size(size)
-    rows: list[dict[str, Any]] = []
-    with Renderer(backend) as renderer:
-        for case in cases:
-            scene = showcase(case.mesh(), size=size)
-            with renderer.gpu.context.current() as gl:
-                timings = _interleaved(_workloads(renderer, scene, size, methods), gl.finish, seconds)
-            truth = reference.render(scene, size)
-            inside = interior(reference.hit_counts(scene, size))
-            floor = np.array(timings["depth-only"])
-            rows.append({"case": case.name, "method": "depth-only", **_statistics("ms", floor)})
-            for name, method in methods.items():
-                rows.append(
-                    {
-                        "case": case.name,
-                        "triangles": len(scene.objects[0].mesh.faces),
-                        "method": name,
-                        "parameters": str(method),
-                        "size": list(size),
-                        **_statistics("ms", np.array(timings[f"{name}/thickness"]), floor),
-                        **_statistics("frame_ms", np.array(timings[f"{name}/frame"]), floor),
-                        **_errors(renderer, scene, size, method, truth, inside),
-                    }
+
+    studio: Studio
+    cpu: Renderer | None
+    case: Case
+    size: Size
+    seconds: float
+    compared: float = 1.0
+    _entries: list[_Entry] = field(default_factory=list)
+
+    def measure(self, contenders: Sequence[Contender]) -> CaseRecord:
+        """All rows and pictures of the case. What fails is a row with its reason; the rest goes on."""
+        case = self.case
+        self.size = self.size[0] // case.shrink or 1, self.size[1] // case.shrink or 1
+        blank = CaseRecord(case.name, case.title, case.why, QUANTITY[case.effect], size=self.size)
+        try:
+            scene = case.scene(self.size)
+            small = scaled(self.size, round(case.compared * self.compared))
+            truth = Truth.of(scene, small, case.tolerance)
+        except Exception as error:  # noqa: BLE001 - a scene that cannot be traced leaves the other cases alone
+            return dataclasses.replace(blank, failure=one_line(error))
+        blank = _described(blank, scene, truth, small)
+        if not blank.compared_pixels:
+            return dataclasses.replace(blank, failure=_untrusted(scene))
+        pictures = [_picture("reference", truth.frame, None, blank)]
+        for contender in contenders:
+            entry = self._compared(contender, scene, truth, small, blank)
+            if entry.frame is not None and case.effect in contender.pictured:
+                pictures.append(_picture(contender.name, entry.frame, truth.frame, blank))
+            entry.frame = None
+            self._entries.append(entry)
+        rows = mark_frontier(self._timed(scene), blank.quantity)
+        return dataclasses.replace(blank, rows=rows, pictures=tuple(pictures))
+
+    def _compared(self, contender: Contender, scene: Scene, truth: Truth, size: Size, case: CaseRecord) -> _Entry:
+        """Draw the contender once, small, and hold it against the reference."""
+        seen = seen_by(contender, scene)
+        row = Row(contender.name, contender.family, _parameters(contender), contender.kind, "", False)
+        entry = _Entry(contender, row, seen)
+        if (refusal := contender.refusal(scene)) is not None:
+            entry.row = dataclasses.replace(row, refusal=refusal)
+            return entry
+        targets = Targets(self.studio.gl, size)
+        try:
+            plan = plan_of(self.studio, contender, seen, self.cpu)
+            entry.contender, entry.assumed = fitted(self.studio, contender, seen, truth.frame, size)
+            plan = plan_of(self.studio, entry.contender, seen, self.cpu)
+            drawn = drawing(self.studio, entry.contender, seen, plan, targets, entry.assumed, self.cpu)
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", TranslucentWarning)  # rows tell what pixels are not valid
+                    drawn.draw()
+                    entry.frame = drawn.read()
+                entry.row = _against(row, entry, drawn, truth, case, plan)
+            finally:
+                drawn.release()
+        except InputError as error:  # the planner's answer
+            entry.row = dataclasses.replace(row, refusal=one_line(error))
+        except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
+            entry.row = dataclasses.replace(row, failure=one_line(error))
+        finally:
+            targets.release()
+        return entry
+
+    def _timed(self, scene: Scene) -> list[Row]:
+        """The rows with their times, the floor first."""
+        studio = self.studio
+        targets = Targets(studio.gl, self.size)
+        floor = Floor(studio, scene, targets)
+        ready = [entry for entry in self._entries if entry.row.failure is None and entry.row.refusal is None]
+        failures: dict[str, str] = {}
+        try:
+            drawings: dict[str, Callable[[], Any]] = {}
+            for entry in ready:
+                try:
+                    plan = plan_of(studio, entry.contender, entry.scene, self.cpu)
+                    entry.drawn = drawing(studio, entry.contender, entry.scene, plan, targets, entry.assumed, self.cpu)
+                    drawings[entry.row.method] = entry.drawn.draw
+                except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
+                    failures[entry.row.method] = one_line(error)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", TranslucentWarning)
+                found = interleaved(
+                    floor.draw,
+                    drawings,
+                    self.seconds,
+                    lambda name, error: failures.update({name: one_line(error)}),
                 )
-        machine = {"platform": platform.platform(), "processors": _processors(), **renderer.provenance}
-        host = host_overhead(renderer)
-    return {"machine": machine, "host": host, "rows": rows}
+        finally:
+            for entry in ready:
+                if entry.drawn is not None:
+                    entry.drawn.release()
+            floor.release()
+            targets.release()
+        rows = [_with_times(entry.row, found.get(entry.row.method), failures) for entry in self._entries]
+        return [_floor_row(list(found.values())), *rows]
 
 
-def host_overhead(renderer: Renderer, frames: int = 200) -> dict[str, float]:
-    """Milliseconds that `Renderer.render` takes at 64 x 64, and what of it is neither GPU work nor read-back.
-
-    The same frame is rendered with `render`, and with only `run` and `read` on a job that is prepared beforehand, in
-    turn; the difference of the medians is the host's part.
-    """
-    scene, size = showcase(Sphere().tessellate(64), size=(64, 64)), (64, 64)
-    with renderer.gpu.context.current():
-        job = renderer.gpu.prepare(scene, size, renderer.plan(scene))
-        whole, device = [], []
-        for _ in range(frames):
-            begin = time.perf_counter()
-            renderer.render(scene, size)
-            middle = time.perf_counter()
-            job.place((0.0, 0.0))
-            bound = time.perf_counter()
-            renderer.gpu.run(job)
-            renderer.gpu.read(job)
-            whole.append(middle - begin)
-            device.append(time.perf_counter() - bound)
-        job.release()
-    render, gpu = float(np.median(whole)) * 1e3, float(np.median(device)) * 1e3
-    return {"render_ms": render, "gpu_and_read_ms": gpu, "host_ms": render - gpu}
+def scaled(size: Size, longest: int) -> Size:
+    """A size of the same shape, with no side longer than this."""
+    share = min(1.0, longest / max(size))
+    return max(1, round(size[0] * share)), max(1, round(size[1] * share))
 
 
-def _workloads(
-    renderer: Renderer, scene: Scene, size: tuple[int, int], methods: dict[str, Method]
-) -> dict[str, Callable[[], None]]:
-    """What is timed, by name; each draws with its own uniforms, prepared beforehand."""
-    gl = renderer.gpu.context.gl
-    floor_job = renderer.gpu.prepare(scene, size, renderer.plan(scene, SignedDepth()))
-    floor_pass = DepthOnlyPass(gl)
-
-    def depth_only() -> None:
-        floor_job.place((0.0, 0.0), with_depth=True)
-        gl.viewport = (0, 0, *size)
-        floor_pass.run(floor_job)
-
-    workloads: dict[str, Callable[[], None]] = {"depth-only": depth_only}
-    for name, method in methods.items():
-        job = renderer.gpu.prepare(scene, size, renderer.plan(scene, method))
-
-        def thickness(job: Any = job) -> None:
-            job.place((0.0, 0.0))
-            renderer.gpu.run(job, geometry_only=True)
-
-        def frame(job: Any = job) -> None:
-            job.place((0.0, 0.0))
-            renderer.gpu.run(job)
-
-        workloads[f"{name}/thickness"] = thickness
-        workloads[f"{name}/frame"] = frame
-    return workloads
+def one_line(error: Exception) -> str:
+    """An error as rows tell it."""
+    text = str(error) if isinstance(error, TranslucentError) else f"{type(error).__name__}: {error}"
+    return " ".join(text.split())
 
 
-def _interleaved(workloads: dict[str, Callable[[], None]], finish: Callable[[], None], seconds: float) -> Timings:
-    """Wall-clock seconds, A B C A B C, until the time is up; a quarter of it, and at least two rounds, warm up."""
-    timings: Timings = {name: [] for name in workloads}
-    started = time.perf_counter()
-    rounds = 0
-    warm = 0
-    while rounds < warm + 5 or time.perf_counter() - started < seconds:
-        for name, work in workloads.items():
-            finish()
-            begin = time.perf_counter()
-            work()
-            finish()
-            timings[name].append(time.perf_counter() - begin)
-        rounds += 1
-        if time.perf_counter() - started < seconds / 4 or rounds < 2:
-            warm = rounds
-    return {name: values[warm:] for name, values in timings.items()}
+def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> CaseRecord:
+    diagnoses = [body.mesh.diagnosis for body in scene.bodies]
+    media = [body.medium for body in scene.bodies if body.medium is not None]
+    return dataclasses.replace(
+        blank,
+        convex=len(diagnoses) == 1 and diagnoses[0].convex,
+        closed=all(found.solid for found in diagnoses),
+        absorption_only=not any(medium.emits or medium.scatters for medium in media)
+        and all(body.density is None for body in scene.bodies),
+        triangles=sum(len(item.mesh.faces) for item in scene.objects),
+        bodies=len(scene.bodies),
+        layers=truth.layers,
+        compared_size=small,
+        diagonal=scene.diagonal,
+        compared_pixels=int((truth.inside & truth.frame.coverage & truth.frame.valid).sum()),
+        reference_seconds=truth.seconds,
+    )
 
 
-def _statistics(name: str, values: Any, floor: Any = None) -> dict[str, float]:
-    low, median, high, p95 = np.quantile(values * 1e3, (0.25, 0.5, 0.75, 0.95))
-    found = {name: float(median), f"{name}_p95": float(p95), f"{name}_iqr": float(high - low)}
-    if floor is not None:
-        found[name.replace("ms", "ratio")] = float(np.median(values / floor))
-    return found
+def _untrusted(scene: Scene) -> str:
+    """Why there is nothing to compare."""
+    problems = [f"{body.mesh.name!r}: {'; '.join(body.mesh.diagnosis.problems)}" for body in scene.bodies]
+    return (
+        f"no pixel of the reference can be trusted; {', '.join(problems)}; close the mesh, or declare it a sheet"
+        if any(body.mesh.diagnosis.problems for body in scene.bodies)
+        else "no pixel is away from silhouettes; ask for a larger --size"
+    )
+
+
+def _parameters(contender: Contender) -> str:
+    return {
+        "constant": "best constant in metres",
+        "ball": "best diameter in metres",
+        "unmarked": "BackFaceDepth() without its mask",
+        "half": "SignedDepth(anchored=True) into float16",
+        "cpu": 'Renderer(backend="cpu")',
+        "march": f"reference.march with {contender.method}",
+        "plan": str(contender.method),
+    }[contender.technique]
+
+
+def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRecord, plan: RenderPlan) -> Row:
+    """The row with what the planner promises and what the frame shows."""
+    assert entry.frame is not None
+    contender, frame = entry.contender, entry.frame
+    parameters = row.parameters
+    if entry.assumed:
+        parameters = f"{entry.assumed:.4g} m, of least squared error"
+    promise, exact = _promise(contender, plan, entry.scene)
+    found: dict[str, Any] = {}
+    scales: dict[Quantity, float | None] = {"thickness": case.diagonal, "transmittance": 1.0, "radiance": None}
+    for quantity, scale in scales.items():
+        errors = _errors(frame, truth, quantity, scale)
+        found[quantity] = None if errors is None else errors[0]
+        if errors is not None:
+            found["invalid"], found["coverage_mismatch"] = errors[1:]
+    if "invalid" not in found:
+        covered = (frame.coverage | truth.frame.coverage).sum()
+        found["invalid"] = float((~frame.valid).sum() / max(covered, 1))
+    layers = None if frame.layers is None or frame.truncated is None else int((frame.layers - frame.truncated).max())
+    passes = plan.geometry_passes if contender.technique in ("plan", "half", "unmarked") else 1
+    if isinstance(contender.method, DepthPeeling) and layers is not None:
+        passes = (-(-layers // 2) if contender.method.order == "both-ends" else layers) + 1
+    return dataclasses.replace(
+        row,
+        parameters=parameters,
+        promise=promise,
+        exact=exact,
+        passes=passes if contender.kind != "cpu" else None,
+        layers=layers,
+        bytes_per_pixel=drawn.bytes_per_pixel,
+        **found,
+    )
+
+
+def _promise(contender: Contender, plan: RenderPlan, scene: Scene) -> tuple[str, bool]:
+    if contender.technique in ("constant", "ball"):
+        return "none: the nearest face alone, with the best thickness that there is", False
+    if contender.technique == "unmarked":
+        return "exact for convex bodies; says nothing where a body is not", False
+    if contender.technique == "half":
+        return "none: 11 bits for sums of signed distances", False
+    if contender.technique == "march":
+        return f"sums over {getattr(contender.method, 'steps', 0)} steps in each interval", False
+    if isinstance(contender.method, RayMarched) and any(map(_shines, scene.bodies)):
+        return f"sums over {contender.method.steps} steps in each interval", False
+    if any(step.name == "light_views" for step in plan.passes):
+        points = getattr(contender.method, "light_points", 0)
+        return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
+    missing = [effect for effect in plan.unmodelled if not effect.startswith(("light scattered more", "refraction"))]
+    limits = [*plan.limits, *missing]
+    return "; ".join(limits) or "exact", not limits
+
+
+def _shines(body: Object) -> bool:
+    """Whether steps through the body add something up."""
+    medium = body.medium
+    return medium is not None and (medium.emits or medium.scatters or body.density is not None)
 
 
 def _errors(
-    renderer: Renderer, scene: Scene, size: tuple[int, int], method: Method, truth: Any, inside: Any
-) -> dict[str, Any]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TranslucentWarning)
-        frame = renderer.render(scene, size, method)
-    errors = compare(frame, truth, mask=inside)
-    found = {key: getattr(errors, key) / scene.diagonal for key in ("median", "p99", "p999", "max", "rms", "bias")}
-    return {
-        **found,
-        "invalid": errors.invalid,
-        "coverage_mismatch": errors.coverage_mismatch,
-        "geometry_passes": frame.plan.geometry_passes,
-        "gpu_ms": 1e3 * sum(s for key, s in frame.seconds.items() if key != "total"),
-    }
+    frame: Frame, truth: Truth, quantity: Quantity, scale: float | None
+) -> tuple[record.Errors, float, float] | None:
+    """Errors in units of the scale (default: the root mean square of the truth); and the shares of both masks."""
+    try:
+        found = compare(frame, truth.frame, quantity, mask=truth.inside)
+    except InputError:
+        return None
+    if scale is None:
+        used = truth.inside & truth.frame.coverage & truth.frame.valid
+        scale = float(np.sqrt(np.mean(getattr(truth.frame, quantity)[used] ** 2))) or 1.0
+    values = {name.name: float(getattr(found, name.name)) / scale for name in dataclasses.fields(record.Errors)}
+    return record.Errors(**values), found.invalid, found.coverage_mismatch
 
 
-def _processors() -> int:
-    import os
+def _picture(name: str, frame: Frame, truth: Frame | None, case: CaseRecord) -> Picture:
+    from PIL import Image
 
-    return os.cpu_count() or 1
+    stream = io.BytesIO()
+    Image.fromarray(frame.to_srgb8()).save(stream, format="PNG", optimize=True)
+    png = base64.b64encode(stream.getvalue()).decode("ascii")
+    if truth is None:
+        return Picture(name, png)
+    result, right = (np.asarray(getattr(f, case.quantity), np.float64) for f in (frame, truth))
+    error = result - right
+    if error.ndim == 3:
+        worst = np.abs(error).argmax(axis=-1)[..., None]
+        error = np.take_along_axis(error, worst, axis=-1)[..., 0]
+    covered = frame.coverage | truth.coverage
+    error = error / _scale(truth, case)
+    error = np.where(np.abs(error) < INVISIBLE, 0.0, error)
+    error = np.where(covered & frame.valid & truth.valid, error, np.nan)
+    return Picture(name, png, Packed.of(error), Packed.of(covered & ~frame.valid))
 
 
-def table(result: dict[str, Any]) -> str:
-    """The result as aligned text."""
-    machine = result["machine"]
-    lines = [
-        f"{machine['renderer']}, {machine['processors']} processors; errors as shares of the diagonal",
-        f"{'case':<13}{'method':<30}{'ms':>8}{'p95':>8}{'ratio':>7}{'frame':>7}{'median':>10}{'p99.9':>10}{'invalid':>9}",
-    ]
-    for row in result["rows"]:
-        line = f"{row['case']:<13}{row['method']:<30}{row['ms']:>8.2f}{row['ms_p95']:>8.2f}"
-        if "ratio" in row:
-            line += f"{row['ratio']:>7.2f}{row['frame_ratio']:>7.2f}{row['median']:>10.1e}{row['p999']:>10.1e}"
-            line += f"{row['invalid']:>9.2%}"
-        lines.append(line)
-    host = result["host"]
-    lines.append(
-        f"render() at 64x64: {host['render_ms']:.2f} ms, {host['host_ms']:.2f} ms of it neither GPU nor read-back"
+def _scale(truth: Frame, case: CaseRecord) -> float:
+    if case.quantity == "thickness":
+        return case.diagonal
+    used = truth.coverage & truth.valid
+    return float(np.sqrt(np.mean(truth.radiance[used] ** 2))) or 1.0
+
+
+def _with_times(row: Row, samples: Samples | None, failures: dict[str, str]) -> Row:
+    if samples is None:
+        return dataclasses.replace(row, failure=row.failure or failures.get(row.method))
+    wall = timing(samples.wall)
+    peeled = row.family == "DepthPeeling" and wall is not None and row.layers
+    return dataclasses.replace(
+        row,
+        wall=wall,
+        gpu=timing(samples.gpu),
+        frame=timing(samples.frame),
+        ratio=ratio(samples.wall, samples.floor),
+        frame_ratio=ratio(samples.frame, samples.floor),
+        ms_per_layer=wall.median / row.layers if peeled and wall is not None and row.layers else None,
     )
-    return "\n".join(lines)
+
+
+def _floor_row(found: Sequence[Samples]) -> Row:
+    """The floor; its time is over all draws of it beside the others."""
+    floor = [seconds for samples in found for seconds in samples.floor]
+    row = Row(
+        "depth only", "depth only", "", "floor", "the cost of drawing the geometry: no thickness", False, passes=1
+    )
+    if not floor:
+        return dataclasses.replace(row, refusal="nothing else has been timed on this scene")
+    return dataclasses.replace(row, wall=timing(floor), ratio=ratio(floor, floor))

@@ -1,0 +1,207 @@
+"""What is concluded from numbers: the frontier, changes between reports, claims. No clock is read here."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from translucent.bench.claims import check_claims
+from translucent.bench.comparison import compare_reports, machines_differ
+from translucent.bench.frontier import beats, mark_frontier
+from translucent.bench.record import CaseRecord, Errors, HardCase, Ratio, Report, Row, Timing
+from translucent.bench.timing import MOST, interleaved, ratio, timing
+
+from .test_record import PROVENANCE
+
+
+def row(method: str, time: float, error: float, noise: float = 0.0, invalid: float = 0.0, kind: str = "method") -> Row:
+    errors = Errors(error, error, error, error, error, 0.0)
+    return Row(
+        method,
+        method,
+        "",
+        kind,  # type: ignore[arg-type]
+        "exact",
+        True,
+        wall=Timing(time, time, 0.0, 9),
+        ratio=Ratio(time, 0.0, noise),
+        thickness=errors,
+        invalid=invalid,
+    )
+
+
+def test_only_what_no_other_beats_is_on_the_frontier() -> None:
+    rows = [row("fast", 1.0, 1e-1), row("good", 2.0, 1e-4), row("worse", 2.5, 1e-3), row("best", 9.0, 1e-6)]
+    found = {one.method: one.pareto for one in mark_frontier(rows, "thickness")}
+    assert found == {"fast": True, "good": True, "worse": False, "best": True}
+
+
+def test_the_floor_and_rows_without_numbers_are_not_on_it() -> None:
+    nothing = dataclasses.replace(row("none", 1.0, 1.0), ratio=None)
+    lost = dataclasses.replace(row("lost", 0.1, 1.0), thickness=None)
+    found = mark_frontier([row("depth only", 0.5, 0.0, kind="floor"), nothing, lost, row("a", 1, 1e-3)], "thickness")
+    assert [one.method for one in found if one.pareto] == ["a"]
+
+
+def test_what_noise_explains_beats_nothing() -> None:
+    assert beats(row("a", 1.0, 1e-3), row("b", 1.2, 1e-3), "thickness")
+    assert not beats(row("a", 1.0, 1e-3, noise=0.1), row("b", 1.2, 1e-3, noise=0.1), "thickness")
+    assert not beats(row("a", 1.0, 1e-3), row("b", 1.04, 1e-3), "thickness")
+    assert not beats(row("a", 1.0, 1e-8), row("b", 1.0, 9e-7), "thickness"), "both are rounding"
+
+
+def test_a_method_that_marks_pixels_beats_none_that_does_not() -> None:
+    assert not beats(row("a", 1.0, 1e-5, invalid=0.2), row("b", 2.0, 1e-4), "thickness")
+    assert beats(row("b", 1.0, 1e-5), row("a", 2.0, 1e-4, invalid=0.2), "thickness")
+
+
+def case(*rows: Row, name: str = "knot", **more: object) -> CaseRecord:
+    fields = {"closed": True, "absorption_only": True, "size": (64, 64), "compared_size": (32, 32), "layers": 4}
+    return CaseRecord(name, name, "", "thickness", rows=mark_frontier(rows, "thickness"), **(fields | more))  # type: ignore[arg-type]
+
+
+def report(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> Report:
+    return Report(PROVENANCE, cases, (), hard)
+
+
+def test_the_same_report_has_not_changed() -> None:
+    made = report(case(row("a", 1.0, 1e-4)))
+    assert compare_reports(made, made) == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kinds"),
+    [
+        ((1.0, 1e-4), (1.3, 1e-4), ["slower"]),
+        ((1.0, 1e-4), (1.1, 1e-4), []),  # within what two runs differ by
+        ((1.3, 1e-4), (1.0, 1e-4), ["faster"]),
+        ((1.0, 1e-4), (1.0, 1e-3), ["less accurate"]),
+        ((1.0, 1e-3), (1.0, 1e-4), ["more accurate"]),
+        ((1.0, 1e-8), (1.0, 8e-7), []),  # rounding
+        ((1.0, 1e-3), (1.5, 1e-4), ["slower", "more accurate"]),
+    ],
+)
+def test_changes_are_told(before: tuple[float, float], after: tuple[float, float], kinds: list[str]) -> None:
+    found = compare_reports(report(case(row("a", *before))), report(case(row("a", *after))))
+    assert [change.kind for change in found] == kinds
+
+
+def test_noise_excuses_a_difference() -> None:
+    old, new = report(case(row("a", 1.0, 1e-4, noise=0.1))), report(case(row("a", 1.4, 1e-4, noise=0.05)))
+    assert compare_reports(old, new) == ()
+    assert "1.00 -> 1.40" in str(compare_reports(report(case(row("a", 1.0, 1e-4))), new)[0])
+
+
+def test_marks_failures_and_hard_cases_are_told() -> None:
+    held, broke = HardCase("H07", "far", "exact", "1e-7", True), HardCase("H07", "far", "exact", "off", False)
+    old = report(case(row("a", 1, 1e-4), row("b", 1, 1e-4), row("c", 1, 1e-4)), hard=(held,))
+    failed = dataclasses.replace(row("b", 1, 1e-4), wall=None, ratio=None, thickness=None, failure="crash")
+    refused = dataclasses.replace(failed, method="c", failure=None, refusal="two media")
+    new = report(case(row("a", 1, 1e-4, invalid=0.01), failed, refused), hard=(broke,))
+    assert [change.kind for change in compare_reports(old, new)] == ["marks more", "fails", "gone", "fails"]
+    assert all(change.worse for change in compare_reports(old, new))
+
+
+def test_other_sizes_are_not_compared() -> None:
+    old = report(case(row("a", 1.0, 1e-4)))
+    new = report(case(row("a", 5.0, 1e-1), size=(128, 128), compared_size=(64, 64)))
+    assert compare_reports(old, new) == ()
+
+
+def test_another_machine_is_told() -> None:
+    one, other = report(), Report(dataclasses.replace(PROVENANCE, renderer="a GPU"))
+    assert machines_differ(one, one) is None
+    assert "a GPU" in str(machines_differ(one, other))
+
+
+def claims(*cases: CaseRecord, hard: tuple[HardCase, ...] = ()) -> list[bool | None]:
+    return [claim.held for claim in check_claims(cases, hard)]
+
+
+def test_claims_hold_where_the_numbers_do() -> None:
+    good = (
+        row("SignedDepth", 1.1, 1e-7),
+        row("constant thickness", 1.3, 1e-2, kind="counter-example"),
+        row("BackFaceDepth, unmarked", 1.6, 1e-3, kind="counter-example"),
+        row("SignedDepth from the camera", 1.1, 1e-4, kind="counter-example"),
+        row("SignedDepth in float16", 1.1, 1e-4, kind="counter-example"),
+    )
+    hard = tuple(HardCase(f"H{i:02}", "", "", "", True) for i in range(1, 25))
+    assert claims(case(*good), case(*good, name="far slab"), hard=hard) == [True] * 7
+    assert claims() == [None] * 7
+    assert claims(hard=hard[:23])[-1] is False
+
+
+@pytest.mark.parametrize(
+    ("number", "change"),
+    [
+        (0, row("SignedDepth", 2.0, 1e-1)),
+        (1, row("SignedDepth", 1.4, 1e-7)),
+        (2, row("constant thickness", 1.3, 9e-6)),
+        (3, row("BackFaceDepth, unmarked", 1.6, 9e-6)),
+        (4, row("SignedDepth in float16", 1.1, 2e-7)),
+        (5, row("SignedDepth from the camera", 1.1, 2e-7)),
+    ],
+)
+def test_a_claim_falls_on_one_case(number: int, change: Row) -> None:
+    names = ("constant thickness", "BackFaceDepth, unmarked", "SignedDepth from the camera", "SignedDepth in float16")
+    good = [row("SignedDepth", 1.1, 1e-7), *(row(name, 1.3, 1e-2) for name in names)]
+    bad = [change if one.method == change.method else one for one in good]
+    found = check_claims([case(*good), case(*bad, name="far slab")], ())[number]
+    assert found.held is False
+    assert found.measured.startswith("not on 'far slab'")
+
+
+def test_a_claim_within_the_noise_is_undecided() -> None:
+    found = check_claims([case(row("SignedDepth", 1.3, 1e-7, noise=0.05))], ())[1]
+    assert found.held is None
+    assert "undecided on 'knot': 1.30 ± 0.05" in found.measured
+
+
+def test_the_median_of_quotients_ignores_a_slow_spell() -> None:
+    floor = np.array([1.0] * 10 + [3.0] * 9)  # somebody else works on the machine for half of the time
+    found = ratio(list(1.2 * floor), list(floor))
+    assert found is not None
+    assert found.median == pytest.approx(1.2)
+    assert found.noise == pytest.approx(0, abs=1e-12)
+    assert ratio([], []) is None
+    assert timing([]) is None
+
+
+def test_the_noise_is_the_scatter_of_medians(rng: np.random.Generator) -> None:
+    samples = 2.0 + 0.3 * rng.standard_normal((4000, 25))
+    medians = np.median(samples, axis=1)
+    told = np.median([ratio(list(line), [1.0] * 25).noise for line in samples[:500]])  # type: ignore[union-attr]
+    assert told == pytest.approx(medians.std(), rel=0.1)  # the estimate from quartiles is biased by some percent
+
+
+def test_everything_is_measured_in_turns_with_the_floor_between() -> None:
+    order: list[str] = []
+
+    def draw(name: str, seconds: float):  # type: ignore[no-untyped-def]
+        def drawn() -> tuple[float, float, float | None]:
+            order.append(name)
+            return seconds, seconds, None
+
+        return drawn
+
+    failures: dict[str, str] = {}
+
+    def broken() -> tuple[float, float, float | None]:
+        raise RuntimeError("lost")
+
+    drawings = {"a": draw("a", 0.01), "b": draw("b", 0.02), "c": broken}
+    found = interleaved(draw("floor", 0.01), drawings, 0.0, lambda name, error: failures.update({name: str(error)}))
+    assert failures == {"c": "lost"}
+    assert found.keys() == {"a", "b"}
+    assert len(found["a"].wall) == len(found["b"].wall) >= 3
+    measured = order[order.index("floor") + 10 :]
+    assert measured == ["floor", "a", "floor", "b", "floor"] * len(found["a"].wall)
+    assert found["b"].floor == [0.01] * len(found["b"].wall)
+
+
+def test_the_fastest_need_no_more_than_so_many_rounds() -> None:
+    found = interleaved(lambda: (1e-9, 1e-9, 1e-9), {"a": lambda: (1e-9, 1e-9, 1e-9)}, 0.01, lambda *_: None)
+    assert len(found["a"].wall) == len(found["a"].gpu) == MOST

@@ -1,0 +1,238 @@
+"""Cases and contenders are really drawn; what fails is a row, and the rest goes on. No time is judged here."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.bench import measure as measuring
+from translucent.bench import run as running
+from translucent.bench.cases import CASES, Case
+from translucent.bench.contenders import CONTENDERS, check_names, contenders
+from translucent.bench.drawing import Studio
+from translucent.bench.files import read_report, write_report
+from translucent.bench.measure import CaseRun
+from translucent.bench.record import CaseRecord, Report
+from translucent.bench.run import Effort, measure_all
+from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
+from translucent.bench.table import table
+from translucent.solids import Sphere
+
+#: Rounds are few and frames small: what is tested is that there are numbers.
+HASTE = Effort(0.0, 0.0, 0.4)
+
+
+@pytest.fixture
+def studio(renderer: tl.Renderer) -> Iterator[Studio]:
+    with renderer.gpu.context.current():
+        made = Studio(renderer)
+        yield made
+        made.release()
+
+
+def case_of(mesh: tl.Mesh, **more: object) -> Case:
+    return Case("mine", "Mine", "mine", lambda size: tl.showcase(mesh, size=size), **more)  # type: ignore[arg-type]
+
+
+def measured(studio: Studio, case: Case, *names: str, size: tuple[int, int] = (64, 64)) -> CaseRecord:
+    chosen = contenders(case.effect, quick=False, only=names)
+    return CaseRun(studio, None, case, size, 0.0).measure(chosen)
+
+
+def test_rows_have_times_errors_and_pictures(studio: Studio) -> None:
+    made = measured(studio, case_of(lying_torus(48)), "signed-depth", "DepthPeeling", "constant thickness")
+    rows = {row.method: row for row in made.rows}
+    assert made.failure is None
+    assert next(iter(rows)) == "depth only"
+    assert not [row.failure or row.refusal for row in made.rows if row.failure or row.refusal]
+    signed, constant = rows["SignedDepth"], rows["constant thickness"]
+    assert signed.exact
+    assert signed.wall is not None
+    assert signed.gpu is not None
+    assert signed.frame is not None
+    assert signed.frame.median > signed.wall.median > 0
+    assert signed.thickness is not None
+    assert constant.thickness is not None
+    assert signed.thickness.p999 <= 1e-5
+    assert constant.thickness.rms > 1000 * signed.thickness.rms
+    assert rows["SignedDepth in float16"].thickness.rms > 1000 * signed.thickness.rms  # type: ignore[union-attr]
+    peeled = rows["DepthPeeling, all layers"]
+    assert made.layers >= peeled.layers >= 4  # type: ignore[operator]
+    assert peeled.ms_per_layer == pytest.approx(peeled.wall.median / peeled.layers)  # type: ignore[union-attr,operator]
+    assert rows["DepthPeeling, 2 layers"].invalid > 0.01  # type: ignore[operator]
+    assert rows["DepthPeeling, 2 layers"].bytes_per_pixel > signed.bytes_per_pixel  # type: ignore[operator]
+    assert made.pictures[0].method == "reference"
+    shown = {picture.method: picture for picture in made.pictures}
+    error = shown["constant thickness"].error
+    assert error is not None
+    # The picture's error is that of the row, silhouettes aside.
+    assert np.nanstd(error.array()) == pytest.approx(constant.thickness.rms, rel=0.2)
+
+
+def test_shortcuts_get_the_best_thickness_that_there_is(studio: Studio) -> None:
+    """A ball is what the sphere assumption assumes; and the mean is the best constant."""
+    made = measured(studio, case_of(Sphere().tessellate(96)), "sphere assumption", "constant thickness", size=(96, 96))
+    rows = {row.method: row for row in made.rows}
+    assert float(rows["sphere assumption"].parameters.split()[0]) == pytest.approx(2.0, rel=2e-3)
+    assert rows["sphere assumption"].thickness.rms < 0.01  # type: ignore[union-attr]
+    constant = rows["constant thickness"]
+    assert constant.thickness is not None
+    scene = tl.showcase(Sphere().tessellate(96), size=(96, 96))
+    truth = tl.reference.render(scene, size=(96, 96))
+    best = truth.thickness[truth.coverage].mean()
+    assert float(constant.parameters.split()[0]) == pytest.approx(best, rel=0.01)
+    assert "least squared error" in constant.parameters
+
+
+def test_back_face_depth_without_its_mask_is_wrong_where_there_is_a_gap(studio: Studio) -> None:
+    made = measured(studio, case_of(lying_torus(48)), "back-face-depth")
+    rows = {row.method: row for row in made.rows}
+    honest, silent = rows["BackFaceDepth"], rows["BackFaceDepth, unmarked"]
+    assert honest.invalid > 0.01  # type: ignore[operator]
+    assert silent.invalid == 0
+    assert silent.thickness.rms > 1e3 * honest.thickness.rms  # type: ignore[union-attr]
+
+
+def test_a_refusal_is_an_answer_and_not_a_failure(studio: Studio) -> None:
+    case = next(case for case in CASES if case.name == "two emitters")
+    made = measured(studio, case, "SignedDepth", "FragmentLists", size=(48, 48))
+    rows = {row.method: row for row in made.rows}
+    assert "emission among several media" in str(rows["SignedDepth"].refusal)
+    assert rows["FragmentLists"].radiance is not None
+    assert Report(running.provenance(studio.renderer, "test", quick=True), (made,)).failures == ()
+
+
+def test_what_fails_in_the_middle_is_a_row(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(shared: Studio, contender: object, *more: object) -> object:
+        if contender.name == "BackFaceDepth":  # type: ignore[attr-defined]
+            raise MemoryError("no room for\nthe frame")
+        return original(shared, contender, *more)  # type: ignore[arg-type]
+
+    original = measuring.drawing
+    monkeypatch.setattr(measuring, "drawing", failing)
+    made = measured(studio, case_of(Sphere().tessellate(32)), "BackFaceDepth", "SignedDepth")
+    rows = {row.method: row for row in made.rows}
+    assert rows["BackFaceDepth"].failure == "MemoryError: no room for the frame"
+    assert rows["SignedDepth"].ratio is not None
+
+
+def test_a_model_without_a_pixel_to_trust_fails(studio: Studio) -> None:
+    wall = tl.Mesh(np.array([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], float), np.array([(0, 1, 2)], np.int32), name="wall")
+    made = measured(studio, case_of(wall), "SignedDepth")
+    assert "no pixel of the reference can be trusted; 'wall'" in str(made.failure)
+    assert made.rows == ()
+
+
+def test_density_is_marched_without_a_gpu(studio: Studio) -> None:
+    case = next(case for case in CASES if case.name == "density")
+    with tl.Renderer("cpu") as cpu:
+        chosen = contenders(
+            "density",
+            quick=True,
+            only=("RayMarched on the CPU, 8 steps", "RayMarched on the CPU, 64 steps", "cpu backend"),
+        )
+        made = CaseRun(studio, cpu, case, (48, 48), 0.0).measure(chosen)
+    rows = {row.method: row for row in made.rows}
+    coarse, fine = rows["RayMarched on the CPU, 8 steps"], rows["RayMarched on the CPU, 64 steps"]
+    assert coarse.radiance.rms > 20 * fine.radiance.rms  # type: ignore[union-attr]  # second order: 64 times
+    assert rows["cpu backend"].radiance.rms < 1e-6  # type: ignore[union-attr]
+
+
+def small(monkeypatch: pytest.MonkeyPatch, *cases: Case) -> None:
+    """A report of these cases alone."""
+    monkeypatch.setattr(running, "CASES", cases)
+    monkeypatch.setattr(running.ScalingRun, "ladders", lambda self: [])
+    monkeypatch.setattr(running, "measure_hard_cases", lambda renderer: iter(()))
+
+
+def test_a_case_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    def scene(size: object) -> tl.Scene:
+        raise OSError("the file is gone")
+
+    bad = dataclasses.replace(case_of(Sphere().tessellate(24)), name="bad", scene=scene)
+    small(monkeypatch, bad, case_of(Sphere().tessellate(24)))
+    report = measure_all(size=(48, 48), methods=["signed-depth"], effort=HASTE, quick=True)
+    assert report.complete
+    assert report.failures == ("bad: OSError: the file is gone",)
+    assert report.cases[1].rows[1].method == "SignedDepth"
+    text = table(report)
+    assert "failed: OSError: the file is gone" in text
+    assert "SignedDepth *" in text
+
+
+def test_an_interruption_leaves_what_is_done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def scene(size: object) -> tl.Scene:
+        raise KeyboardInterrupt
+
+    last = dataclasses.replace(case_of(Sphere().tessellate(24)), name="last", scene=scene)
+    small(monkeypatch, case_of(Sphere().tessellate(24)), last)
+    path = tmp_path / "report.json"
+    report = measure_all(
+        size=(48, 48), methods=["signed-depth"], effort=HASTE, keep=lambda part: write_report(part, path)
+    )
+    assert not report.complete
+    assert [case.name for case in report.cases] == ["mine"]
+    assert read_report(path) == report
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"methods": ["signed-dept"]}, "did you mean signed-depth"),
+        ({"methods": ["xyz"]}, "use some of .*fragment-lists"),
+        ({"size": (0, 4)}, "size"),
+        ({"backend": "vulkan"}, "backend 'vulkan'"),
+    ],
+)
+def test_bad_arguments_are_refused_before_any_work(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(tl.InputError, match=message):
+        measure_all(**arguments)  # type: ignore[arg-type]
+
+
+def test_the_cpu_alone_cannot_be_measured() -> None:
+    with pytest.raises(tl.RenderError, match="no OpenGL"):
+        measure_all(backend="cpu")
+
+
+def test_methods_are_chosen_by_name_or_family() -> None:
+    check_names(["SignedDepth", "depth-peeling", "DepthPeeling, 8 layers", "RayMarched, 64 steps, equiangular"])
+    found = contenders("absorption", quick=True, only=["depth-peeling-4-layers", "thin_layer"])
+    assert [one.name for one in found] == ["ThinLayer", "ThinLayer, refracted", "DepthPeeling, 4 layers"]
+    assert {one.name for one in contenders("scattering", quick=True)} < {
+        one.name for one in contenders("scattering", quick=False)
+    }
+
+
+def test_all_that_is_promised_is_measured() -> None:
+    names = {one.name for one in CONTENDERS}
+    assert len(names) == len(CONTENDERS)
+    assert {f"DepthPeeling, {n} layer{'s' * (n > 1)}" for n in (1, 2, 4, 8)} | {"DepthPeeling, all layers"} <= names
+    assert {f"KBuffer, k = {k}" for k in (2, 4, 8)} | {"FragmentLists", "cpu backend", "sphere assumption"} <= names
+    assert {f"RayMarched, {steps} steps" for steps in (8, 16, 32, 64, 128, 256, 512)} <= names
+    quadratures = ("left", "exponential", "jittered", "equiangular", "gauss")
+    assert {one.method.quadrature for one in CONTENDERS if isinstance(one.method, tl.RayMarched)} >= {*quadratures}
+    assert len({case.name for case in CASES}) == len(CASES)
+    assert {"absorption", "sheet", "emission", "scattering", "density"} == {case.effect for case in CASES}
+
+
+def test_the_sponge_is_a_closed_body_of_known_volume() -> None:
+    for level in (1, 2, 3):
+        sponge = menger_sponge(level)
+        assert sponge.diagnosis.solid
+        assert sponge.volume == pytest.approx((20 / 27) ** level, rel=1e-12)
+
+
+def test_shells_and_plates_have_as_many_surfaces_as_asked_for() -> None:
+    shells = nested_shells(3, 24)
+    camera = tl.Camera.orthographic((0.01, 0.02, 5), (0.01, 0.02, 0), height=0.1)
+    assert tl.reference.hit_counts(tl.Scene([tl.Object(shells, tl.Medium())], camera), (2, 2)).max() == 12
+    assert shells.diagnosis.solid
+    stack = plates(10)
+    assert tl.reference.hit_counts(tl.Scene([tl.Object(stack, tl.Medium())], camera), (2, 2)).min() == 10
+    truth = tl.reference.render(tl.Scene([tl.Object(stack, tl.Medium(absorption=(1, 1, 1)))], camera), (2, 2))
+    assert truth.thickness == pytest.approx(0.5)

@@ -1,0 +1,399 @@
+"""The page of a report: complete, self-contained, escaped, the same for the same record, and made without OpenGL."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import itertools
+import re
+import subprocess
+import sys
+import types
+from collections import Counter
+from collections.abc import Callable, Iterator
+from html import unescape
+from html.parser import HTMLParser
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from translucent.bench.codec import Packed
+from translucent.bench.frontier import mark_frontier
+from translucent.bench.page import numbers
+from translucent.bench.page.build import build_page, write_page
+from translucent.bench.page.overview import overview_svg
+from translucent.bench.record import (
+    CaseRecord,
+    Claim,
+    Errors,
+    HardCase,
+    Picture,
+    Provenance,
+    Ratio,
+    Report,
+    Row,
+    ScalePoint,
+    Series,
+    Timing,
+)
+from translucent.errors import InputError, RenderError
+
+PROVENANCE = Provenance(
+    command="translucent report -o out",
+    started="2025-01-02T03:04:05Z",
+    platform="Linux",
+    processor="a processor",
+    processors=2,
+    backend="egl",
+    renderer="llvmpipe",
+    driver="4.5 Mesa",
+    software=True,
+    versions={"numpy": "2.4"},
+    commit="0123abc",
+    dirty=True,
+    seed=7,
+    quick=False,
+)
+
+FAMILIES = ("SignedDepth", "BackFaceDepth", "constant thickness", "KBuffer", "FragmentLists", "something new")
+
+
+def unlike() -> Iterator[float]:
+    """Numbers of which no two look alike with two digits."""
+    return itertools.cycle((1.0 + k / 10) * 10.0**e for e in (-7, -6, -5, -4, -3, -2) for k in range(90))
+
+
+def measured(method: str, family: str, ratio: float, rms: float, values: Iterator[float], **more: Any) -> Row:
+    def timing() -> Timing:
+        return Timing(1e3 * next(values), 1e3 * next(values), 1e3 * next(values), 11)
+
+    def errors(rms: float) -> Errors:
+        return Errors(rms, next(values), next(values), next(values), next(values), -next(values))
+
+    row = Row(
+        method=method,
+        family=family,
+        parameters=f"{family}()",
+        kind="method",
+        promise=f"what {method} promises",
+        exact=True,
+        wall=timing(),
+        gpu=timing(),
+        frame=timing(),
+        ratio=Ratio(ratio, next(values), next(values)),
+        frame_ratio=Ratio(ratio + 1.23, next(values), next(values)),
+        passes=2,
+        layers=17,
+        ms_per_layer=next(values),
+        bytes_per_pixel=1234,
+        thickness=errors(rms),
+        transmittance=errors(next(values)),
+        radiance=errors(next(values)),
+        invalid=0.0,
+        coverage_mismatch=next(values),
+    )
+    return dataclasses.replace(row, **more)
+
+
+def png() -> str:
+    stream = io.BytesIO()
+    Image.new("RGB", (8, 6), (10, 200, 30)).save(stream, format="PNG")
+    return base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def case(name: str = "knot", title: str = "A knot", **more: Any) -> CaseRecord:
+    values = unlike()
+    rows = [
+        Row("depth only", "depth only", "", "floor", "", True, wall=Timing(9.87, 10.1, 0.21, 11)),
+        *(
+            measured(f"{family}, 4 of them", family, 1.1 + i, 10.0 ** (i - 8), values)
+            for i, family in enumerate(FAMILIES)
+        ),
+        measured("marking", "KBuffer", 1.02, 1e-7, values, invalid=0.25),
+        measured("on the processor", "cpu backend", 400.0, 0.0, values, kind="cpu"),
+        Row("refusing", "ThinLayer", "", "method", "", False, refusal="no sheets here"),
+        Row("breaking", "RayMarched", "", "method", "", False, failure="a shader that does not compile"),
+    ]
+    error = np.linspace(-1e-3, 1e-3, 48).reshape(6, 8)
+    pictures = (
+        Picture("reference", png()),
+        Picture("marking", png(), Packed.of(error), Packed.of(error > 5e-4)),
+    )
+    record = CaseRecord(
+        name=name,
+        title=title,
+        why="concave",
+        quantity="thickness",
+        closed=True,
+        absorption_only=True,
+        triangles=20160,
+        bodies=1,
+        layers=8,
+        size=(640, 480),
+        compared_size=(64, 48),
+        diagonal=0.1,
+        compared_pixels=777,
+        reference_seconds=1.5,
+        rows=tuple(mark_frontier(rows, "thickness")),
+        pictures=pictures,
+    )
+    return dataclasses.replace(record, **more)
+
+
+def report(**more: Any) -> Report:
+    points = tuple(ScalePoint(x, Timing(x / 100, x / 90, 0.1, 5), Ratio(1.25, 0.1, 0.01)) for x in (1000, 10000))
+    lost = ScalePoint(100000, failure="out of memory")
+    made = Report(
+        provenance=PROVENANCE,
+        cases=(case(), case("broken", "A broken model", rows=(), pictures=(), failure="12 holes")),
+        scaling=(Series("triangles", "SignedDepth", "SignedDepth", "one frame size", (*points, lost)),),
+        hard_cases=(
+            HardCase("H01", "grazing", "exact", "as promised", True, 1.5e-7, 2e-6, "of the diagonal"),
+            HardCase("H02", "colors", "a clear error", "a traceback", False),
+        ),
+        claims=(Claim("it is fast", True, "1.1"), Claim("it is exact", False, "1e-1"), Claim("on a GPU", None, "none")),
+        seconds=12.0,
+        complete=True,
+    )
+    return dataclasses.replace(made, **more)
+
+
+class Elements(HTMLParser):
+    """All elements of a page with their attributes, and all of its text."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.text: list[str] = []
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return build_page(report())
+
+
+def cells(page: str) -> Counter[str]:
+    """The texts of all cells of tables."""
+    return Counter(
+        unescape(re.sub(r"<[^>]*>", "", cell)).strip() for cell in re.findall(r"<td[^>]*>(.*?)</td>", page, re.DOTALL)
+    )
+
+
+def test_nothing_is_fetched(page: str) -> None:
+    for tag, attributes in Elements(page).found:
+        assert tag not in {"script", "iframe", "object", "embed", "base"}
+        assert not {name for name in attributes if name.startswith("on")}
+        for name in ("src", "href", "xlink:href", "srcset", "action"):
+            assert (attributes.get(name) or "#").startswith(("#", "data:")), (tag, attributes)
+    assert all(inside.startswith("#") for inside in re.findall(r"url\(([^)]*)\)", page))
+    assert "@import" not in page
+    assert set(re.findall(r"https?://[^\s\"'<]*", page)) <= {
+        "http://www.w3.org/2000/svg",
+        "http://www.w3.org/1999/xlink",
+    }
+
+
+def test_links_lead_somewhere_and_identifiers_are_unique(page: str) -> None:
+    found = Elements(page).found
+    identifiers = Counter(attributes["id"] for _, attributes in found if "id" in attributes)
+    assert identifiers.most_common(1)[0][1] == 1
+    targets = {a["href"][1:] for _, a in found if (a.get("href") or "").startswith("#")}  # type: ignore[index]
+    targets |= set(re.findall(r"url\(#([^)]*)\)", page))
+    assert targets
+    assert targets <= identifiers.keys()
+
+
+def test_cases_of_one_name_have_pages_of_their_own() -> None:
+    page = build_page(report(cases=(case(), case(), case("КНОТ"), case("***"))))
+    identifiers = Counter(attributes["id"] for _, attributes in Elements(page).found if "id" in attributes)
+    assert identifiers.most_common(1)[0][1] == 1
+
+
+SHOWN: dict[str, Callable[[Any], str]] = {
+    "wall": numbers.ms_text,
+    "gpu": numbers.ms_text,
+    "frame": numbers.ms_text,
+    "ratio": numbers.ratio_text,
+    "thickness": numbers.error_text,
+    "transmittance": numbers.error_text,
+    "radiance": numbers.error_text,
+    "ms_per_layer": numbers.ms_text,
+    "coverage_mismatch": numbers.share_text,
+}
+
+
+def test_every_number_of_a_row_is_in_a_table(page: str) -> None:
+    expected: Counter[str] = Counter()
+    for row in report().cases[0].rows:
+        for name, text in SHOWN.items():
+            value = getattr(row, name)
+            parts = [value] if isinstance(value, float) else dataclasses.asdict(value).items() if value else []
+            for part in parts:
+                if isinstance(part, float):
+                    expected[text(part)] += 1
+                elif part[0] == "rounds":
+                    expected["11"] += name == "wall"
+                elif part[0] == "bias":
+                    expected[numbers.signed_error_text(part[1])] += 1
+                else:
+                    expected[text(part[1])] += 1
+        if row.frame_ratio is not None:
+            expected[numbers.ratio_text(row.frame_ratio.median)] += 1
+            expected.update(["2", "17", numbers.count_text(1234)])
+    assert sum(expected.values()) > 200
+    assert not expected - cells(page)
+
+
+def test_texts_of_the_record_are_shown(page: str) -> None:
+    text = " ".join(" ".join(Elements(page).text).split())
+    for shown in (
+        "A knot", "12 holes", "breaking: a shader that does not compile", "refusing : no sheets here", "out of memory",
+        "broken: 12 holes", "knot / breaking: a shader", "H01", "a traceback", "1.5e-7", "of the diagonal", "2.0e-6",
+        "1 of 2 keep", "it is exact", "does not hold", "not checked", "0123abc", "changes that are not committed",
+        "translucent report -o out", "what marking promises", "777 pixels", "20 160 triangles",
+    ):  # fmt: skip
+        assert shown in text
+
+
+def test_banners() -> None:
+    def of(**more: Any) -> str:
+        changed = dataclasses.replace(PROVENANCE, **{k: v for k, v in more.items() if hasattr(PROVENANCE, k)})
+        rest = {k: v for k, v in more.items() if not hasattr(PROVENANCE, k)}
+        return " ".join(Elements(build_page(report(provenance=changed, **rest))).text)
+
+    plain = of(software=False, renderer="A GPU")
+    assert "A GPU" in plain
+    for words, text in (
+        ("Software rasteriser", of(software=True)),
+        ("Not complete.", of(software=False, complete=False)),
+        ("A quick run", of(software=False, quick=True)),
+    ):
+        assert words in text
+        assert words not in plain
+
+
+def test_the_same_record_gives_the_same_bytes(page: str) -> None:
+    assert build_page(Report.from_json(report().to_json())) == page
+    assert overview_svg(report()) == overview_svg(report())
+
+
+EVIL = """<script>alert('1')</script>"><img src=x onerror="alert(1)"> {{ 7 * 7 }} & ]]> $x^2$"""
+
+
+def poisoned(value: Any) -> Any:
+    """The value with hostile text wherever the record has free text."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        if isinstance(value, Packed):
+            return value
+        fixed = {"kind", "quantity", "axis", "format", "png"}
+        changed = {f.name: poisoned(getattr(value, f.name)) for f in dataclasses.fields(value) if f.name not in fixed}
+        return dataclasses.replace(value, **changed)
+    if isinstance(value, str):
+        return value + EVIL
+    if isinstance(value, tuple):
+        return tuple(poisoned(item) for item in value)
+    if isinstance(value, dict | types.MappingProxyType):
+        return {key + EVIL: poisoned(item) for key, item in value.items()}
+    return value
+
+
+def test_text_stays_text() -> None:
+    evil = poisoned(report())
+    page = build_page(evil)
+    elements = Elements(page)
+    assert not [tag for tag, attributes in elements.found if tag == "script" or "onerror" in attributes]
+    assert sum("<script>alert('1')</script>" in part for part in elements.text) > 50
+    assert " 49 " not in page
+    for svg in (overview_svg(evil), *re.findall(r"<svg .*?</svg>", page, re.DOTALL)):
+        assert not ElementTree.fromstring(svg).findall(".//{*}script")
+
+
+def test_a_picture_is_nothing_but_a_picture() -> None:
+    evil = case(pictures=(Picture("reference", '"><script>'),))
+    assert not [tag for tag, _ in Elements(build_page(report(cases=(evil,)))).found if tag == "script"]
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"cases": ()},
+        {"cases": (), "scaling": (), "hard_cases": (), "claims": (), "complete": False},
+        {"cases": (case(rows=case().rows[:2]),)},
+        {"cases": (case(rows=case().rows[8:9]),)},
+        {"cases": (case(rows=case().rows[:1]),)},
+    ],
+    ids=["no case", "nothing", "one method", "an error of zero", "only the floor"],
+)
+def test_little_makes_a_page_too(more: dict[str, Any]) -> None:
+    assert "Where the numbers come from" in build_page(report(**more))
+
+
+def test_a_long_list_of_methods_stands_below_its_plot() -> None:
+    values = unlike()
+    rows = [measured(f"RayMarched, {2**i} steps", "RayMarched", 2.0 + 7 * i % 30, 0.5**i, values) for i in range(30)]
+    page = build_page(report(cases=(case(rows=tuple(rows)),)))
+    assert 'class="plot tall"' in page
+    assert 'class="plot tall"' not in build_page(report())
+    order = re.findall(r"RayMarched, (\d+) steps</td><td>", page)
+    assert [int(steps) for steps in order[:30]] == [2**i for i in range(30)]
+
+
+def test_drawings_say_what_they_show_and_follow_the_theme(page: str) -> None:
+    svg = next(s for s in re.findall(r"<svg .*?</svg>", page, re.DOTALL) if "Cost against error" in s)
+    assert "SignedDepth, 4 of them: 1.10 x depth-only, RMS error 1.0e-8" in svg
+    assert "var(--green)" in svg
+    assert "#0102" not in page
+    # Black and white come from matplotlib's defaults, and would vanish in one of the themes.
+    assert not re.findall(r"(?:fill|stroke): ?#(?:000000|ffffff)", svg)
+
+
+def test_the_figure_names_its_methods_and_is_a_file_of_its_own() -> None:
+    svg = overview_svg(report(cases=(case(convex=True, title="A sphere"), case())))
+    root = ElementTree.fromstring(svg)
+    text = "".join(root.itertext())
+    assert "A knot, 640 × 480, software rasteriser" in text
+    assert "SignedDepth, 4 of them" in text
+    assert "on the processor" not in text
+    assert "prefers-color-scheme: dark" in text
+    with pytest.raises(InputError, match="no scene in it has numbers; measure at least one"):
+        overview_svg(report(cases=()))
+
+
+def test_names_are_no_formulas_and_long_ones_are_cut() -> None:
+    values = unlike()
+    rows = (measured("$k^2$ layers", "KBuffer", 2.0, 1e-3, values), measured("x" * 200, "KBuffer", 3.0, 1e-4, values))
+    text = "".join(ElementTree.fromstring(overview_svg(report(cases=(case(rows=rows),)))).itertext())
+    assert "$k^2$ layers" in text
+    assert "x" * 39 + "…" in text
+
+
+def test_no_opengl_is_needed() -> None:
+    code = (
+        "import sys; from pathlib import Path; from translucent.bench.record import Report; "
+        "from translucent.bench.page.build import build_page; "
+        "build_page(Report.from_json(sys.stdin.read())); "
+        "assert not {'moderngl', 'OpenGL', 'glcontext', 'embreex'} & sys.modules.keys()"
+    )
+    subprocess.run([sys.executable, "-c", code], input=report().to_json(), text=True, check=True)
+
+
+@pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
+def test_a_missing_package_is_named_with_its_extra(
+    package: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(RenderError, match=rf"the package {package} is not installed; pip install .*\[report\]"):
+        write_page(report(), tmp_path / "report.html")
+    assert not list(tmp_path.iterdir())

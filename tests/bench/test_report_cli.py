@@ -1,0 +1,290 @@
+"""``translucent report``: from a record to its files, what the changes are, and errors that leave all as it was."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from translucent.assets import mesh_path
+from translucent.bench.models import effect_of, model_cases
+from translucent.bench.record import CaseRecord, Errors, Provenance, Ratio, Report, Row, Timing
+from translucent.cli import main
+from translucent.medium import Medium
+from translucent.mesh import load_mesh
+from translucent.showcase import showcase
+
+
+class Result(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Result]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
+
+    def _run(*arguments: object) -> Result:
+        code = main(["report", *map(str, arguments)])
+        captured = capsys.readouterr()
+        return Result(code, captured.out, captured.err)
+
+    return _run
+
+
+PROVENANCE = Provenance(
+    "translucent report", "2025-01-02T03:04:05Z", "Linux", "a processor", 2, "egl", "llvmpipe", "4.5", True, {}, None,
+    None, 0, True,
+)  # fmt: skip
+
+
+def record(ratio: float = 1.1, rms: float = 3e-8, **more: Any) -> Report:
+    timing, errors = Timing(10.0 * ratio, 11.0, 0.1, 9), Errors(rms, rms, rms, rms, rms, 0.0)
+    row = Row("SignedDepth", "SignedDepth", "SignedDepth()", "method", "exact", True, timing, ratio=Ratio(ratio, 0, 0))
+    case = CaseRecord("knot", "Knot", "concave", "thickness", rows=(dataclasses.replace(row, thickness=errors),))
+    made = Report(PROVENANCE, cases=(case,), seconds=3.0, complete=True)
+    return dataclasses.replace(made, **more)
+
+
+@pytest.fixture
+def new(tmp_path: Path) -> Path:
+    path = tmp_path / "new.json"
+    path.write_text(record().to_json())
+    return path
+
+
+FILES = ["report.csv", "report.html", "report.json", "report.svg"]
+
+
+def test_a_page_is_made_again_from_its_record(run: Run, new: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "not there" / "yet"
+    result = run("--from", new, "-o", folder)
+    assert (result.code, result.err) == (0, "")
+    assert sorted(path.name for path in folder.iterdir()) == FILES
+    assert json.loads((folder / "report.json").read_text()) == json.loads(new.read_text())
+    assert "knot" in result.out
+    assert "1.10" in result.out
+    assert str(folder / "report.html") in result.out
+
+
+def test_without_a_folder_the_table_is_printed(run: Run, new: Path) -> None:
+    result = run("--from", new)
+    assert result.code == 0
+    assert "SignedDepth" in result.out
+    assert "÷ floor" in result.out
+
+
+def test_json_is_one_object(run: Run, new: Path, tmp_path: Path) -> None:
+    result = run("--from", new, "-o", tmp_path, "--json")
+    found = json.loads(result.out)
+    assert found["answers"] == [
+        {"case": "knot", "method": "SignedDepth", "ratio": 1.1, "quantity": "thickness", "rms_error": 3e-8}
+        | {"good_enough": True}
+    ]
+    assert sorted(Path(path).name for path in found["files"]) == FILES
+    assert found["changes"] is None
+
+
+def test_changes_are_told(run: Run, new: Path, tmp_path: Path) -> None:
+    old = tmp_path / "old.json"
+    old.write_text(record(ratio=0.6, rms=1e-9).to_json())
+    result = run("--from", new, "--compare", old)
+    assert result.code == 0
+    assert "slower: knot / SignedDepth: 0.60 -> 1.10" in result.out
+    assert "nothing got slower" in run("--from", new, "--compare", new).out
+    changes = json.loads(run("--from", new, "--compare", old, "--json").out)["changes"]
+    assert [change["kind"] for change in changes] == ["slower"]
+
+
+def test_times_of_two_machines_are_no_comparison(run: Run, new: Path, tmp_path: Path) -> None:
+    old = tmp_path / "old.json"
+    old.write_text(record(provenance=dataclasses.replace(PROVENANCE, renderer="a GPU")).to_json())
+    assert "warning: times of two machines" in run("--from", new, "--compare", old).err
+
+
+def test_what_failed_is_told_and_the_rest_is_written(run: Run, tmp_path: Path) -> None:
+    whole = record()
+    broken = CaseRecord("mine", "Mine", "", "thickness", failure="12 holes")
+    path = tmp_path / "part.json"
+    path.write_text(dataclasses.replace(whole, cases=(broken, *whole.cases)).to_json())
+    result = run("--from", path, "-o", tmp_path / "out")
+    assert result.code == 1
+    assert "12 holes" in result.err
+    assert result.err.count("\n") == 1
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == FILES
+
+
+def test_a_report_without_numbers_has_no_figure(run: Run, new: Path, tmp_path: Path) -> None:
+    run("--from", new, "-o", tmp_path / "out")
+    empty = tmp_path / "empty.json"
+    empty.write_text(record(cases=()).to_json())
+    assert run("--from", empty, "-o", tmp_path / "out").code == 0
+    assert not (tmp_path / "out" / "report.svg").exists(), "an old figure beside a new page would be a lie"
+
+
+@pytest.mark.parametrize("option", ["--from", "--compare"])
+def test_a_truncated_record_is_an_error_before_any_work(run: Run, new: Path, tmp_path: Path, option: str) -> None:
+    cut = tmp_path / "cut.json"
+    cut.write_text(new.read_text()[:300])
+    more = ["--from", new] if option == "--compare" else []
+    result = run(option, cut, *more, "-o", tmp_path / "out")
+    assert result.code == 2
+    assert "cut.json; it is cut off or no JSON" in result.err
+    assert result.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["a file", "a file/below"])
+def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / "a file").write_text("kept")
+    result = run("--from", new, "-o", tmp_path / name)
+    assert result.code == 1
+    assert "no folder that can be written to" in result.err
+    assert (tmp_path / "a file").read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--from", "x.json", "-o", "out", "--quick"], "nothing is measured"),
+        (["--from", "x.json", "-o", "out", "knot"], "nothing is measured"),
+        (["--from", "absent.json", "-o", "out"], "it cannot be read"),
+    ],
+    ids=["from and quick", "from and a model", "no such file"],
+)
+def test_bad_usage(
+    run: Run, arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.code == 2
+    assert message in result.err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The models that the test asks for, and none of the toolkit's scenes, sizes and hard cases."""
+    from translucent.bench import run as measuring
+
+    monkeypatch.setattr(measuring, "CASES", ())
+    monkeypatch.setattr(measuring.ScalingRun, "ladders", lambda _: ())
+    monkeypatch.setattr(measuring, "measure_hard_cases", lambda _: ())
+
+
+SMALL = ("--quick", "--size", "64x48", "--methods", "signed-depth,constant-thickness")
+
+
+@pytest.mark.usefixtures("nothing_else")
+def test_a_model_of_the_user_is_measured(run: Run, tmp_path: Path) -> None:
+    result = run("knot", "bear", "-o", tmp_path, *SMALL, "--json")
+    assert result.code == 0
+    answers = json.loads(result.out)["answers"]
+    assert [(answer["case"], answer["method"]) for answer in answers] == [
+        ("model knot", "SignedDepth"),
+        ("model bear", "SignedDepth"),
+    ]
+    made = Report.from_json((tmp_path / "report.json").read_text())
+    assert made.complete
+    assert made.cases[0].size == (64, 48)
+    assert {row.family for row in made.cases[0].rows} == {"depth only", "SignedDepth", "constant thickness"}
+    assert made.provenance.command == (
+        f"translucent report knot bear -o {tmp_path} --size 64x48 --methods signed-depth,constant-thickness --quick"
+    )
+    assert sorted(path.name for path in tmp_path.iterdir()) == FILES
+
+
+@pytest.mark.usefixtures("nothing_else")
+def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from translucent.bench.measure import CaseRun
+
+    measure = CaseRun.measure
+
+    def impatient(self: CaseRun, *arguments: Any) -> CaseRecord:
+        if self.case.name == "model bear":
+            raise KeyboardInterrupt
+        return measure(self, *arguments)
+
+    monkeypatch.setattr(CaseRun, "measure", impatient)
+    result = run("knot", "bear", "-o", tmp_path, *SMALL)
+    assert result.code == 130
+    assert "error: interrupted" in result.err
+    made = Report.from_json((tmp_path / "report.json").read_text())
+    assert [case.name for case in made.cases] == ["model knot"]
+    assert "Not complete." in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.usefixtures("nothing_else")
+def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from translucent.bench.measure import Truth
+
+    trace = Truth.of
+
+    def failing(scene: Any, *arguments: Any) -> Truth:
+        if "knot" in scene.objects[0].mesh.name:
+            raise RuntimeError("no luck")
+        return trace(scene, *arguments)
+
+    monkeypatch.setattr(Truth, "of", failing)
+    result = run("knot", "bear", "-o", tmp_path, *SMALL)
+    assert result.code == 1
+    assert "model knot: RuntimeError: no luck" in result.err
+    assert "model bear" in result.out
+    assert "no luck" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.usefixtures("nothing_else")
+def test_a_model_that_is_no_solid_is_a_row_that_failed(run: Run, tmp_path: Path) -> None:
+    result = run("leaf", "bear", "-o", tmp_path, *SMALL)
+    assert result.code == 1
+    assert "measuring 'leaf'; no method can treat it as solid" in result.err
+    assert "246 open edges" in result.err
+    assert "model bear" in result.out
+    assert "246 open edges" in (tmp_path / "report.html").read_text()
+
+
+def test_models_of_one_name_are_told_apart() -> None:
+    scene = showcase(load_mesh(mesh_path("bear")))
+    cases = model_cases({"a/x.stl": scene, "b/x.stl": scene, "c/y.stl": scene})
+    assert [case.title for case in cases] == ["a/x.stl", "b/x.stl", "y.stl"]
+    assert {case.effect for case in cases} == {"absorption"}
+
+
+def test_media_decide_what_is_worth_measuring() -> None:
+    mesh = load_mesh(mesh_path("bear"))
+    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), scattering=(1, 1, 1)))) == "scattering"
+    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), emission=(1, 1, 1)))) == "emission"
+    scene = showcase(mesh)
+    sheet = dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], sheet_thickness=1e-3)])
+    assert effect_of(sheet) == "sheet"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["absent.stl"], "absent.stl"),
+        (["--size", "0x5"], "size"),
+        (["--methods", "magic"], "method 'magic'; not one that is measured"),
+        (["--backend", "magic"], "magic"),
+    ],
+    ids=["model", "size", "method", "backend"],
+)
+def test_bad_input_is_found_before_measuring(run: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
+    result = run("-o", tmp_path / "out", *arguments)
+    assert result.code == 2
+    assert message in result.err
+    assert result.err.count("error:") == 1
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_help_has_an_example(run: Run) -> None:
+    assert "Example: translucent report" in run("--help").out

@@ -1,0 +1,140 @@
+"""What the project says of itself, checked on the numbers of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from translucent.bench.frontier import NOISES, error_of
+from translucent.bench.record import CaseRecord, Claim, HardCase, Row
+
+#: Times the floor, within which signed depth stays.
+MOST_OF_FLOOR = 1.25
+
+#: Surfaces on a ray beyond which most of what is drawn is hidden.
+MANY_LAYERS = 8
+
+#: Times smaller than that of a shortcut: the error of signed depth on concave bodies.
+FACTOR = 100.0
+
+#: Cases at whose place or shape float32 from the camera and float16 are lost.
+LOST = ("slab", "far slab", "far knot")
+
+#: Visibly wrong: this much more than signed depth, and more than float32 has to say at all.
+VISIBLE_FACTOR, VISIBLE = 10.0, 1e-6
+
+
+def check_claims(cases: Sequence[CaseRecord], hard_cases: Sequence[HardCase]) -> tuple[Claim, ...]:
+    """All claims, each with the numbers behind it."""
+    closed = [case for case in cases if case.closed and case.absorption_only and not case.failure]
+    concave = [case for case in closed if not case.convex]
+    far = [case for case in closed if case.name.startswith("far")]
+    lost = [case for case in closed if case.name in LOST]
+    return (
+        _over("SignedDepth is on the Pareto frontier of every closed case that only absorbs", closed, _on_frontier),
+        _over(f"SignedDepth takes at most {MOST_OF_FLOOR} times the floor on these", closed, _near_floor),
+        _over(
+            f"SignedDepth has at most 1/{FACTOR:.0f} of the error of constant thickness on concave cases",
+            concave,
+            lambda case: _smaller(case, "constant thickness"),
+        ),
+        _over(
+            f"SignedDepth has at most 1/{FACTOR:.0f} of the error of back-face depth on concave cases, where rays "
+            "leave the body and enter again",
+            concave,
+            lambda case: _smaller(case, "BackFaceDepth, unmarked") if case.layers > 2 else (None, ""),
+        ),
+        _over("float16 is visibly off on thin and far cases", lost, lambda case: _off(case, "SignedDepth in float16")),
+        _over(
+            "distances from the camera are visibly off on far cases",
+            far,
+            lambda case: _off(case, "SignedDepth from the camera"),
+        ),
+        _hard(hard_cases),
+    )
+
+
+Check = Callable[[CaseRecord], tuple[bool | None, str]]
+
+
+def _over(text: str, cases: Sequence[CaseRecord], check: Check) -> Claim:
+    """A claim over several cases: held where it holds on all that decide it; None where none does.
+
+    A check gives no verdict (None) where the case has not the numbers, or they are too noisy, which it tells in words.
+    """
+    found = [(case, *check(case)) for case in cases]
+    known = [(case, held, words) for case, held, words in found if held is not None]
+    undecided = [f"undecided on {case.name!r}: {words}" for case, held, words in found if held is None and words]
+    if not known:
+        return Claim(text, None, "; ".join(undecided) or "no case in this run to check it on")
+    wrong = [f"not on {case.name!r}: {words}" for case, held, words in known if not held]
+    right = [f"{case.name}: {words}" for case, held, words in known if held]
+    return Claim(text, not wrong, "; ".join([*wrong, *undecided, *right]))
+
+
+def _row(case: CaseRecord, method: str) -> Row | None:
+    return next((row for row in case.rows if row.method == method and row.ratio is not None), None)
+
+
+def _on_frontier(case: CaseRecord) -> tuple[bool | None, str]:
+    row = _row(case, "SignedDepth")
+    if row is None:
+        return None, ""
+    error = error_of(row, case.quantity)
+    place = "" if row.ratio is None or error is None else f"{row.ratio.median:.2f} times the floor, error {error:.1e}"
+    return row.pareto, place
+
+
+def _near_floor(case: CaseRecord) -> tuple[bool | None, str]:
+    row = _row(case, "SignedDepth")
+    if row is None or row.ratio is None:
+        return None, ""
+    words = f"{row.ratio.median:.2f} ± {row.ratio.noise:.2f}"
+    if row.ratio.median > MOST_OF_FLOOR:
+        words += _why_slow(case)
+    if row.ratio.median > MOST_OF_FLOOR >= row.ratio.median - NOISES * row.ratio.noise:
+        return None, words
+    return row.ratio.median <= MOST_OF_FLOOR, words
+
+
+def _why_slow(case: CaseRecord) -> str:
+    """What signed depth does there that the floor does not."""
+    if case.bodies > 1:
+        return " (several media: three optical depths and the path are added up, 20 bytes per pixel and not 8)"
+    if case.layers > MANY_LAYERS:
+        return f" ({case.layers} layers: the floor skips hidden surfaces by its depth test, signed depth adds them)"
+    return ""
+
+
+def _smaller(case: CaseRecord, shortcut: str) -> tuple[bool | None, str]:
+    factor = _error_factor(case, shortcut)
+    return (None, "") if factor is None else (factor >= FACTOR, f"{factor:.2g} times smaller")
+
+
+def _off(case: CaseRecord, shortcut: str) -> tuple[bool | None, str]:
+    factor, row = _error_factor(case, shortcut), _row(case, shortcut)
+    error = None if row is None else error_of(row, case.quantity)
+    if factor is None or error is None:
+        return None, ""
+    return factor >= VISIBLE_FACTOR and error > VISIBLE, f"error {error:.1e}, {factor:.2g} times SignedDepth's"
+
+
+def _error_factor(case: CaseRecord, shortcut: str) -> float | None:
+    """How many times larger the error of the shortcut is than that of signed depth."""
+    ours, theirs = _row(case, "SignedDepth"), _row(case, shortcut)
+    if ours is None or theirs is None:
+        return None
+    mine, other = error_of(ours, case.quantity), error_of(theirs, case.quantity)
+    if mine is None or other is None:
+        return None
+    return other / max(mine, 1e-12)
+
+
+def _hard(hard_cases: Sequence[HardCase]) -> Claim:
+    text = "All hard cases H01 to H24 hold"
+    if not hard_cases:
+        return Claim(text, None, "none has been measured in this run")
+    failed = [f"{case.id} {case.title}: {case.result}" for case in hard_cases if not case.passed]
+    missing = 24 - len({case.id for case in hard_cases})
+    if missing:
+        failed.append(f"{missing} not measured")
+    return Claim(text, not failed, "; ".join(failed) or f"{len(hard_cases)} measured")

@@ -1,0 +1,113 @@
+"""What got slower or less accurate between two reports of one machine, beyond their noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from translucent.bench.frontier import ERROR_FLOOR, ERROR_MARGIN
+from translucent.bench.record import CaseRecord, Report, Row
+
+#: Runs on one machine differ by this share of a ratio to the floor though nothing has changed.
+TIME_SHARE = 0.15
+
+#: Standard errors of the difference of two medians, beyond which it is no accident.
+NOISES = 4.0
+
+#: Shares of pixels that rasterizers may decide otherwise.
+PIXEL_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that is not as it was.
+
+    Attributes
+    ----------
+    kind : {"slower", "faster", "less accurate", "more accurate", "marks more", "fails", "gone"}
+    where : str
+        Case and method.
+    text : str
+        Before and after.
+    """
+
+    kind: Literal["slower", "faster", "less accurate", "more accurate", "marks more", "fails", "gone"]
+    where: str
+    text: str
+
+    @property
+    def worse(self) -> bool:
+        """Whether that is bad news."""
+        return self.kind not in ("faster", "more accurate")
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.where}: {self.text}"
+
+
+def compare_reports(old: Report, new: Report) -> tuple[Change, ...]:
+    """All changes, bad news first. What only the new report has is no change."""
+    changes = list(_changes(old, new))
+    return tuple(sorted(changes, key=lambda change: not change.worse))
+
+
+def machines_differ(old: Report, new: Report) -> str | None:
+    """Why times of the two cannot be compared, if so."""
+    pairs = {
+        "device": (old.provenance.renderer, new.provenance.renderer),
+        "processor": (old.provenance.processor, new.provenance.processor),
+        "processors": (str(old.provenance.processors), str(new.provenance.processors)),
+    }
+    wrong = [f"{name} {a!r}, now {b!r}" for name, (a, b) in pairs.items() if a != b]
+    return "; ".join(wrong) or None
+
+
+def _changes(old: Report, new: Report) -> Iterator[Change]:
+    cases = {case.name: case for case in new.cases}
+    for before in old.cases:
+        after = cases.get(before.name)
+        if after is None:
+            continue  # fewer cases were asked for
+        if after.failure and not before.failure:
+            yield Change("fails", before.name, after.failure)
+        rows = {row.method: row for row in after.rows}
+        for row in before.rows:
+            if (now := rows.get(row.method)) is not None:
+                yield from _row_changes(before, after, row, now)
+    hard = {case.id: case for case in new.hard_cases}
+    for case in old.hard_cases:
+        if (found := hard.get(case.id)) is not None and case.passed and not found.passed:
+            yield Change("fails", case.id, found.result)
+
+
+def _row_changes(before: CaseRecord, after: CaseRecord, old: Row, new: Row) -> Iterator[Change]:
+    where = f"{before.name} / {old.method}"
+    if old.wall is not None and (new.failure or new.refusal):
+        yield Change("fails" if new.failure else "gone", where, str(new.failure or new.refusal))
+    if before.size == after.size and old.kind != "floor":
+        yield from _time_change(where, old, new)
+    if before.compared_size == after.compared_size:
+        yield from _error_change(where, before, old, new)
+
+
+def _time_change(where: str, old: Row, new: Row) -> Iterator[Change]:
+    if old.ratio is None or new.ratio is None:
+        return
+    difference = new.ratio.median - old.ratio.median
+    margin = max(TIME_SHARE * old.ratio.median, NOISES * math.hypot(old.ratio.noise, new.ratio.noise))
+    if abs(difference) > margin:
+        text = f"{old.ratio.median:.2f} -> {new.ratio.median:.2f} times the floor (noise up to {margin:.2f})"
+        yield Change("slower" if difference > 0 else "faster", where, text)
+
+
+def _error_change(where: str, case: CaseRecord, old: Row, new: Row) -> Iterator[Change]:
+    before, after = old.errors(case.quantity), new.errors(case.quantity)
+    if before is None or after is None:
+        return
+    a, b = max(before.rms, ERROR_FLOOR), max(after.rms, ERROR_FLOOR)
+    if b > a * ERROR_MARGIN or a > b * ERROR_MARGIN:
+        text = f"RMS error in {case.quantity} {before.rms:.2g} -> {after.rms:.2g}"
+        yield Change("less accurate" if b > a else "more accurate", where, text)
+    if (new.invalid or 0.0) > (old.invalid or 0.0) + PIXEL_SHARE:
+        yield Change("marks more", where, f"{old.invalid or 0.0:.2%} -> {new.invalid or 0.0:.2%} of pixels invalid")

@@ -1,0 +1,201 @@
+"""What is compared, as data: the methods with their parameters, and the shortcuts that others take."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from translucent.bench.record import Kind
+from translucent.errors import InputError
+from translucent.scene import Scene
+from translucent.thickness import (
+    MAX_LAYERS,
+    BackFaceDepth,
+    DepthPeeling,
+    FragmentLists,
+    KBuffer,
+    Method,
+    Quadrature,
+    RayMarched,
+    SignedDepth,
+    ThinLayer,
+)
+
+#: How a contender is drawn: by the plan for its method, by a shortcut of the bench, or without OpenGL.
+Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march"]
+
+#: What a scene has that makes some contenders worth a row, or no contest at all.
+Effect = Literal["absorption", "emission", "scattering", "density", "sheet"]
+
+#: Refraction index of the thin layers that bend rays.
+REFRACTED_IOR = 1.5
+
+_ALL: tuple[Effect, ...] = get_args(Effect)
+_STEPS = (8, 16, 32, 64, 128, 256, 512)
+_SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
+
+#: With light scattered into every step, more take seconds for a frame, and nobody would.
+_MOST_LIT_STEPS = 128
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One row of every case that it fits.
+
+    Attributes
+    ----------
+    name, family : str
+        As in `translucent.bench.record.Row`.
+    method : Method
+        With its parameters. `ThinLayer` and shortcuts get the thickness with the least squared error of all, which
+        nobody has who does not know the truth: no choice of theirs would do better.
+    technique : str
+    kind : {"method", "counter-example", "cpu"}
+    effects : tuple of str
+        Cases in which it is measured.
+    quick : bool
+        Measured with ``--quick``, too.
+    pictured : tuple of str
+        Cases of which the report shows its picture.
+    ior : {"matched", "refracted"}, optional
+        Drawn with media of the index of refraction 1, or else of `REFRACTED_IOR` where they have none of their own.
+    """
+
+    name: str
+    family: str
+    method: Method
+    technique: Technique = "plan"
+    kind: Kind = "method"
+    effects: tuple[Effect, ...] = _ALL
+    quick: bool = True
+    pictured: tuple[Effect, ...] = ()
+    ior: Literal["matched", "refracted"] | None = None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether its thickness, in solids, is chosen to fit the truth best."""
+        return self.technique in ("constant", "ball") or isinstance(self.method, ThinLayer)
+
+    def refusal(self, scene: Scene) -> str | None:
+        """Why it is not measured on a scene though the planner would run it."""
+        if self.technique in ("constant", "ball", "unmarked", "half") and scene.opaque:
+            return "the shortcuts are drawn without opaque objects"
+        if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
+            return "signed distances of a sheet mean nothing"
+        return None
+
+
+def _ordered() -> Iterable[Contender]:
+    for layers in (1, 2, 4, 8):
+        name = f"DepthPeeling, {layers} layer{'s' if layers > 1 else ''}"
+        yield Contender(
+            name,
+            "DepthPeeling",
+            DepthPeeling(max_layers=layers),
+            quick=layers in (2, 8),
+        )
+    yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
+    for k in (2, 4, 8):
+        yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), quick=k == 8)
+    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=_SOURCES)
+
+
+def _light_points() -> Iterable[Contender]:
+    for points in (1, 2, 4):  # 8 is what FragmentLists does by itself
+        name = f"FragmentLists, {points} light point{'s' if points > 1 else ''}"
+        method = FragmentLists(light_points=points)
+        yield Contender(name, "FragmentLists", method, effects=("scattering",), quick=points != 2)
+
+
+def _marched() -> Iterable[Contender]:
+    # Where media only absorb there is nothing to sum, and marching costs what its fragment lists cost.
+    for steps in _STEPS:
+        quick = steps in (8, 64)
+        yield Contender(
+            f"RayMarched, {steps} steps",
+            "RayMarched",
+            RayMarched(steps=steps),
+            effects=_SOURCES if steps <= _MOST_LIT_STEPS else ("emission", "density"),
+            quick=quick,
+            pictured=_SOURCES if steps == 8 else (),
+        )
+        yield Contender(
+            f"RayMarched on the CPU, {steps} steps",
+            "RayMarched on the CPU",
+            RayMarched(steps=steps),
+            "march",
+            "cpu",
+            ("density",),
+            quick,
+            ("density",) if steps == 8 else (),
+        )
+    for rule in get_args(Quadrature):
+        if rule != "midpoint":
+            steps = 16 if rule == "gauss" else 64  # shaders hold 16 Gauss points
+            method = RayMarched(steps=steps, quadrature=rule)
+            name = f"RayMarched, {steps} steps, {rule}"
+            yield Contender(name, "RayMarched", method, effects=_SOURCES, quick=rule == "equiangular")
+
+
+CONTENDERS: tuple[Contender, ...] = (
+    Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
+    Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
+    Contender("ThinLayer", "ThinLayer", ThinLayer(), ior="matched"),
+    Contender("ThinLayer, refracted", "ThinLayer", ThinLayer(), quick=False, ior="refracted"),
+    Contender("BackFaceDepth", "BackFaceDepth", BackFaceDepth()),
+    Contender(
+        "BackFaceDepth, unmarked",
+        "BackFaceDepth",
+        BackFaceDepth(),
+        "unmarked",
+        "counter-example",
+        pictured=("absorption", "emission"),
+    ),
+    Contender("SignedDepth", "SignedDepth", SignedDepth(), pictured=_ALL),
+    Contender(
+        "SignedDepth from the camera",
+        "SignedDepth",
+        SignedDepth(anchored=False),
+        kind="counter-example",
+        pictured=("absorption",),
+    ),
+    Contender(
+        "SignedDepth in float16", "SignedDepth", SignedDepth(), "half", "counter-example", pictured=("absorption",)
+    ),
+    *_ordered(),
+    *_light_points(),
+    *_marched(),
+    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", quick=False),
+)
+
+
+def contenders(effect: Effect, *, quick: bool, only: Iterable[str] = ()) -> tuple[Contender, ...]:
+    """What is measured on a case of this effect; `only` names contenders or families, as `check_names` accepts them."""
+    wanted = {_slug(name) for name in only}
+    return tuple(
+        one
+        for one in CONTENDERS
+        if effect in one.effects
+        and (one.quick or not quick or wanted)
+        and (not wanted or wanted & {_slug(one.name), _slug(one.family)})
+    )
+
+
+def check_names(names: Iterable[str]) -> None:
+    """Raise `InputError` where a name is that of no contender and of no family: ``depth-peeling``, ``ThinLayer``."""
+    known = {_slug(text) for one in CONTENDERS for text in (one.name, one.family)}
+    families = sorted({_slug(one.family) for one in CONTENDERS})
+    for name in names:
+        if _slug(name) not in known:
+            close = difflib.get_close_matches(_slug(name), sorted(known), n=1)
+            do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(families)}"
+            raise InputError(f"method {name!r}", "not one that is measured", do)
+
+
+def _slug(name: str) -> str:
+    """Lower case, words joined by dashes: ``DepthPeeling, 8 layers`` is ``depth-peeling-8-layers``."""
+    spaced = "".join(f" {letter}" if letter.isupper() and i else letter for i, letter in enumerate(name))
+    words = "".join(letter if letter.isalnum() else " " for letter in spaced.lower()).split()
+    return "-".join(words).replace("c-p-u", "cpu")

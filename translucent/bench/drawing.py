@@ -1,0 +1,227 @@
+"""What is timed: frames that are prepared once, drawn again and again, and read at the end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from translucent import reference
+from translucent.frame import Frame
+from translucent.gpu.buffers import MeshCache
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes import PASSES, Pass
+from translucent.gpu.passes.depth_only import DepthOnlyPass
+from translucent.gpu.passes.shortcuts import Shortcut
+from translucent.gpu.targets import Targets
+from translucent.gpu.timer import PassTimer
+from translucent.render_plan import PassSpec, RenderPlan
+from translucent.renderer import Renderer
+from translucent.scene import Scene
+from translucent.thickness import RayMarched, SignedDepth
+
+Size = tuple[int, int]
+
+
+class Drawing(Protocol):
+    """A frame that can be drawn again and again."""
+
+    def draw(self) -> tuple[float, float, float | None]:
+        """Draw it: seconds until the part that finds thickness is done, until all is, and the GPU's for that part."""
+
+    def read(self) -> Frame:
+        """What the last drawing left."""
+
+    @property
+    def bytes_per_pixel(self) -> int | None:
+        """Of all targets and buffers."""
+
+    def release(self) -> None:
+        """Free what it needed."""
+
+
+class Studio:
+    """What the drawings of one renderer share: compiled passes, uploaded meshes, a timer."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self.renderer = renderer
+        self.gl = renderer.gpu.context.gl
+        self.meshes = MeshCache(self.gl)
+        self.timer = PassTimer(self.gl)
+        self._passes: dict[type[Pass], Pass] = {}
+
+    def step(self, name: str) -> Pass:
+        """The pass of this name in plans."""
+        kind = PASSES[name]
+        if kind not in self._passes:
+            self._passes[kind] = kind(self.gl)
+        return self._passes[kind]
+
+    def timed(self, geometry: Callable[[], None], shading: Callable[[], None]) -> tuple[float, float, float]:
+        """Seconds as `Drawing.draw` tells them."""
+        self.timer.begin_frame()
+        self.gl.finish()
+        begin = time.perf_counter()
+        geometry()
+        self.gl.finish()
+        middle = time.perf_counter()
+        shading()
+        self.gl.finish()
+        end = time.perf_counter()
+        return middle - begin, end - begin, sum(self.timer.seconds().values())
+
+    def release(self) -> None:
+        """Free everything."""
+        self.meshes.release()
+        self._passes.clear()
+
+
+class Floor:
+    """The geometry into a depth buffer, and nothing else: what any rasterized method costs at least."""
+
+    bytes_per_pixel = 4
+
+    def __init__(self, studio: Studio, scene: Scene, targets: Targets) -> None:
+        plan = RenderPlan(SignedDepth(), ())
+        self._studio = studio
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.meshes)
+        self._pass = DepthOnlyPass(studio.gl)
+
+    def draw(self) -> tuple[float, float, float | None]:
+        """Draw it."""
+
+        def geometry() -> None:
+            self._job.place((0.0, 0.0), with_depth=True)
+            self._studio.gl.viewport = (0, 0, *self._job.targets.size)
+            with self._studio.timer.measure("depth_only"):
+                self._pass.run(self._job)
+
+        return self._studio.timed(geometry, _nothing)
+
+    def read(self) -> Frame:
+        """A depth buffer is no frame."""
+        raise NotImplementedError
+
+    def release(self) -> None:
+        """Free the uniform buffers."""
+        self._job.release()
+
+
+class Planned:
+    """A plan of the public API, pass by pass as the renderer runs it."""
+
+    def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
+        self._studio = studio
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.meshes)
+        self._geometry = [spec for spec in plan.passes if spec.geometry_passes]
+        self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
+
+    def draw(self) -> tuple[float, float, float | None]:
+        """Draw it."""
+
+        def geometry() -> None:
+            self._job.place((0.0, 0.0))
+            self._run(self._geometry, "geometry")
+
+        return self._studio.timed(geometry, lambda: self._run(self._shading, None))
+
+    def read(self) -> Frame:
+        """What the last drawing left."""
+        return self._studio.renderer.gpu.read(self._job)
+
+    @property
+    def bytes_per_pixel(self) -> int | None:
+        """Of all targets and buffers that have been made in this size."""
+        return self._job.targets.bytes_per_pixel()
+
+    def release(self) -> None:
+        """Free the uniform buffers."""
+        self._job.release()
+
+    def _run(self, specs: list[PassSpec], prefix: str | None) -> None:
+        for spec in specs:
+            step = self._studio.step(spec.name)
+            if prefix is None:
+                step.run(self._job, spec)
+            else:
+                with self._studio.timer.measure(f"{prefix}/{spec.name}"):
+                    step.run(self._job, spec)
+
+
+class Short:
+    """A shortcut in place of the passes over geometry, and the shading of signed depth."""
+
+    def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan, shortcut: Shortcut) -> None:
+        self._studio = studio
+        shading = tuple(spec for spec in plan.passes if spec.name == "transmittance")
+        plan = RenderPlan(SignedDepth(), shading, plan.spectral)
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.meshes)
+        self._shortcut = shortcut
+
+    def draw(self) -> tuple[float, float, float | None]:
+        """Draw it."""
+        job = self._job
+
+        def geometry() -> None:
+            job.place((0.0, 0.0), with_depth=self._shortcut.with_depth)
+            job.accumulator()
+            with self._studio.timer.measure("shortcut"):
+                self._shortcut.run(job)
+
+        def shading() -> None:
+            self._shortcut.hand_over(job)
+            for spec in job.plan.passes:
+                self._studio.step(spec.name).run(job, spec)
+
+        return self._studio.timed(geometry, shading)
+
+    def read(self) -> Frame:
+        """What the last drawing left."""
+        return self._studio.renderer.gpu.read(self._job)
+
+    @property
+    def bytes_per_pixel(self) -> int | None:
+        """Of all targets and buffers that have been made in this size."""
+        return self._job.targets.bytes_per_pixel()
+
+    def release(self) -> None:
+        """Free the uniform buffers."""
+        self._job.release()
+
+
+class OnProcessor:
+    """Frames without OpenGL: of the backend ``cpu``, or where it is given a way to march, of the reference's march."""
+
+    bytes_per_pixel = None
+
+    def __init__(self, renderer: Renderer, scene: Scene, size: Size, march: RayMarched | None = None) -> None:
+        self._renderer = renderer
+        self._scene = scene
+        self._size = size
+        self._march = march
+        self._frame: Frame | None = None
+        self.plan = renderer.plan(scene)
+
+    def draw(self) -> tuple[float, float, float | None]:
+        """Draw it; thickness and shading are one."""
+        begin = time.perf_counter()
+        if self._march is None:
+            self._frame = self._renderer.render(self._scene, self._size)
+        else:
+            self._frame = reference.march(self._scene, self._size, self._march)
+        seconds = time.perf_counter() - begin
+        return seconds, seconds, None
+
+    def read(self) -> Frame:
+        """What the last drawing left."""
+        if self._frame is None:
+            self.draw()
+        assert self._frame is not None
+        return self._frame
+
+    def release(self) -> None:
+        """Nothing to free: the renderer is shared."""
+
+
+def _nothing() -> None:
+    pass

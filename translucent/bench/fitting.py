@@ -1,0 +1,97 @@
+"""The best thickness that a shortcut could be told: of least squared error, for want of one that is right."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from translucent.bench.contenders import REFRACTED_IOR, Contender
+from translucent.bench.drawing import Drawing, OnProcessor, Planned, Short, Size, Studio
+from translucent.errors import InputError
+from translucent.frame import Frame
+from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFacePass, Shortcut, UnmarkedBackFacePass
+from translucent.gpu.targets import Targets
+from translucent.render_plan import RenderPlan
+from translucent.renderer import Renderer
+from translucent.scene import Object, Scene
+from translucent.thickness import BackFaceDepth, RayMarched, SignedDepth, ThinLayer
+
+
+def seen_by(contender: Contender, scene: Scene) -> Scene:
+    """The scene with the index of refraction that the contender wants."""
+    if contender.ior is None:
+        return scene
+
+    def bent(body: Object) -> Object:
+        if body.medium is None:
+            return body
+        own = body.medium.ior if body.medium.ior > 1 else REFRACTED_IOR
+        ior = 1.0 if contender.ior == "matched" else own
+        return dataclasses.replace(body, medium=dataclasses.replace(body.medium, ior=ior))
+
+    return dataclasses.replace(scene, objects=[bent(body) for body in scene.objects])
+
+
+def drawing(
+    studio: Studio,
+    contender: Contender,
+    scene: Scene,
+    plan: RenderPlan,
+    targets: Targets,
+    size: float,
+    cpu: Renderer | None,
+) -> Drawing:
+    """The contender's frame, ready to be drawn; `size` is the thickness that a shortcut assumes, in metres."""
+    if contender.technique in ("cpu", "march"):
+        assert cpu is not None, "there is a plan for it"
+        march = contender.method if isinstance(contender.method, RayMarched) else None
+        return OnProcessor(cpu, scene, targets.size, march)
+    if contender.technique == "plan":
+        return Planned(studio, scene, targets, plan)
+    shortcut: Shortcut
+    if contender.technique == "half":
+        shortcut = HalfFloatPass(studio.gl)
+    elif contender.technique == "unmarked":
+        shortcut = UnmarkedBackFacePass(studio.gl)
+    else:
+        shortcut = NearestFacePass(studio.gl, sphere=contender.technique == "ball", size=size)
+    return Short(studio, scene, targets, plan, shortcut)
+
+
+def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | None = None) -> RenderPlan:
+    """What runs, or what lends a shortcut its shading; raises `InputError` where the planner refuses."""
+    if contender.technique in ("cpu", "march"):
+        if cpu is None:
+            raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
+        return cpu.plan(scene)
+    if contender.technique == "plan":
+        return studio.renderer.plan(scene, contender.method)
+    return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())
+
+
+def fitted(studio: Studio, contender: Contender, scene: Scene, truth: Frame, size: Size) -> tuple[Contender, float]:
+    """The contender with the thickness of least squared error, and that in metres.
+
+    Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t> over
+    all pixels that truth or picture cover.
+    """
+    told = contender.technique == "plan" and all(body.sheet_thickness is not None for body in scene.bodies)
+    if told or not contender.fitted:
+        return contender, 0.0
+    probe = float(scene.diagonal)
+    contender = dataclasses.replace(contender, method=ThinLayer(probe))
+    targets = Targets(studio.gl, size)
+    try:
+        drawn = drawing(studio, contender, scene, plan_of(studio, contender, scene), targets, probe, None)
+        try:
+            drawn.draw()
+            frame = drawn.read()
+        finally:
+            drawn.release()
+    finally:
+        targets.release()
+    used = truth.valid & (truth.coverage | frame.coverage)
+    shape = np.asarray(frame.thickness, np.float64)[used] / probe
+    best = float(np.sum(shape * truth.thickness[used]) / max(np.sum(shape**2), np.finfo(np.float64).tiny))
+    return dataclasses.replace(contender, method=ThinLayer(best)), best

@@ -1,0 +1,57 @@
+"""Which methods of a case no other beats: neither slower nor less accurate than any (Pareto)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+from translucent.bench.record import Quantity, Row
+
+#: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much.
+TIME_MARGIN = 1.05
+NOISES = 2.0
+
+#: Errors closer than this are equal, as are all below `ERROR_FLOOR`: float32 of a path has no more to say.
+ERROR_MARGIN = 1.5
+ERROR_FLOOR = 1e-6
+
+
+def error_of(row: Row, quantity: Quantity) -> float | None:
+    """By which methods are ranked: the root mean square error. None where there is none to trust."""
+    errors = row.errors(quantity)
+    return None if errors is None else errors.rms
+
+
+def mark_frontier(rows: Sequence[Row], quantity: Quantity) -> tuple[Row, ...]:
+    """The rows, each with `Row.pareto` set."""
+    placed = [row for row in rows if _place(row, quantity) is not None]
+    return tuple(
+        dataclasses.replace(
+            row, pareto=_place(row, quantity) is not None and not any(beats(o, row, quantity) for o in placed)
+        )
+        for row in rows
+    )
+
+
+def beats(one: Row, other: Row, quantity: Quantity) -> bool:
+    """Whether one row is clearly better in time or error, and not clearly worse in the other.
+
+    A row that marks pixels as not to be trusted leaves a part of the picture out: it beats none that marks fewer.
+    """
+    a, b = _place(one, quantity), _place(other, quantity)
+    if a is None or b is None or (one.invalid or 0.0) > (other.invalid or 0.0) + 1e-3:
+        return False
+    (time_a, noise_a, error_a), (time_b, noise_b, error_b) = a, b
+    margin = max((TIME_MARGIN - 1.0) * min(time_a, time_b), NOISES * math.hypot(noise_a, noise_b))
+    faster, slower = time_a + margin < time_b, time_a > time_b + margin
+    better, worse = error_a * ERROR_MARGIN < error_b, error_a > error_b * ERROR_MARGIN
+    return (faster and not worse) or (better and not slower)
+
+
+def _place(row: Row, quantity: Quantity) -> tuple[float, float, float] | None:
+    """Time, its noise, and error."""
+    error = error_of(row, quantity)
+    if row.ratio is None or error is None or row.kind == "floor":
+        return None
+    return row.ratio.median, row.ratio.noise, max(error, ERROR_FLOOR)

@@ -1,0 +1,60 @@
+"""The folder of a report: record, table, page and figure."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from translucent.bench.files import write_csv, write_report
+from translucent.bench.page.build import write_page
+from translucent.bench.page.figure import require_packages
+from translucent.bench.page.overview import has_overview, write_overview
+from translucent.bench.record import Report
+from translucent.errors import RenderError
+
+
+def check_folder(folder: Path) -> None:
+    """Make the folder if it is not there, and raise before any work is done where nothing could be written into it.
+
+    Raises
+    ------
+    RenderError
+        If it cannot be made or written to, or what draws the page is not installed.
+    """
+    require_packages()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise RenderError(
+            f"output {str(folder)!r}",
+            f"it is no folder that can be written to ({error.strerror or error})",
+            "check the path and its permissions",
+        ) from error
+
+
+def write_outputs(report: Report, folder: Path) -> list[Path]:
+    """Write ``report.json``, ``.csv``, ``.html`` and ``.svg`` into a folder, each complete or not at all.
+
+    The figure is left out where no scene has numbers, and one of an earlier report removed.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    RenderError
+        If a file cannot be written.
+    """
+    writers = {"report.json": write_report, "report.csv": write_csv, "report.html": write_page}
+    if has_overview(report):
+        writers["report.svg"] = write_overview
+    elif os.path.lexists(folder / "report.svg"):
+        (folder / "report.svg").unlink()
+    for name, write in writers.items():
+        write(report, folder / name)
+    return [folder / name for name in writers]

@@ -1,0 +1,166 @@
+"""A whole report: cases, scaling and hard cases, with what is done kept on the way."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+
+from translucent.bench.cases import CASES, Case, Size
+from translucent.bench.claims import check_claims
+from translucent.bench.contenders import check_names, contenders
+from translucent.bench.drawing import Studio
+from translucent.bench.hard_cases import measure_hard_cases
+from translucent.bench.machine import provenance
+from translucent.bench.measure import CaseRun
+from translucent.bench.record import Report
+from translucent.bench.scaling import ScalingRun
+from translucent.camera import check_size
+from translucent.errors import RenderError
+from translucent.renderer import Renderer
+
+#: Size of the timed frames.
+FULL_SIZE: Size = (512, 512)
+QUICK_SIZE: Size = (256, 256)
+
+
+@dataclasses.dataclass(frozen=True)
+class Effort:
+    """How long to measure.
+
+    Attributes
+    ----------
+    case_seconds, step_seconds : float
+        Of timing, for each case and for each step of a scaling axis.
+    compared : float
+        Width and height of the frames that are held against the reference, as a share of what the case wants.
+    """
+
+    case_seconds: float
+    step_seconds: float
+    compared: float
+
+
+FULL = Effort(12.0, 2.5, 1.0)
+QUICK = Effort(1.5, 0.25, 0.6)
+
+#: Told what is being measured, and how many steps of how many are done.
+Progress = Callable[[str, int, int], None]
+
+
+def measure_all(
+    extra: Sequence[Case] = (),
+    *,
+    size: Size | None = None,
+    methods: Sequence[str] = (),
+    quick: bool = False,
+    backend: str | None = None,
+    effort: Effort | None = None,
+    command: str = "tl.bench.measure_all(...)",
+    progress: Progress = lambda *_: None,
+    keep: Callable[[Report], None] = lambda _: None,
+) -> Report:
+    """Measure everything, on the cases of the toolkit and on others.
+
+    Parameters
+    ----------
+    extra : sequence of Case
+        Scenes to measure on, before those of the toolkit.
+    size : (width, height), optional
+        Of the timed frames, in pixels; default 512 x 512, with `quick` 256 x 256.
+    methods : sequence of str
+        Names or families of what to measure, ``"SignedDepth"`` or ``"signed-depth"``; default: all.
+    quick : bool
+        Fewer cases, methods and repetitions: under a minute instead of ten.
+    backend : str, optional
+        Of the renderer; default: what works here.
+    effort : Effort, optional
+        How long to measure; default: `QUICK` or `FULL`.
+    command : str
+        What the record says has made it.
+    progress : callable
+        Hears what is being measured.
+    keep : callable
+        Gets the unfinished report whenever a part is done.
+
+    Returns
+    -------
+    Report
+        Unfinished (``complete`` False) after a `KeyboardInterrupt`: with all that had been measured before.
+
+    Raises
+    ------
+    InputError
+        If the size, a method or the backend is not one.
+    RenderError
+        If there is no OpenGL to measure.
+    """
+    size = check_size(size or (QUICK_SIZE if quick else FULL_SIZE))
+    check_names(methods)
+    effort = effort or (QUICK if quick else FULL)
+    with ExitStack() as stack:
+        renderer = stack.enter_context(Renderer(backend))
+        if renderer.provenance["backend"] == "cpu":
+            raise RenderError("measuring", "there is no OpenGL here", "see 'translucent doctor'")
+        cpu = _cpu_renderer(stack)
+        stack.enter_context(renderer.gpu.context.current())
+        studio = Studio(renderer)
+        stack.callback(studio.release)
+        report = Report(provenance(renderer, command, quick=quick))
+        begin = time.perf_counter()
+        try:
+            cases = [*extra, *(case for case in CASES if case.quick or not quick)]
+            for report in _measured(report, studio, cpu, cases, size, methods, quick, effort, progress):  # noqa: B020
+                report = dataclasses.replace(report, seconds=time.perf_counter() - begin)
+                keep(report)
+        except KeyboardInterrupt:
+            return report
+    report = dataclasses.replace(report, seconds=time.perf_counter() - begin, complete=True)
+    keep(report)
+    return report
+
+
+def _measured(
+    report: Report,
+    studio: Studio,
+    cpu: Renderer | None,
+    cases: Sequence[Case],
+    size: Size,
+    methods: Sequence[str],
+    quick: bool,
+    effort: Effort,
+    progress: Progress,
+) -> Iterator[Report]:
+    """The report after each part of it."""
+    scaling = ScalingRun(studio, effort.step_seconds, quick)
+    parts = len(cases) + sum(len(ladder.steps) for ladder in scaling.ladders()) + 24
+    done = 0
+    for case in cases:
+        progress(f"case {case.name}", done, parts)
+        chosen = contenders(case.effect, quick=quick or case.brief, only=methods)
+        run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared)
+        report = dataclasses.replace(report, cases=(*report.cases, run.measure(chosen)))
+        report = dataclasses.replace(report, claims=check_claims(report.cases, report.hard_cases))
+        studio.renderer.gpu.context.drain()
+        done += 1
+        yield report
+    for name, series in scaling.steps():
+        done += 1
+        progress(f"scaling, {name}", done, parts)
+        report = dataclasses.replace(report, scaling=series)
+        studio.renderer.gpu.context.drain()
+        yield report
+    for found, _ in measure_hard_cases(studio.renderer):
+        done += 1
+        progress(f"hard case {found.id}", done, parts)
+        report = dataclasses.replace(report, hard_cases=(*report.hard_cases, found))
+    yield dataclasses.replace(report, claims=check_claims(report.cases, report.hard_cases))
+
+
+def _cpu_renderer(stack: ExitStack) -> Renderer | None:
+    """A renderer without OpenGL, where Embree can be loaded."""
+    try:
+        return stack.enter_context(Renderer("cpu"))
+    except RenderError:
+        return None

@@ -1,0 +1,200 @@
+"""How cost grows with triangles, pixels, layers and media."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from translucent.bench.drawing import Floor, Planned, Size, Studio
+from translucent.bench.measure import one_line
+from translucent.bench.record import ScalePoint, Series
+from translucent.bench.shapes import lying_torus, plates
+from translucent.bench.timing import Samples, interleaved, ratio, timing
+from translucent.camera import Camera
+from translucent.gpu.targets import Targets
+from translucent.lights import Environment
+from translucent.medium import Medium
+from translucent.scene import Object, Scene
+from translucent.showcase import framing, showcase
+from translucent.slots import MAX_SLOTS
+from translucent.solids import Sphere
+from translucent.thickness import MAX_LAYERS, DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth
+
+Axis = Literal["triangles", "pixels", "layers", "media"]
+
+#: What is measured along all axes, by family.
+METHODS: dict[str, Method] = {
+    "SignedDepth": SignedDepth(),
+    "FragmentLists": FragmentLists(),
+    "KBuffer": KBuffer(k=8),
+    "DepthPeeling": DepthPeeling(max_layers=MAX_LAYERS),
+}
+
+#: Frames that a GPU shows on screens: 1080p and 4K.
+SCREENS: tuple[Size, ...] = ((1920, 1080), (3840, 2160))
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """One axis: what is drawn at each x.
+
+    Attributes
+    ----------
+    axis : str
+    fixed : str
+        What stays the same.
+    steps : mapping of int to callable
+        For each x, what makes the scene and its size.
+    """
+
+    axis: Axis
+    fixed: str
+    steps: Mapping[int, Callable[[], tuple[Scene, Size]]]
+
+
+@dataclass
+class ScalingRun:
+    """All ladders, a step at a time.
+
+    Parameters
+    ----------
+    studio : Studio
+    seconds : float
+        For each step.
+    quick : bool
+        Every second step, none of the largest.
+    """
+
+    studio: Studio
+    seconds: float
+    quick: bool
+    _points: dict[tuple[Axis, str], list[ScalePoint]] = field(default_factory=dict)
+
+    def ladders(self) -> list[Ladder]:
+        """What is to be measured on this machine."""
+        software = "software" in self.studio.renderer.provenance["renderer"]
+        return [ladder for ladder in _ladders(software) for ladder in [_thinned(ladder) if self.quick else ladder]]
+
+    def steps(self) -> Iterator[tuple[str, tuple[Series, ...]]]:
+        """Measure step by step: after each, its name and all series so far."""
+        ladders = self.ladders()
+        for ladder in ladders:
+            for x, make in ladder.steps.items():
+                self._measure(ladder, x, make)
+                yield f"{ladder.axis} {x}", self._series(ladders)
+
+    def _measure(self, ladder: Ladder, x: int, make: Callable[[], tuple[Scene, Size]]) -> None:
+        failures: dict[str, str] = {}
+        found: dict[str, Samples] = {}
+        try:
+            scene, size = make()
+            found = self._timed(scene, size, failures)
+        except Exception as error:  # noqa: BLE001 - a step that cannot be measured leaves the others alone
+            failures = dict.fromkeys(METHODS, one_line(error))
+        floor = [seconds for samples in found.values() for seconds in samples.floor]
+        points = {"depth only": ScalePoint(x, timing(floor), ratio(floor, floor))}
+        for name in METHODS:
+            samples = found.get(name)
+            if samples is None:
+                points[name] = ScalePoint(x, failure=failures.get(name, "not measured"))
+            else:
+                points[name] = ScalePoint(x, timing(samples.wall), ratio(samples.wall, samples.floor))
+        for name, point in points.items():
+            self._points.setdefault((ladder.axis, name), []).append(point)
+
+    def _timed(self, scene: Scene, size: Size, failures: dict[str, str]) -> dict[str, Samples]:
+        targets = Targets(self.studio.gl, size)
+        floor = Floor(self.studio, scene, targets)
+        drawings: dict[str, Planned] = {}
+        try:
+            for name, method in METHODS.items():
+                try:
+                    plan = self.studio.renderer.plan(scene, method)
+                    drawings[name] = Planned(self.studio, scene, targets, plan)
+                except Exception as error:  # noqa: BLE001 - the other methods go on
+                    failures[name] = one_line(error)
+            return interleaved(
+                floor.draw,
+                {name: drawn.draw for name, drawn in drawings.items()},
+                self.seconds,
+                lambda name, error: failures.update({name: one_line(error)}),
+            )
+        finally:
+            for drawn in drawings.values():
+                drawn.release()
+            floor.release()
+            targets.release()
+
+    def _series(self, ladders: list[Ladder]) -> tuple[Series, ...]:
+        fixed = {ladder.axis: ladder.fixed for ladder in ladders}
+        return tuple(
+            Series(axis, name if name == "depth only" else _label(METHODS[name]), name, fixed[axis], tuple(points))
+            for (axis, name), points in self._points.items()
+        )
+
+
+def _label(method: Method) -> str:
+    if isinstance(method, DepthPeeling):
+        return "DepthPeeling, all layers"
+    return f"KBuffer, k = {method.k}" if isinstance(method, KBuffer) else type(method).__name__
+
+
+def _ladders(software: bool) -> list[Ladder]:
+    small, torus = (512, 512), 316
+    pixels = [(n, n) for n in (256, 512, 1024, 2048)] + ([] if software else list(SCREENS))
+    return [
+        Ladder(
+            "triangles",
+            "a torus at 512 x 512",
+            {2 * (n // 2) * n: _torus(n, small) for n in (32, 100, 316, 1000)},
+        ),
+        Ladder(
+            "pixels",
+            "a torus of 100,000 triangles",
+            {width * height: _torus(torus, (width, height)) for width, height in sorted(pixels, key=np.prod)},
+        ),
+        Ladder(
+            "layers", "plates over the whole picture, 256 x 256", {n: _plates(n) for n in (2, 4, 8, 16, 32, 64, 100)}
+        ),
+        Ladder("media", "16 spheres at 512 x 512", {n: _media(n, small) for n in (1, 2, 4, 8, MAX_SLOTS)}),
+    ]
+
+
+def _thinned(ladder: Ladder) -> Ladder:
+    chosen = list(ladder.steps)[: -1 if ladder.axis in ("triangles", "pixels") else None : 2]
+    return dataclasses.replace(ladder, steps={x: ladder.steps[x] for x in chosen})
+
+
+def _torus(segments: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
+    return lambda: (showcase(lying_torus(segments), size=size), size)
+
+
+def _plates(layers: int) -> Callable[[], tuple[Scene, Size]]:
+    size = (256, 256)
+
+    def make() -> tuple[Scene, Size]:
+        camera = Camera.orthographic((0, 0, 2), (0, 0, 0), height=1.0)
+        body = Object(plates(layers), Medium.from_color((0.5, 0.7, 0.9), 1.0))
+        return Scene([body], camera, environment=Environment.constant((1, 1, 1))), size
+
+    return make
+
+
+def _media(count: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
+    """16 balls, and as many media as asked for."""
+
+    def make() -> tuple[Scene, Size]:
+        ball = Sphere(radius=0.6).tessellate(80)
+        media = [Medium(absorption=np.roll((0.2, 0.5, 1.0), i) * (1 + i / count)) for i in range(count)]
+        objects = []
+        for i in range(MAX_SLOTS):
+            place = np.eye(4)
+            place[:3, 3] = (i % 4, i // 4, 0.3 * (i % 3))
+            objects.append(Object(ball, media[i % count], place))
+        return Scene(objects, framing(objects, size)), size
+
+    return make

@@ -1,0 +1,78 @@
+"""Meshes that only measurements need, made here."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.assets import mesh_path
+from translucent.mesh import Mesh, load_mesh
+from translucent.solids import Box, Sphere, Torus
+
+Vertices = npt.NDArray[np.float64]
+Faces = npt.NDArray[np.int32]
+
+
+def subdivided(name: str, triangles: int) -> Mesh:
+    """A mesh of the toolkit with each face cut in four until it has at least this many."""
+    from trimesh.remesh import subdivide
+
+    mesh = load_mesh(mesh_path(name))
+    vertices, faces = mesh.vertices, mesh.faces
+    while len(faces) < triangles:
+        vertices, faces = subdivide(vertices, faces)
+    return Mesh(vertices, faces, name=name)
+
+
+def lying_torus(segments: int, major: float = 1.0, minor: float = 0.35) -> Mesh:
+    """A ring around the y axis: seen from the front, rays go through it twice."""
+    mesh = Torus(major, minor).tessellate(segments)
+    return Mesh(mesh.vertices[:, [1, 2, 0]], mesh.faces, name="torus")
+
+
+def menger_sponge(level: int = 3) -> Mesh:
+    """The surface of a cube with holes in its holes (Menger 1926), on a grid of 3^level cells along each side."""
+    count = 3**level
+    digits = np.array(list(itertools.product(range(count), repeat=3)))
+    solid = np.ones(len(digits), dtype=bool)
+    for power in range(level):
+        # A cell is gone where two of its three coordinates are in the middle third, at any scale.
+        solid &= ((digits // 3**power % 3) == 1).sum(axis=1) < 2
+    cells = np.pad(solid.reshape(count, count, count), 1)
+    quads = []
+    for axis, side in itertools.product(range(3), (0, 1)):
+        here = cells & ~np.roll(cells, -1 if side else 1, axis)
+        corner = np.argwhere(here) - 1
+        corner[:, axis] += side
+        u, v = np.eye(3, dtype=np.int64)[(axis + 1) % 3], np.eye(3, dtype=np.int64)[(axis + 2) % 3]
+        if not side:
+            u, v = v, u
+        quads.append(np.stack([corner, corner + u, corner + u + v, corner + v], axis=1))
+    points, indices = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
+    square = indices.reshape(-1, 4)
+    faces = np.concatenate([square[:, [0, 1, 2]], square[:, [0, 2, 3]]])
+    return Mesh(points / count - 0.5, faces, name="menger sponge")
+
+
+def nested_shells(shells: int = 6, segments: int = 96) -> Mesh:
+    """Hollow balls within each other: every second sphere is wound inwards."""
+    radii = np.linspace(1.0, 0.15, 2 * shells)
+    parts = [Sphere(radius=float(radius)).tessellate(segments) for radius in radii]
+    return joined([(p.vertices, p.faces if i % 2 == 0 else p.faces[:, ::-1]) for i, p in enumerate(parts)], "shells")
+
+
+def plates(layers: int, gap: float = 0.5) -> Mesh:
+    """Square plates one behind the other, along z from 0 to -1: as many surfaces as asked for, an even number."""
+    count = layers // 2
+    pitch = 1.0 / count
+    plate = Box((-0.5, -0.5, -pitch * (1 - gap)), (0.5, 0.5, 0.0)).tessellate()
+    return joined([(plate.vertices - (0, 0, i * pitch), plate.faces) for i in range(count)], "plates")
+
+
+def joined(parts: list[tuple[Vertices, Faces]], name: str) -> Mesh:
+    """One mesh of several, each as vertices and faces."""
+    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    faces = np.concatenate([faces + offset for (_, faces), offset in zip(parts, offsets, strict=True)])
+    return Mesh(np.concatenate([vertices for vertices, _ in parts]), faces, name=name)

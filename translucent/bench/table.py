@@ -1,0 +1,57 @@
+"""A report as aligned text, for terminals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from translucent.bench.record import CaseRecord, Report, Row
+
+_HEAD = (
+    f"{'method':<36}{'ms':>8}{'p95':>8}{'÷ floor':>9}{'±':>6}{'frame':>7}{'passes':>7}{'layers':>7}{'ms/layer':>9}"
+    f"{'RMS':>9}{'p99.9':>9}{'invalid':>9}"
+)
+
+
+def table(report: Report) -> str:
+    """Every row of every case, hard cases and claims."""
+    return "\n".join(_lines(report))
+
+
+def _lines(report: Report) -> Iterator[str]:
+    made = report.provenance
+    yield f"{made.renderer}, {made.processors} processors; {report.seconds:.0f} s of measuring"
+    for case in report.cases:
+        yield ""
+        yield (
+            f"{case.title}: {case.why}; {case.triangles} triangles, {case.layers} layers, "
+            f"{case.size[0]}x{case.size[1]}; errors in {case.quantity}; * on the Pareto frontier"
+        )
+        if case.failure:
+            yield f"  failed: {case.failure}"
+            continue
+        yield _HEAD
+        yield from (_row(case, row) for row in case.rows)
+    if report.hard_cases:
+        yield ""
+        passed = sum(case.passed for case in report.hard_cases)
+        yield f"hard cases: {passed} of {len(report.hard_cases)} hold"
+        yield from (f"  {case.id} {case.title}: {case.result}" for case in report.hard_cases if not case.passed)
+    if report.claims:
+        yield ""
+    for claim in report.claims:
+        state = "not checked" if claim.held is None else "held" if claim.held else "NOT HELD"
+        yield f"{state}: {claim.text}: {claim.measured}"
+
+
+def _row(case: CaseRecord, row: Row) -> str:
+    name = f"{row.method}{' *' if row.pareto else ''}"
+    if row.failure or row.refusal or row.wall is None:
+        return f"{name:<36}{'failed' if row.failure else 'refused'}: {row.failure or row.refusal}"
+    line = f"{name:<36}{row.wall.median:>8.2f}{row.wall.p95:>8.2f}"
+    line += f"{row.ratio.median:>9.2f}{row.ratio.noise:>6.2f}" if row.ratio else f"{'':>15}"
+    line += f"{row.frame_ratio.median:>7.2f}" if row.frame_ratio else f"{'':>7}"
+    line += f"{'' if row.passes is None else row.passes:>7}{'' if row.layers is None else row.layers:>7}"
+    line += f"{row.ms_per_layer:>9.2f}" if row.ms_per_layer is not None else f"{'':>9}"
+    errors = row.errors(case.quantity)
+    line += f"{errors.rms:>9.1e}{errors.p999:>9.1e}" if errors else f"{'':>18}"
+    return line + (f"{row.invalid:>9.2%}" if row.invalid is not None else "")

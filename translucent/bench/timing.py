@@ -1,0 +1,137 @@
+"""Interleaved timing on a machine that others use, too.
+
+All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
+a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
+count either. Slow drawings leave the rounds early, once they have had their share of the time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bench.record import Ratio, Timing
+
+#: Seconds of one drawing, as `translucent.bench.drawing.Drawing.draw` tells them.
+Sample = tuple[float, float, float | None]
+
+#: Rounds that even the slowest takes part in, and that the fastest needs no more than.
+FEWEST, MOST = 3, 60
+
+#: A drawing of so many seconds needs no more rounds than this: its own noise averages out within it.
+FEWEST_LONG, LONG = 2, 0.3
+FEWEST_LONGEST, LONGEST = 1, 2.0
+
+#: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
+FLOOR_SHARE, MOST_FLOORS = 0.15, 6
+
+
+@dataclass
+class Samples:
+    """What the rounds of one drawing have given, in seconds.
+
+    Attributes
+    ----------
+    wall, frame, gpu : list of float
+        As `Sample`.
+    floor : list of float
+        Of the floor around each.
+    """
+
+    wall: list[float] = field(default_factory=list)
+    frame: list[float] = field(default_factory=list)
+    gpu: list[float] = field(default_factory=list)
+    floor: list[float] = field(default_factory=list)
+
+    @property
+    def spent(self) -> float:
+        """Seconds so far."""
+        return sum(self.frame) + sum(self.floor)
+
+
+def interleaved(
+    floor: Callable[[], Sample],
+    drawings: Mapping[str, Callable[[], Sample]],
+    seconds: float,
+    failed: Callable[[str, Exception], None],
+) -> dict[str, Samples]:
+    """Measure all, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
+
+    What raises is left out of the other rounds, and `failed` hears of it.
+    """
+    warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, seconds / 8, failed, len(drawings))}
+    for _ in range(5):
+        floor()
+    found = {name: Samples() for name in warmed}
+    share = 0.85 * seconds / max(len(warmed), 1)
+    typical = float(np.median([floor()[0] for _ in range(5)]))
+    while running := [name for name in warmed if not _enough(found[name], share)]:
+        before = _floor(floor, typical, 0.0)
+        for name in running:
+            try:
+                sample = warmed[name]()
+            except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row, and the others go on
+                failed(name, error)
+                del warmed[name], found[name]
+                continue
+            after = _floor(floor, typical, sample[0])
+            samples = found[name]
+            samples.wall.append(sample[0])
+            samples.frame.append(sample[1])
+            samples.floor.append(0.5 * (before + after))
+            if sample[2] is not None:
+                samples.gpu.append(sample[2])
+            before = after
+    return found
+
+
+def _warm_up(
+    name: str, draw: Callable[[], Sample], seconds: float, failed: Callable[[str, Exception], None], count: int
+) -> bool:
+    """Draw for its share of the time, at least once: shaders compile, buffers grow, caches fill."""
+    begin = time.perf_counter()
+    try:
+        draw()
+        while time.perf_counter() - begin < seconds / count:
+            draw()
+    except Exception as error:  # noqa: BLE001 - as above
+        failed(name, error)
+        return False
+    return True
+
+
+def _floor(floor: Callable[[], Sample], typical: float, beside: float) -> float:
+    """Median of a few draws of the floor: the longer what is beside it takes, the more."""
+    count = int(np.clip(round(FLOOR_SHARE * beside / typical), 1, MOST_FLOORS))
+    return float(np.median([floor()[0] for _ in range(count)]))
+
+
+def _enough(samples: Samples, share: float) -> bool:
+    rounds = len(samples.wall)
+    first = samples.frame[0] if rounds else 0.0
+    fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > LONG else FEWEST
+    return rounds >= MOST or (rounds >= fewest and samples.spent >= share)
+
+
+def timing(seconds: list[float]) -> Timing | None:
+    """Statistics in milliseconds; None of nothing."""
+    if not seconds:
+        return None
+    low, median, high, p95 = np.quantile(np.array(seconds) * 1e3, (0.25, 0.5, 0.75, 0.95))
+    return Timing(float(median), float(p95), float(high - low), len(seconds))
+
+
+def ratio(seconds: list[float], floor: list[float]) -> Ratio | None:
+    """Statistics of the quotients of rounds."""
+    if not seconds:
+        return None
+    quotients: npt.NDArray[np.float64] = np.array(seconds) / np.array(floor)
+    low, median, high = np.quantile(quotients, (0.25, 0.5, 0.75))
+    # The quartiles of a normal distribution are 1.349 standard deviations apart; the median of n samples has a
+    # standard error of sqrt(pi / 2) = 1.253 standard deviations over sqrt(n).
+    noise = 1.253 * (high - low) / 1.349 / np.sqrt(len(quotients))
+    return Ratio(float(median), float(high - low), float(noise))

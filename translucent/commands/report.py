@@ -1,0 +1,189 @@
+"""``translucent report``: speed against error of every method, as a page, a table and a record."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from translucent.commands.common import common_options, read_size, unit_option
+from translucent.commands.model import read_scene, require_translucent
+from translucent.errors import InputError, RenderError
+
+if TYPE_CHECKING:
+    from translucent.bench.record import CaseRecord, Report
+
+PATH = click.Path(path_type=Path)
+
+
+@click.command(epilog="Example: translucent report model.stl --unit mm -o out/report --quick")
+@click.argument("models", nargs=-1, metavar="[MODEL...]")
+@click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for report.html, .svg, .json and .csv.")
+@click.option("--quick", is_flag=True, help="Under a minute: fewer scenes, methods, pixels and repetitions.")
+@click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
+@click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
+@click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
+@click.option("--compare", "old", type=PATH, metavar="JSON", help="Tell what got slower or less accurate since this.")
+@unit_option
+@click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
+@common_options
+def report(
+    models: tuple[str, ...],
+    output: Path | None,
+    quick: bool,
+    size: str | None,
+    methods: str | None,
+    source: Path | None,
+    old: Path | None,
+    unit: str,
+    backend: str | None,
+    as_json: bool,
+) -> None:
+    """Measure what each method costs and how wrong it is, on the toolkit's scenes and on each MODEL.
+
+    A MODEL is a file, or a mesh of the toolkit by name. Interrupted with Ctrl-C, the finished scenes are written.
+    Without -o and --compare, all numbers are printed, and nothing is kept.
+    """
+    from translucent.bench.comparison import compare_reports, machines_differ
+    from translucent.bench.files import read_report
+    from translucent.bench.output import check_folder, write_outputs
+    from translucent.bench.table import table
+
+    if source is not None and (models or quick or size or methods or backend):
+        raise InputError(
+            f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
+        )
+    before = None if old is None else read_report(old)
+    made = None if source is None else read_report(source)
+    if output is not None:
+        check_folder(output)
+    if made is None:
+        made = _measured(models, output, quick, size, methods, unit, backend)
+    files = [] if output is None else write_outputs(made, output)
+    changes = None if before is None else compare_reports(before, made)
+    if before is not None and (difference := machines_differ(before, made)) is not None:
+        click.echo(f"warning: times of two machines are compared: {difference}", err=True)
+    if as_json:
+        click.echo(json.dumps(_summary(made, files, changes)))
+    else:
+        _tell(made, files, changes)
+    if output is None and old is None and not as_json:
+        click.echo(table(made))
+    if not made.complete and source is None:
+        raise click.exceptions.Abort
+    if made.failures:
+        raise RenderError(
+            f"report: {len(made.failures)} of its measurements", f"they failed: {'; '.join(made.failures)}", "see above"
+        )
+
+
+def _measured(
+    models: tuple[str, ...],
+    output: Path | None,
+    quick: bool,
+    size: str | None,
+    methods: str | None,
+    unit: str,
+    backend: str | None,
+) -> Report:
+    """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
+    from translucent.bench.files import write_report
+    from translucent.bench.models import model_cases
+    from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
+
+    pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
+    scenes = {model: read_scene(model, unit, None, size=pixels) for model in models}
+    for model, scene in scenes.items():
+        require_translucent(model, scene)
+
+    def keep(part: Report) -> None:
+        if output is not None:
+            write_report(part, output / "report.json")
+
+    with click.progressbar(length=1, file=sys.stderr, item_show_func=str) as bar:
+
+        def progress(what: str, done: int, parts: int) -> None:
+            bar.length = parts
+            bar.update(done - bar.pos, what)
+
+        return measure_all(
+            model_cases(scenes),
+            size=pixels,
+            methods=[] if methods is None else [name.strip() for name in methods.split(",")],
+            quick=quick,
+            backend=backend,
+            command=_command(click.get_current_context().params),
+            progress=progress,
+            keep=keep,
+        )
+
+
+def _command(given: dict[str, Any]) -> str:
+    """What the user wrote, as far as it says what was measured."""
+    words = ["translucent", "report", *given["models"]]
+    options = {"-o": "output", "--size": "size", "--methods": "methods", "--backend": "backend"}
+    for option, name in options.items():
+        words += [option, str(given[name])] if given[name] is not None else []
+    words += ["--unit", given["unit"]] if given["unit"] != "m" else []
+    return shlex.join([*words, "--quick"] if given["quick"] else words)
+
+
+def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
+    """What happened, in numbers that JSON can hold; ``report.json`` has all of it."""
+    import dataclasses
+
+    return {
+        "files": [str(path) for path in files],
+        "complete": made.complete,
+        "seconds": made.seconds,
+        "answers": [_answer(case) for case in made.cases],
+        "hard_cases": {case.id: case.passed for case in made.hard_cases},
+        "claims": {claim.text: claim.held for claim in made.claims},
+        "failures": list(made.failures),
+        "changes": None if changes is None else [dataclasses.asdict(change) for change in changes],
+    }
+
+
+def _answer(case: CaseRecord) -> dict[str, Any]:
+    from translucent.bench.frontier import error_of
+    from translucent.bench.page.advice import advise
+
+    advice = advise(case)
+    if advice is None or advice.row.ratio is None:
+        return {"case": case.name, "method": None}
+    return {
+        "case": case.name,
+        "method": advice.row.method,
+        "ratio": advice.row.ratio.median,
+        "quantity": case.quantity,
+        "rms_error": error_of(advice.row, case.quantity),
+        "good_enough": advice.good_enough,
+    }
+
+
+def _tell(made: Report, files: list[Path], changes: Any) -> None:
+    click.echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
+    click.echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10}")
+    for answer in map(_answer, made.cases):
+        if answer["method"] is None:
+            click.echo(f"{answer['case']:<20} -")
+            continue
+        mark = "" if answer["good_enough"] else "  (not good enough, the most accurate)"
+        ratio, error = answer["ratio"], answer["rms_error"]
+        click.echo(
+            f"{answer['case']:<20} {answer['method']:<30} {ratio:>8.2f} {error:>10.1e} {answer['quantity']}{mark}"
+        )
+    for claim in made.claims:
+        if claim.held is False:
+            click.echo(f"does not hold: {claim.text}; {claim.measured}")
+    if changes is not None:
+        for change in changes:
+            click.echo(str(change))
+        if not changes:
+            click.echo("nothing got slower or less accurate, beyond noise")
+    for path in files:
+        click.echo(str(path))

@@ -1,0 +1,140 @@
+"""Shortcuts that others take, drawn and timed like the methods that they are compared with; in no plan."""
+
+from __future__ import annotations
+
+from typing import Protocol
+from weakref import WeakKeyDictionary
+
+import moderngl
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
+from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import set_uniform
+from translucent.gpu.targets import Targets
+from translucent.render_plan import PassSpec
+
+
+class Shortcut(Protocol):
+    """A way to fill the accumulator that no plan takes."""
+
+    with_depth: bool  # how the job has to be placed
+
+    def run(self, job: FrameJob) -> None:
+        """Draw the bodies."""
+
+    def hand_over(self, job: FrameJob) -> None:
+        """Put the result where the shading looks for it, if it is elsewhere."""
+
+
+class NearestFacePass:
+    """The nearest face alone: a constant thickness, or that of a ball; see ``shaders/thickness/nearest_face.frag``.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    sphere : bool
+        The thickness is `size` times n.v; else `size` everywhere.
+    size : float
+        In metres.
+    """
+
+    with_depth = True
+
+    def __init__(self, gl: moderngl.Context, *, sphere: bool, size: float) -> None:
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/nearest_face.frag")
+        self._with_depth: WeakKeyDictionary[Targets, dict[bool, moderngl.Framebuffer]] = WeakKeyDictionary()
+        self._sphere = sphere
+        self._size = size
+
+    def run(self, job: FrameJob) -> None:
+        """Draw the bodies: where several are, the nearest hides the others, as in viewers of glTF."""
+        framebuffer = self._framebuffer(job)
+        framebuffer.use()
+        framebuffer.clear(depth=1.0)
+        job.gl.enable_only(moderngl.DEPTH_TEST)
+        program = self._variants.program(
+            WITH_NORMAL=self._sphere, WITH_POSITION=0, SPHERE=self._sphere, SPECTRAL=job.plan.spectral
+        )
+        set_uniform(program, "size", self._size)
+        job.draw(program, _bodies(job))
+        job.gl.enable_only(moderngl.NOTHING)
+
+    def hand_over(self, job: FrameJob) -> None:
+        """Nothing to do: the result is in the accumulator."""
+
+    def _framebuffer(self, job: FrameJob) -> moderngl.Framebuffer:
+        """The accumulator with a depth buffer."""
+        made = self._with_depth.setdefault(job.targets, {})
+        if job.plan.spectral not in made:
+            depth = job.gl.depth_renderbuffer(job.targets.size)
+            made[job.plan.spectral] = job.gl.framebuffer(job.accumulator().color_attachments, depth)
+        return made[job.plan.spectral]
+
+
+class UnmarkedBackFacePass:
+    """Farthest back face minus nearest front face, and no word of the pixels where there is a gap between them."""
+
+    with_depth = False
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._pass = BackFaceDepthPass(gl)
+
+    def run(self, job: FrameJob) -> None:
+        """Draw the bodies."""
+        self._pass.run(job, PassSpec("back_face_depth", "for comparison", _bodies(job), 2))
+
+    def hand_over(self, job: FrameJob) -> None:
+        """Wipe the count of entries and exits, where the method keeps its doubts."""
+        framebuffer = job.accumulator()
+        framebuffer.use()
+        framebuffer.color_mask = (False, True, False, False)
+        framebuffer.clear()
+        framebuffer.color_mask = (True, True, True, True)
+
+
+class HalfFloatPass:
+    """Signed depth into a target of float16, which takes half the memory and has 11 bits."""
+
+    with_depth = False
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_place=0)
+        self._halves: WeakKeyDictionary[Targets, dict[bool, list[moderngl.Framebuffer]]] = WeakKeyDictionary()
+        self._wholes: WeakKeyDictionary[Targets, dict[bool, list[moderngl.Framebuffer]]] = WeakKeyDictionary()
+
+    def run(self, job: FrameJob) -> None:
+        """Draw the bodies."""
+        half = self._half(job)[0]
+        half.use()
+        half.clear()
+        gl = job.gl
+        gl.enable_only(moderngl.BLEND)
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        job.draw(
+            self._variants.program(WITH_NORMAL=0, WITH_POSITION=0, SPECTRAL=job.plan.spectral, OPAQUE=0), _bodies(job)
+        )
+        gl.enable_only(moderngl.NOTHING)
+
+    def hand_over(self, job: FrameJob) -> None:
+        """Copy into the accumulator."""
+        whole = self._wholes.setdefault(job.targets, {})
+        if job.plan.spectral not in whole:
+            parts = job.accumulator().color_attachments
+            whole[job.plan.spectral] = [job.gl.framebuffer([part]) for part in parts]
+        for source, target in zip(self._half(job)[1:], whole[job.plan.spectral], strict=True):
+            job.gl.copy_framebuffer(target, source)
+
+    def _half(self, job: FrameJob) -> list[moderngl.Framebuffer]:
+        """All attachments in one framebuffer, and each in one of its own."""
+        made = self._halves.setdefault(job.targets, {})
+        if job.plan.spectral not in made:
+            components = (4, 1) if job.plan.spectral else (2,)
+            parts = [job.gl.texture(job.targets.size, count, dtype="f2") for count in components]
+            made[job.plan.spectral] = [job.gl.framebuffer(parts), *(job.gl.framebuffer([part]) for part in parts)]
+        return made[job.plan.spectral]
+
+
+def _bodies(job: FrameJob) -> tuple[int, ...]:
+    return tuple(i for i, item in enumerate(job.scene.objects) if item.medium is not None)
