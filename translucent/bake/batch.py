@@ -131,10 +131,10 @@ def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
 
 
 def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
-    from translucent import __version__
+    from importlib.metadata import version
 
     # An executor has its own idea of how many run at a time on a machine.
-    futures = {executor.submit(run_job, {"threads": 1, **job}, __version__): job for job in jobs}
+    futures = {executor.submit(run_job, {"threads": 1, **job}, version("translucent-shading")): job for job in jobs}
     try:
         for future in as_completed(futures):
             job = futures[future]
@@ -156,12 +156,12 @@ def run_job(job: Job, version: str | None = None) -> Record:
 
     A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
     """
-    from translucent import __version__
+    from importlib.metadata import version
 
     started = time.perf_counter()
-    if version not in (None, __version__):
+    if version not in (None, version("translucent-shading")):
         return _entry(
-            job, "failed", 0.0, error=f"its worker has version {__version__}, and not {version}; install that"
+            job, "failed", 0.0, error=f"its worker has version {version("translucent-shading")}, and not {version}; install that"
         )
     try:
         content = content_hash(job)

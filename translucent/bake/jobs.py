@@ -26,6 +26,7 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -117,11 +118,9 @@ def content_hash(job: Job) -> str:
     InputError
         If a file cannot be read.
     """
-    from translucent import __version__
-
     meant = {key: value for key, value in job.items() if key not in _HOW}
     meant["suffix"] = Path(job["output"]).suffix.lower()
-    digest = hashlib.sha256(json.dumps([__version__, meant], sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps([version("translucent-shading"), meant], sort_keys=True).encode())
     for key in ("model", "high", "cage"):
         if job.get(key) is not None:
             for data in _parts(Path(job[key])):

@@ -14,7 +14,8 @@ from translucent.bench.contenders import Effect
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, subdivided
 from translucent.camera import Camera
 from translucent.density import DensityGrid
-from translucent.lights import DirectionalLight, Environment, PointLight
+from translucent.environment import Environment
+from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.scene import Object, Scene

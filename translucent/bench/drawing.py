@@ -8,11 +8,11 @@ from typing import Protocol
 
 from translucent import reference
 from translucent.frame import Frame
-from translucent.gpu.buffers import MeshCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.depth_only import DepthOnlyPass
 from translucent.gpu.passes.shortcuts import Shortcut
+from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.render_plan import PassSpec, RenderPlan
@@ -46,7 +46,7 @@ class Studio:
     def __init__(self, renderer: Renderer) -> None:
         self.renderer = renderer
         self.gl = renderer.gpu.context.gl
-        self.meshes = MeshCache(self.gl)
+        self.resources = Resources(self.gl)
         self.timer = PassTimer(self.gl)
         self._passes: dict[type[Pass], Pass] = {}
 
@@ -72,7 +72,7 @@ class Studio:
 
     def release(self) -> None:
         """Free everything."""
-        self.meshes.release()
+        self.resources.release()
         self._passes.clear()
 
 
@@ -84,7 +84,7 @@ class Floor:
     def __init__(self, studio: Studio, scene: Scene, targets: Targets) -> None:
         plan = RenderPlan(SignedDepth(), ())
         self._studio = studio
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.meshes)
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
         self._pass = DepthOnlyPass(studio.gl)
 
     def draw(self) -> tuple[float, float, float | None]:
@@ -112,7 +112,7 @@ class Planned:
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
         self._studio = studio
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.meshes)
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
         self._geometry = [spec for spec in plan.passes if spec.geometry_passes]
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
 
@@ -155,7 +155,7 @@ class Short:
         self._studio = studio
         shading = tuple(spec for spec in plan.passes if spec.name == "transmittance")
         plan = RenderPlan(SignedDepth(), shading, plan.spectral)
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.meshes)
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
         self._shortcut = shortcut
 
     def draw(self) -> tuple[float, float, float | None]:

@@ -11,7 +11,8 @@ from translucent import optics, reference
 from translucent.bench.hard_cases import SIZE, Checks, Hard
 from translucent.camera import Camera
 from translucent.density import DensityGrid
-from translucent.lights import Environment, PointLight
+from translucent.environment import Environment
+from translucent.lights import PointLight
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.scene import Object, Scene

@@ -15,8 +15,8 @@ from translucent.bench.record import ScalePoint, Series
 from translucent.bench.shapes import lying_torus, plates
 from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.camera import Camera
+from translucent.environment import Environment
 from translucent.gpu.targets import Targets
-from translucent.lights import Environment
 from translucent.medium import Medium
 from translucent.scene import Object, Scene
 from translucent.showcase import framing, showcase

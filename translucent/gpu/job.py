@@ -9,14 +9,12 @@ import numpy as np
 
 from translucent.backdrop import Backdrop
 from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.buffers import MeshCache
-from translucent.gpu.densities import GridTexture, density_uniforms, scene_grids
-from translucent.gpu.environment_maps import EnvironmentMaps
+from translucent.gpu.densities import density_uniforms, scene_grids
 from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
 from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import AxialRange, Placement, depth_range
+from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
-from translucent.gpu.textures import TextureCache
 from translucent.gpu.uniforms import (
     BodyRole,
     LightViews,
@@ -55,7 +53,7 @@ class FrameJob:
 
     Parameters
     ----------
-    gl, scene, plan, targets, meshes, grids, environments, textures
+    gl, scene, plan, targets, resources
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
     """
@@ -66,20 +64,14 @@ class FrameJob:
         scene: Scene,
         plan: RenderPlan,
         targets: Targets,
-        meshes: MeshCache,
-        grids: GridTexture,
-        environments: EnvironmentMaps,
-        textures: TextureCache,
+        resources: Resources,
         backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> None:
         self.gl = gl
         self.scene = scene
         self.plan = plan
         self.targets = targets
-        self.meshes = meshes
-        self.grids = grids
-        self.environments = environments
-        self.textures = textures
+        self.resources = resources
         self.backdrop = backdrop
         self.averaging = False
         self.light_views: LightViews | None = None
@@ -213,7 +205,7 @@ class FrameJob:
     def bind_grids(self, unit: int) -> None:
         """Give the density grids to the shader that reads texture `unit`, if a density varies."""
         if self.scene.varies:
-            self.grids.use(unit, scene_grids(self.scene, self.slots))
+            self.resources.grids.use(unit, scene_grids(self.scene, self.slots))
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state; front faces are those where a ray enters."""
@@ -221,7 +213,7 @@ class FrameJob:
             body = self.scene.objects[i]
             self._bodies.bind_to_uniform_block(BODY.binding, offset=i * self._stride, size=BODY.dtype.itemsize)
             self.gl.front_face = "cw" if body.faces_inwards else "ccw"
-            self.meshes[body.mesh].vertex_array(program, body.mesh).render()
+            self.resources.meshes[body.mesh].vertex_array(program, body.mesh).render()
         self.gl.front_face = "ccw"
 
     def release(self) -> None:

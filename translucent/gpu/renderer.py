@@ -13,15 +13,12 @@ from translucent.backdrop import Backdrop
 from translucent.errors import RenderError
 from translucent.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.buffers import MeshCache
 from translucent.gpu.context import GpuContext, adopt_context, open_context
-from translucent.gpu.densities import GridTexture
-from translucent.gpu.environment_maps import EnvironmentMaps
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
+from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
-from translucent.gpu.textures import TextureCache
 from translucent.gpu.timer import PassTimer
 from translucent.render_plan import Capabilities, RenderPlan
 from translucent.sampling import sample_shifts
@@ -57,10 +54,7 @@ class GpuRenderer:
 
     def __init__(self, backend: str | None = None, context: moderngl.Context | None = None) -> None:
         self.context: GpuContext = open_context(backend) if context is None else adopt_context(context)
-        self._meshes = MeshCache(self.context.gl)
-        self._grids = GridTexture(self.context.gl)
-        self._environments = EnvironmentMaps(self.context.gl)
-        self._textures = TextureCache(self.context.gl)
+        self._resources = Resources(self.context.gl)
         with self.context.current():
             self._timer = PassTimer(self.context.gl)
         self._targets: Targets | None = None
@@ -131,9 +125,8 @@ class GpuRenderer:
                 self._targets.release()
                 self._targets = None
             self._targets = Targets(self.context.gl, size)
-        shared = self._meshes, self._grids, self._environments, self._textures
         scene = scene.with_ambient_emitted
-        return FrameJob(self.context.gl, scene, plan, self._targets, *shared, backdrop)
+        return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
@@ -185,10 +178,7 @@ class GpuRenderer:
             return
         self._closed = True
         with self.context.current():
-            self._meshes.release()
-            self._grids.release()
-            self._environments.release()
-            self._textures.release()
+            self._resources.release()
             if self._targets is not None:
                 self._targets.release()
             self._passes.clear()

@@ -56,6 +56,6 @@ class InterfacesPass:
 
     def _set_finish(self, job: FrameJob, program: moderngl.Program, body: Object) -> None:
         surface = body.surface or Surface()
-        job.textures.bind(surface, program, _FIRST_TEXTURE)
+        job.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
         set_uniform(program, "surface_roughness", surface.roughness)

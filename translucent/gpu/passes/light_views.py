@@ -93,8 +93,7 @@ class LightViewsPass:
         if side not in self._targets:
             self._targets[side] = Targets(self._gl, (side, side))
         scenes = [replace(job.scene, camera=camera) for camera in cameras]
-        shared = job.meshes, job.grids, job.environments, job.textures
-        return [FrameJob(job.gl, scene, job.plan, self._targets[side], *shared) for scene in scenes]
+        return [FrameJob(job.gl, scene, job.plan, self._targets[side], job.resources) for scene in scenes]
 
     def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> bool:
         """Make all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""

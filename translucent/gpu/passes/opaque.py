@@ -36,7 +36,7 @@ class OpaquePass:
         environment = job.scene.environment
         light_map = environment.kind == "image"
         if light_map:
-            job.environments.light(environment).irradiance.use(_UNITS["light_irradiance"])
+            job.resources.environments.light(environment).irradiance.use(_UNITS["light_irradiance"])
         for i in spec.objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, LIGHT_MAP=light_map)
@@ -51,13 +51,13 @@ class OpaquePass:
         if self._reflectance is None:
             self._reflectance = reflectance_table(job.gl)
         environment = job.scene.environment
-        maps = job.environments.light(environment)
-        textures = maps.irradiance, job.environments.sharp(environment), maps.levels, self._reflectance
+        maps = job.resources.environments.light(environment)
+        textures = maps.irradiance, job.resources.environments.sharp(environment), maps.levels, self._reflectance
         for unit, texture in enumerate(textures):
             texture.use(unit)
 
     def _set_finish(self, job: FrameJob, program: moderngl.Program, surface: Surface) -> None:
-        job.textures.bind(surface, program, _FIRST_TEXTURE)
+        job.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         finish = surface.metallic, surface.roughness, surface.ior, surface.alpha_cutoff
         set_uniform(program, "opaque_finish", finish)

@@ -60,14 +60,20 @@ class SurfacesPass:
                 radiance.repeat_x = radiance.repeat_y = False
             place.use(_SAMPLERS.index("opaque_place"))
             radiance.use(_SAMPLERS.index("opaque_radiance"))
-        maps = job.environments.light(environment)
+        maps = job.resources.environments.light(environment)
         table = surface_table(job.scene, job.sheets)
         finishes = gl.texture(table.shape[1::-1], 4, table, dtype="f4")
-        rest = (finishes, self._reflectance, job.environments.sharp(environment), maps.levels, maps.irradiance)
+        rest = (
+            finishes,
+            self._reflectance,
+            job.resources.environments.sharp(environment),
+            maps.levels,
+            maps.irradiance,
+        )
         for unit, item in enumerate(rest, _SAMPLERS.index("surface_table")):
             item.use(unit)
         if seen_map:
-            job.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
+            job.resources.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
         program = self._variants.program(
             OPAQUE=job.has_opaque, SEEN_MAP=seen_map, SEEN_LIGHTS=seen_lights, SINGLE_SCATTERING=job.scatters
         )

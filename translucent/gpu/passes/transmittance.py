@@ -43,7 +43,7 @@ class TransmittancePass:
         seen = job.scene.environment.seen
         seen_map = seen.kind == "image" and not job.has_surfaces
         if seen_map:
-            job.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
+            job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
         if job.averaging and not job.has_surfaces:
             job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
