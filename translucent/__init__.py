@@ -135,9 +135,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from importlib.metadata import version
+        from translucent.version import VERSION
 
-        return version("translucent-shading")
+        return VERSION
     # The values need no OpenGL, so importing them does not load it.
     if name == "Renderer":
         from translucent.renderer import Renderer

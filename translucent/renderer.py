@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings
-from importlib.metadata import version
 from types import TracebackType
 from typing import TYPE_CHECKING, get_args
 from weakref import WeakKeyDictionary
@@ -25,6 +24,7 @@ from translucent.plan_limits import LIGHTS_LEFT_OUT
 from translucent.render_plan import RenderPlan
 from translucent.scene import Scene
 from translucent.thickness import Method
+from translucent.version import VERSION
 
 if TYPE_CHECKING:
     import moderngl
@@ -92,7 +92,7 @@ class Renderer:
             **self._engine.provenance,
             "numpy": np.__version__,
             "python": sys.version.split()[0],
-            "translucent": version("translucent-shading"),
+            "translucent": VERSION,
         }
 
     def plan(self, scene: Scene, method: Method | None = None, *, over_backdrop: bool = False) -> RenderPlan:

@@ -14,6 +14,7 @@ from translucent.bake.local_pool import in_processes
 from translucent.bake.record import Record
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
+from translucent.version import VERSION
 
 Status = Literal["baked", "skipped", "failed"]
 
@@ -131,10 +132,8 @@ def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
 
 
 def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
-    from importlib.metadata import version
-
     # An executor has its own idea of how many run at a time on a machine.
-    futures = {executor.submit(run_job, {"threads": 1, **job}, version("translucent-shading")): job for job in jobs}
+    futures = {executor.submit(run_job, {"threads": 1, **job}, VERSION): job for job in jobs}
     try:
         for future in as_completed(futures):
             job = futures[future]
@@ -156,13 +155,9 @@ def run_job(job: Job, version: str | None = None) -> Record:
 
     A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
     """
-    from importlib.metadata import version
-
     started = time.perf_counter()
-    if version not in (None, version("translucent-shading")):
-        return _entry(
-            job, "failed", 0.0, error=f"its worker has version {version("translucent-shading")}, and not {version}; install that"
-        )
+    if version not in (None, VERSION):
+        return _entry(job, "failed", 0.0, error=f"its worker has version {VERSION}, and not {version}; install that")
     try:
         content = content_hash(job)
         if is_done(job, content):

@@ -26,7 +26,6 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +37,7 @@ from translucent.gltf.load import SUFFIXES
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
 from translucent.units import metres_per_unit
+from translucent.version import VERSION
 
 Job = dict[str, Any]
 #: Gets the share that is done, 0..1, and the rays traced so far.
@@ -120,7 +120,7 @@ def content_hash(job: Job) -> str:
     """
     meant = {key: value for key, value in job.items() if key not in _HOW}
     meant["suffix"] = Path(job["output"]).suffix.lower()
-    digest = hashlib.sha256(json.dumps([version("translucent-shading"), meant], sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps([VERSION, meant], sort_keys=True).encode())
     for key in ("model", "high", "cage"):
         if job.get(key) is not None:
             for data in _parts(Path(job[key])):
