@@ -118,7 +118,7 @@ def test_whatever_changes_is_baked_again(what: str, make_jobs: Any, monkeypatch:
     elif what == "medium":
         job = {**job, "medium": [1.0, 2.0, 3.0]}
     else:
-        monkeypatch.setattr(tl, "__version__", "999", raising=False)
+        monkeypatch.setattr("translucent.bake.jobs.VERSION", "999")
     assert run_job(job)["status"] == "baked"
     assert run_job(job)["status"] == "skipped"
 
