@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.bake.inscribed import InscribedSpheres
 from translucent.bake.measure import Measure
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Surface
@@ -133,8 +132,7 @@ def test_inscribed_spheres_agree_with_trimesh(assets: Path) -> None:
     theirs = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     with np.errstate(all="ignore"):
         expected = trimesh.proximity.thickness(theirs, position, normals=surface.planes[face, :3], method="max_sphere")
-    exits = np.full(len(face), 1.0 / surface.radius)
-    found = InscribedSpheres(surface).diameters(surface.points(face, weights), exits) * surface.radius
+    found = Measure.of(surface, BakeSettings(mode="inscribed")).at(surface.points(face, weights)).values
     # Theirs stops shrinking at 1e-6 of the scale; ours starts off the edges of the face.
     assert np.allclose(found, expected, rtol=1e-4, atol=1e-4)
 
