@@ -7,8 +7,8 @@ surface is inside:
 
 Rays give a first radius: where one along w ends at the distance d, 2 r <= d / cos(theta). From there the ball shrinks
 (Ma, Bae and Choi 2012): the point of the surface that is nearest to the center gives the next radius, until none is
-inside. It ends, too, where that point is seen from the center less than the crease angle away from p: then it belongs to
-the smooth surface around p, each edge of whose tessellation would otherwise end the ball.
+inside. It ends, too, where that point is seen from the center less than the crease angle away from p: then it belongs
+to the smooth surface around p, each edge of whose tessellation would otherwise end the ball.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class InscribedSpheres:
             shrinks = smaller < radius[live] * (1.0 - AT_REST)
             radius[live] = smaller
             live = live[shrinks]
-        return 2.0 * radius
+        return np.asarray(2.0 * radius)
 
     def _shrunk(self, point: Array, normal: Array, radius: Array) -> Array:
         """(k,): radii with which the balls touch what of the surface is found in them; as before where nothing is."""
