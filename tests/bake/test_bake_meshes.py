@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.bake.inscribed import InscribedSpheres
 from translucent.bake.measure import Measure
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Surface
-from translucent.solids import Box, Sphere
+from translucent.solids import Box, Ellipsoid, Sphere
 
 
 def test_vertices_of_a_sphere() -> None:
@@ -25,6 +24,12 @@ def test_vertices_of_a_sphere() -> None:
 def test_vertices_of_a_box_have_the_mean_of_its_sides() -> None:
     found = tl.bake_vertex_thickness(Box((0, 0, 0), (1.0, 2.0, 4.0)).tessellate(), "normal")
     assert np.allclose(found.values, (1.0 + 2.0 + 4.0) / 3, rtol=1e-6)
+
+
+def test_a_vertex_shows_itself_and_not_its_surroundings() -> None:
+    """The tip of a long ellipsoid: the normals of its next ring already lead out through the side."""
+    tip = tl.bake_vertex_thickness(Ellipsoid(radii=(1.0, 1.0, 8.0)).tessellate(32), "normal").values.max()
+    assert np.isclose(tip, 16.0, rtol=0.01)
 
 
 def test_vertices_at_one_position_are_equal_and_unused_ones_are_zero() -> None:
@@ -127,8 +132,7 @@ def test_inscribed_spheres_agree_with_trimesh(assets: Path) -> None:
     theirs = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     with np.errstate(all="ignore"):
         expected = trimesh.proximity.thickness(theirs, position, normals=surface.planes[face, :3], method="max_sphere")
-    exits = np.full(len(face), 1.0 / surface.radius)
-    found = InscribedSpheres(surface).diameters(surface.points(face, weights), exits) * surface.radius
+    found = Measure.of(surface, BakeSettings(mode="inscribed")).at(surface.points(face, weights)).values
     # Theirs stops shrinking at 1e-6 of the scale; ours starts off the edges of the face.
     assert np.allclose(found, expected, rtol=1e-4, atol=1e-4)
 

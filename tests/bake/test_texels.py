@@ -10,6 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.bake.padding import pad
+from translucent.bake.surface import Surface
 from translucent.bake.texels import Atlas
 from translucent.solids import Box, Sphere
 
@@ -68,6 +69,15 @@ def test_a_texel_shows_its_center_or_the_nearest_point() -> None:
     # Across the long edge, straight.
     assert np.allclose(away[:, 0], away[:, 1])
     assert outside.any()
+
+
+def test_the_face_that_has_the_center_shows_in_the_texel() -> None:
+    """Whatever its number: the first face only touches the texel in the middle."""
+    sliver, owner = [[0.0, 0.0], [0.4, 0.0], [0.4, 0.4]], [[0.41, 0.3], [0.9, 0.3], [0.6, 0.9]]
+    texels = atlas([sliver, owner], 3).strip(1, 2)
+    middle = texels.column == 1
+    assert texels.face[middle].tolist() == [1]
+    assert texels.inside[middle].all()
 
 
 def test_the_first_row_is_the_top() -> None:
@@ -223,6 +233,24 @@ def test_seams_of_a_sphere(size: int) -> None:
     jump, error = seam_jumps(tl.bake_thickness(Sphere(radius=0.05).tessellate(64), size))
     assert len(jump) > 500
     assert (jump <= 3.0 * error).all()
+
+
+def test_both_sides_of_a_smooth_edge_have_the_same_points_and_normals() -> None:
+    """Each corner of a ball, from all its faces; the normal of none of these."""
+    solid = Sphere().tessellate(16)
+    surface = Surface.of(solid)
+    count = len(surface.faces)
+    points = surface.points(np.repeat(np.arange(count), 3), np.tile(np.eye(3), (count, 1)))
+    index = solid.faces.ravel()
+    first = np.unique(index, return_index=True)[1]
+    assert np.array_equal(points.exact, points.exact[first][index])
+    assert np.allclose(points.normal, points.normal[first][index], atol=1e-12)
+    outwards = points.exact / np.linalg.norm(points.exact, axis=1, keepdims=True)
+    # Faces tilt by a 16th of pi from one to the next; their mean is off by a fraction of that, most beside the poles.
+    assert np.allclose(points.normal, outwards, atol=np.pi / 16 / 4)
+    # A box keeps its edges.
+    box = Surface.of(Box().tessellate())
+    assert np.allclose(box.normals, box.planes[:, None, :3])
 
 
 def test_seams_of_the_normal_mode() -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.bake.normals import CREASE
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
 
@@ -23,6 +24,10 @@ MOST_MULTIPLE, MOST_ADDED = 64, 8192
 
 #: Binary digits of the points: what float32 holds.
 DIGITS = 24
+
+#: A sphere that touches the surface where a ray along w has its exit is seen from its center under pi - 2 theta: beyond
+#: this theta the exit belongs to the smooth surface around the point, see `inscribed`.
+SPHERE_CONE = 0.5 * (math.pi - CREASE)
 
 #: Points closer than this share of the radius have the same set: the same point of two charts, rounded twice.
 SAME_POINT = 2.0**-24
@@ -45,7 +50,10 @@ class Directions:
     @classmethod
     def of(cls, settings: BakeSettings) -> Directions:
         """Directions for these settings: one down the normal, or Sobol points in the cone."""
-        if settings.mode in ("normal", "inscribed"):
+        if settings.mode == "inscribed":
+            points = _sobol(settings.rays, max(1, min(SETS, TABLE // settings.rays)), settings.seed)
+            return cls(_in_cone(points, SPHERE_CONE, "uniform"), settings.seed)
+        if settings.mode == "normal":
             return cls(np.array([0.0, 0.0, 1.0], np.float32).reshape(3, 1, 1), settings.seed)
         count = settings.rays
         if settings.tolerance is not None:

@@ -5,9 +5,10 @@ surface is inside:
 
     2 r(p) = min over q of |q - p|^2 / ((p - q) . n),  (p - q) . n > 0.
 
-It is found by shrinking a ball (Ma, Bae and Choi 2012): from half the distance to the exit along -n, the nearest point
-q to the center gives the next radius, until none is inside. Points seen from the center less than the crease angle away
-from p belong to the smooth surface around p, and do not count: each edge of a tessellation would end the ball.
+Rays give a first radius: where one along w ends at the distance d, 2 r <= d / cos(theta). From there the ball shrinks
+(Ma, Bae and Choi 2012): the point of the surface that is nearest to the center gives the next radius, until none is
+inside. It ends, too, where that point is seen from the center less than the crease angle away from p: then it belongs
+to the smooth surface around p, each edge of whose tessellation would otherwise end the ball.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from translucent.bake.surface import Points, Surface, blend
 from translucent.bake.texels import closest
 
 Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
 Integers = npt.NDArray[np.int64]
 
 #: About how many points of the surface the search tree holds, beyond one for each face, and how many of them are tried
@@ -56,42 +58,42 @@ class InscribedSpheres:
         self._tree = cKDTree(points)
         self._error = LARGE_TREE_ERROR if len(points) > LARGE_TREE else 0.0
 
-    def diameters(self, points: Points, exits: Array) -> Array:
-        """(k,): diameters in radii of the mesh; `exits` (k,) are the distances to the exits along -n."""
-        radius = 0.5 * np.minimum(exits, 2.0)
+    def diameters(self, points: Points, directions: Floats, distance: Array) -> Array:
+        """(k,): diameters in radii of the mesh, from the `distance` (k, r) of rays along `directions` (3, k, r)."""
+        n = points.normal[..., None]
+        cosine = -(n[:, 0] * directions[0] + n[:, 1] * directions[1] + n[:, 2] * directions[2])
+        # Rays lie in a cone around the normal, so that no cosine is near 0.
+        radius = np.minimum((0.5 * distance / cosine).min(axis=1), 1.0)
         live = np.flatnonzero(radius > 0)
         for _ in range(ROUNDS):
             if not live.size:
                 break
-            point, normal, r = points.start[live], points.normal[live], radius[live]
-            center = point - r[:, None] * normal
-            nearest = self._nearest(center)
-            to_nearest, to_point = nearest - center, r[:, None] * normal
-            away = np.sqrt(_dot(to_nearest, to_nearest))
-            # What is on the other side of the point's plane is no part of the ball's surroundings.
-            height, square = _dot(point - nearest, normal), _dot(nearest - point, nearest - point)
-            beside = _dot(to_nearest, to_point) > math.cos(CREASE) * away * r
-            shrinks = (away < r * (1.0 - AT_REST)) & (height > 0) & ~beside
-            with np.errstate(all="ignore"):
-                smaller = np.where(shrinks, square / (2.0 * height), r)
-            radius[live] = np.minimum(r, smaller)
+            smaller = self._shrunk(points.start[live], points.normal[live], radius[live])
+            shrinks = smaller < radius[live] * (1.0 - AT_REST)
+            radius[live] = smaller
             live = live[shrinks]
-        return 2.0 * radius
+        return np.asarray(2.0 * radius)
 
-    def _nearest(self, center: Array) -> Array:
-        """(k, 3): points of the surface nearest to centers (k, 3), of the faces whose tree points are nearest."""
+    def _shrunk(self, point: Array, normal: Array, radius: Array) -> Array:
+        """(k,): radii with which the balls touch what of the surface is found in them; as before where nothing is."""
+        to_point = radius[:, None] * normal
+        center = point - to_point
         _, found = self._tree.query(center, k=min(TRIED, self._tree.n), eps=self._error)
-        found = found.reshape(len(center), -1)
-        best, distance = np.zeros_like(center), np.full(len(center), np.inf)
-        for column in range(found.shape[1]):
-            face = self._face[found[:, column]]
+        touched, away = center, np.full(len(center), np.inf)
+        for column in found.reshape(len(center), -1).T:
+            face = self._face[column]
             corners = self._surface.corners[face]
-            _, barycentric = closest(self._flat[face], _flatten(self._axes[face], center - corners[:, 0]))
-            point = blend(corners, barycentric)
-            square = _dot(point - center, point - center)
-            nearer = square < distance
-            best[nearer], distance[nearer] = point[nearer], square[nearer]
-        return best
+            _, weights = closest(self._flat[face], _flatten(self._axes[face], center - corners[:, 0]))
+            here = blend(corners, weights)
+            square = _dot(here - center, here - center)
+            touched = np.where((square < away)[:, None], here, touched)
+            away = np.minimum(away, square)
+        from_point, from_center = touched - point, touched - center
+        below = -_dot(from_point, normal)
+        beside = _dot(from_center, to_point) > math.cos(CREASE) * np.sqrt(away) * radius
+        inside = (away < radius * radius) & (below > 0) & ~beside
+        ratio = 0.5 * _dot(from_point, from_point) / np.where(inside, below, 1.0)
+        return np.where(inside, np.minimum(radius, ratio), radius)
 
 
 def _flatten(axes: Array, vectors: Array) -> Array:

@@ -113,11 +113,12 @@ class Measure:
             if self.stop.is_set():
                 raise StoppedError
             asked = points if len(live) == len(points) else points[live]
-            found, more = self.rays.distances(asked, self.directions.at(asked, begin, end))
+            directions = self.directions.at(asked, begin, end)
+            found, more = self.rays.distances(asked, directions)
             traced, cast, escaped = traced + more, cast + found.size, escaped + int(np.isinf(found).sum())
             distance = found if begin == 0 else np.concatenate([distance, found], axis=1)
             edges = np.concatenate([edges, block_edges(begin, end, edges.shape[1])])
-            values[live], errors[live] = self._estimate(asked, distance, edges)
+            values[live], errors[live] = self._estimate(asked, directions, distance, edges)
             above = errors[live] > tolerance
             if end == self.directions.most or not above.any():
                 break
@@ -126,8 +127,10 @@ class Measure:
             begin, end = end, min(2 * end, self.directions.most)
         return Measured(values * self.unit, errors * self.unit, traced, cast, escaped, int(above.sum()))
 
-    def _estimate(self, points: Points, distance: Array, edges: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    def _estimate(
+        self, points: Points, directions: npt.NDArray[np.float32], distance: Array, edges: npt.NDArray[np.int64]
+    ) -> tuple[Array, Array]:
         if self.spheres is None:
             return self.mean.estimate(distance, edges)
-        diameter = np.minimum(self.spheres.diameters(points, distance[:, 0]), self.rays.reach)
+        diameter = np.minimum(self.spheres.diameters(points, directions, distance), self.rays.reach)
         return diameter, np.zeros(len(diameter))

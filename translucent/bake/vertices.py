@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
+from contextlib import closing
 
 import numpy as np
 import numpy.typing as npt
@@ -106,10 +107,11 @@ def _measure_corners(
         weights[np.arange(len(face)), corner] = 1.0 - 2.0 * CORNER
         return measure.at(surface.points(face, weights))
 
-    for part in in_order(bake, range(0, count, PART), threads, measure.stop):
-        parts.append(part)
-        if progress is not None:
-            progress(sum(len(one.values) for one in parts), count, sum(one.traced for one in parts))
+    with closing(in_order(bake, range(0, count, PART), threads, measure.stop)) as baked:
+        for part in baked:
+            parts.append(part)
+            if progress is not None:
+                progress(sum(len(one.values) for one in parts), count, sum(one.traced for one in parts))
     return parts
 
 

@@ -6,6 +6,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from contextvars import copy_context
 from typing import TypeVar
 
@@ -53,8 +54,8 @@ def bake_strips(
     """Bake the strips that `canvas` lacks."""
     missing = [number for number in range(canvas.strips) if not canvas.done[number]]
     begins = [number * strips.rows for number in missing]
-    baked = in_order(strips.bake, begins, threads, strips.measure.stop)
-    try:
+    # Closed whatever is raised here, an interruption by the user as well: that ends the threads.
+    with closing(in_order(strips.bake, begins, threads, strips.measure.stop)) as baked:
         for number, begin, strip in zip(missing, begins, baked, strict=True):
             canvas.put(number, begin, strip)
             if checkpoint is not None:
@@ -62,8 +63,3 @@ def bake_strips(
             if progress is not None:
                 texels = min(int(canvas.done.sum()) * strips.rows, canvas.size) * canvas.size
                 progress(texels, canvas.size**2, canvas.count("traced"))
-    except BaseException:
-        # The generator does not see what is raised out here; closing it ends its threads.
-        strips.measure.stop.set()
-        baked.close()
-        raise
