@@ -372,15 +372,15 @@ def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception
         wall=wall,
         gpu=timing(samples.gpu),
         frame=timing(samples.frame),
-        ratio=ratio(samples.wall, samples.floor),
-        frame_ratio=ratio(samples.frame, samples.floor),
+        ratio=ratio(samples.part, samples.floor),
+        frame_ratio=ratio(samples.whole, samples.floor),
         ms_per_layer=wall.median / row.layers if peeled and wall is not None and row.layers else None,
     )
 
 
 def _floor_row(found: Sequence[Samples]) -> Row:
     """The floor; its time is over all draws of it beside the others."""
-    floor = [seconds for samples in found for seconds in samples.floor]
+    floor = [seconds for samples in found for seconds in samples.floor_wall]
     row = Row(
         "depth only", "depth only", "", "floor", "the cost of drawing the geometry: no thickness", False, passes=1
     )

@@ -82,7 +82,7 @@ class Ratio:
     """Time as a multiple of the depth-only floor's.
 
     Each round measures the method between two floors, and their quotient is one sample: what disturbs the machine for
-    longer than that cancels.
+    longer than that cancels. With a software rasterizer, times in it are the processor's, of all threads.
 
     Attributes
     ----------

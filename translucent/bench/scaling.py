@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from translucent.bench.drawing import Floor, Planned, Size, Studio
+from translucent.bench.drawing import Floor, Planned, Size, Studio, is_software
 from translucent.bench.measure import one_line
 from translucent.bench.record import ScalePoint, Series
 from translucent.bench.shapes import lying_torus, plates
@@ -77,8 +77,8 @@ class ScalingRun:
 
     def ladders(self) -> list[Ladder]:
         """What is to be measured on this machine."""
-        software = "software" in self.studio.renderer.provenance["renderer"]
-        return [ladder for ladder in _ladders(software) for ladder in [_thinned(ladder) if self.quick else ladder]]
+        ladders = _ladders(is_software(self.studio.renderer))
+        return [_thinned(ladder) for ladder in ladders] if self.quick else ladders
 
     def steps(self) -> Iterator[tuple[str, tuple[Series, ...]]]:
         """Measure step by step: after each, its name and all series so far."""
@@ -96,12 +96,12 @@ class ScalingRun:
             found = self._timed(scene, size, failures)
         except Exception as error:  # noqa: BLE001 - a step that cannot be measured leaves the others alone
             failures = dict.fromkeys(METHODS, error)
-        floor = [seconds for samples in found.values() for seconds in samples.floor]
+        floor = [seconds for samples in found.values() for seconds in samples.floor_wall]
         points = {"depth only": ScalePoint(x, timing(floor), ratio(floor, floor))}
         for name in METHODS:
             samples = found.get(name)
             if samples is not None:
-                points[name] = ScalePoint(x, timing(samples.wall), ratio(samples.wall, samples.floor))
+                points[name] = ScalePoint(x, timing(samples.wall), ratio(samples.part, samples.floor))
             elif isinstance(failures[name], TranslucentError):  # said on purpose: no room for so many surfaces
                 points[name] = ScalePoint(x, refusal=one_line(failures[name]))
             else:
