@@ -25,7 +25,7 @@ FEWEST_LONG, LONG = 2, 0.3
 FEWEST_LONGEST, LONGEST = 1, 2.0
 
 #: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
-FLOOR_SHARE, MOST_FLOORS = 0.15, 6
+FLOOR_SHARE, MOST_FLOORS = 0.3, 10
 
 
 class Sample(NamedTuple):
