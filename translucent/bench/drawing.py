@@ -47,8 +47,8 @@ class Studio:
     Attributes
     ----------
     clock : callable
-        By which drawings are compared. Where the CPU draws, it is the processor time of all threads: as long as nobody
-        else works on the machine it is what the clock shows, and it stays the same if somebody does.
+        By which drawings are compared. Where the CPU draws, it is the processor time of all threads: the work that a
+        drawing is, whatever else the machine does meanwhile.
     """
 
     def __init__(self, renderer: Renderer) -> None:
