@@ -11,7 +11,7 @@ from translucent.bench.claims import check_claims
 from translucent.bench.comparison import compare_reports, machines_differ
 from translucent.bench.frontier import beats, mark_frontier
 from translucent.bench.record import CaseRecord, Errors, HardCase, Ratio, Report, Row, Timing
-from translucent.bench.timing import MOST, interleaved, ratio, timing
+from translucent.bench.timing import MOST, Sample, interleaved, ratio, timing
 
 from .test_record import PROVENANCE
 
@@ -181,15 +181,15 @@ def test_everything_is_measured_in_turns_with_the_floor_between() -> None:
     order: list[str] = []
 
     def draw(name: str, seconds: float):  # type: ignore[no-untyped-def]
-        def drawn() -> tuple[float, float, float | None]:
+        def drawn() -> Sample:
             order.append(name)
-            return seconds, seconds, None
+            return Sample(seconds, seconds, None, 2 * seconds, 3 * seconds)
 
         return drawn
 
     failures: dict[str, str] = {}
 
-    def broken() -> tuple[float, float, float | None]:
+    def broken() -> Sample:
         raise RuntimeError("lost")
 
     drawings = {"a": draw("a", 0.01), "b": draw("b", 0.02), "c": broken}
@@ -199,9 +199,12 @@ def test_everything_is_measured_in_turns_with_the_floor_between() -> None:
     assert len(found["a"].wall) == len(found["b"].wall) >= 3
     measured = order[order.index("floor") + 10 :]
     assert measured == ["floor", "a", "floor", "b", "floor"] * len(found["a"].wall)
-    assert found["b"].floor == [0.01] * len(found["b"].wall)
+    rounds = len(found["b"].wall)
+    assert (found["b"].part, found["b"].whole) == ([0.04] * rounds, [0.06] * rounds)
+    assert (found["b"].floor, found["b"].floor_wall) == ([0.02] * rounds, [0.01] * rounds)
 
 
 def test_the_fastest_need_no_more_than_so_many_rounds() -> None:
-    found = interleaved(lambda: (1e-9, 1e-9, 1e-9), {"a": lambda: (1e-9, 1e-9, 1e-9)}, 0.01, lambda *_: None)
+    tiny = Sample(1e-9, 1e-9, 1e-9, 1e-9, 1e-9)
+    found = interleaved(lambda: tiny, {"a": lambda: tiny}, 0.01, lambda *_: None)
     assert len(found["a"].wall) == len(found["a"].gpu) == MOST

@@ -12,6 +12,7 @@ import pytest
 import translucent as tl
 from translucent.bench import measure as measuring
 from translucent.bench import run as running
+from translucent.bench import scaling
 from translucent.bench.cases import CASES, Case
 from translucent.bench.contenders import CONTENDERS, check_names, contenders
 from translucent.bench.drawing import Studio
@@ -19,8 +20,10 @@ from translucent.bench.files import read_report, write_report
 from translucent.bench.measure import CaseRun
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.run import Effort, measure_all
+from translucent.bench.scaling import ScalingRun
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.table import table
+from translucent.gpu.targets import Targets
 from translucent.solids import Sphere
 
 #: Rounds are few and frames small: what is tested is that there are numbers.
@@ -162,7 +165,7 @@ def test_a_case_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) ->
     assert report.cases[1].rows[1].method == "SignedDepth"
     text = table(report)
     assert "failed: OSError: the file is gone" in text
-    assert "SignedDepth *" in text
+    assert "SignedDepth in float16" in text
 
 
 def test_an_interruption_leaves_what_is_done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -236,3 +239,36 @@ def test_shells_and_plates_have_as_many_surfaces_as_asked_for() -> None:
     assert tl.reference.hit_counts(tl.Scene([tl.Object(stack, tl.Medium())], camera), (2, 2)).min() == 10
     truth = tl.reference.render(tl.Scene([tl.Object(stack, tl.Medium(absorption=(1, 1, 1)))], camera), (2, 2))
     assert truth.thickness == pytest.approx(0.5)
+
+
+def test_cost_is_measured_along_an_axis_and_limits_are_told(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    def layers(count: int):  # type: ignore[no-untyped-def]
+        camera = tl.Camera.orthographic((0, 0, 2), (0, 0, 0), height=1.0)
+        return lambda: (tl.Scene([tl.Object(plates(count), tl.Medium(absorption=(1, 1, 1)))], camera), (16, 16))
+
+    def gone() -> object:
+        raise OSError("gone")
+
+    monkeypatch.setattr(scaling, "METHODS", {"SignedDepth": tl.SignedDepth(), "KBuffer": tl.KBuffer(k=256)})
+    ladder = scaling.Ladder("layers", "16 x 16", {2: layers(2), 20: layers(20), 30: gone})  # type: ignore[dict-item]
+    monkeypatch.setattr(ScalingRun, "ladders", lambda self: [ladder])
+    monkeypatch.setattr(Targets, "largest_storage", 1000)
+    *_, (name, series) = ScalingRun(studio, 0.0, quick=True).steps()
+    assert name == "layers 30"
+    found = {one.family: one.points for one in series}
+    assert found.keys() == {"depth only", "SignedDepth", "KBuffer"}
+    assert [point.x for point in found["SignedDepth"]] == [2, 20, 30]
+    assert [point.ratio is not None for point in found["SignedDepth"]] == [True, True, False]
+    assert found["depth only"][0].ratio.median == 1  # type: ignore[union-attr]
+    assert "OpenGL has no room" in str(found["KBuffer"][0].refusal)
+    assert [point.failure for point in found["KBuffer"]] == [None, None, "OSError: gone"]
+
+
+def test_the_ladders_are_those_of_the_design(studio: Studio) -> None:
+    full, quick = ({x.axis: list(x.steps) for x in ScalingRun(studio, 0, quick).ladders()} for quick in (False, True))
+    assert full.keys() == quick.keys() == {"triangles", "pixels", "layers", "media"}
+    assert min(full["triangles"]) <= 1100
+    assert max(full["triangles"]) >= 1_000_000
+    assert {256**2, 512**2, 1024**2, 2048**2} <= set(full["pixels"])
+    assert (full["layers"][-1], full["media"][0], full["media"][-1]) == (100, 1, 16)
+    assert all(set(quick[axis]) < set(full[axis]) for axis in full)

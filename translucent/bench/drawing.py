@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from translucent import reference
+from translucent.bench.timing import Sample
 from translucent.frame import Frame
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
@@ -26,8 +27,8 @@ Size = tuple[int, int]
 class Drawing(Protocol):
     """A frame that can be drawn again and again."""
 
-    def draw(self) -> tuple[float, float, float | None]:
-        """Draw it: seconds until the part that finds thickness is done, until all is, and the GPU's for that part."""
+    def draw(self) -> Sample:
+        """Draw it, and tell what that took."""
 
     def read(self) -> Frame:
         """What the last drawing left."""
@@ -41,13 +42,21 @@ class Drawing(Protocol):
 
 
 class Studio:
-    """What the drawings of one renderer share: compiled passes, uploaded meshes, a timer."""
+    """What the drawings of one renderer share: compiled passes, uploaded meshes, timers.
+
+    Attributes
+    ----------
+    clock : callable
+        By which drawings are compared. Where the CPU draws, it is the processor time of all threads: the work that a
+        drawing is, whatever else the machine does meanwhile.
+    """
 
     def __init__(self, renderer: Renderer) -> None:
         self.renderer = renderer
         self.gl = renderer.gpu.context.gl
         self.resources = Resources(self.gl)
         self.timer = PassTimer(self.gl)
+        self.clock = time.process_time if is_software(renderer) else time.perf_counter
         self._passes: dict[type[Pass], Pass] = {}
 
     def step(self, name: str) -> Pass:
@@ -57,18 +66,18 @@ class Studio:
             self._passes[kind] = kind(self.gl)
         return self._passes[kind]
 
-    def timed(self, geometry: Callable[[], None], shading: Callable[[], None]) -> tuple[float, float, float]:
-        """Seconds as `Drawing.draw` tells them."""
+    def timed(self, geometry: Callable[[], None], shading: Callable[[], None]) -> Sample:
+        """Draw the part that finds thickness, then the rest of the frame; each until the device has finished."""
         self.timer.begin_frame()
         self.gl.finish()
-        begin = time.perf_counter()
+        began, work = time.perf_counter(), self.clock()
         geometry()
         self.gl.finish()
-        middle = time.perf_counter()
+        wall, part = time.perf_counter() - began, self.clock() - work
         shading()
         self.gl.finish()
-        end = time.perf_counter()
-        return middle - begin, end - begin, sum(self.timer.seconds().values())
+        frame, whole = time.perf_counter() - began, self.clock() - work
+        return Sample(wall, frame, sum(self.timer.seconds().values()), part, whole)
 
     def release(self) -> None:
         """Free everything."""
@@ -87,7 +96,7 @@ class Floor:
         self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
         self._pass = DepthOnlyPass(studio.gl)
 
-    def draw(self) -> tuple[float, float, float | None]:
+    def draw(self) -> Sample:
         """Draw it."""
 
         def geometry() -> None:
@@ -116,7 +125,7 @@ class Planned:
         self._geometry = [spec for spec in plan.passes if spec.geometry_passes]
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
 
-    def draw(self) -> tuple[float, float, float | None]:
+    def draw(self) -> Sample:
         """Draw it."""
 
         def geometry() -> None:
@@ -158,7 +167,7 @@ class Short:
         self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
         self._shortcut = shortcut
 
-    def draw(self) -> tuple[float, float, float | None]:
+    def draw(self) -> Sample:
         """Draw it."""
         job = self._job
 
@@ -194,23 +203,25 @@ class OnProcessor:
 
     bytes_per_pixel = None
 
-    def __init__(self, renderer: Renderer, scene: Scene, size: Size, march: RayMarched | None = None) -> None:
+    def __init__(
+        self, studio: Studio, renderer: Renderer, scene: Scene, size: Size, march: RayMarched | None = None
+    ) -> None:
+        self._clock = studio.clock
         self._renderer = renderer
         self._scene = scene
         self._size = size
         self._march = march
         self._frame: Frame | None = None
-        self.plan = renderer.plan(scene)
 
-    def draw(self) -> tuple[float, float, float | None]:
+    def draw(self) -> Sample:
         """Draw it; thickness and shading are one."""
-        begin = time.perf_counter()
+        began, work = time.perf_counter(), self._clock()
         if self._march is None:
             self._frame = self._renderer.render(self._scene, self._size)
         else:
             self._frame = reference.march(self._scene, self._size, self._march)
-        seconds = time.perf_counter() - begin
-        return seconds, seconds, None
+        seconds, spent = time.perf_counter() - began, self._clock() - work
+        return Sample(seconds, seconds, None, spent, spent)
 
     def read(self) -> Frame:
         """What the last drawing left."""
@@ -221,6 +232,11 @@ class OnProcessor:
 
     def release(self) -> None:
         """Nothing to free: the renderer is shared."""
+
+
+def is_software(renderer: Renderer) -> bool:
+    """Whether the CPU draws what OpenGL is asked to."""
+    return "software" in renderer.provenance["renderer"]
 
 
 def _nothing() -> None:

@@ -46,7 +46,7 @@ def drawing(
     if contender.technique in ("cpu", "march"):
         assert cpu is not None, "there is a plan for it"
         march = contender.method if isinstance(contender.method, RayMarched) else None
-        return OnProcessor(cpu, scene, targets.size, march)
+        return OnProcessor(studio, cpu, scene, targets.size, march)
     if contender.technique == "plan":
         return Planned(studio, scene, targets, plan)
     shortcut: Shortcut

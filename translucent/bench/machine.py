@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from translucent.bench.drawing import is_software
 from translucent.bench.record import Provenance
 from translucent.renderer import Renderer
 
@@ -32,7 +33,7 @@ def provenance(renderer: Renderer, command: str, *, quick: bool) -> Provenance:
         backend=found["backend"],
         renderer=found["renderer"],
         driver=found["driver"],
-        software="software" in found["renderer"],
+        software=is_software(renderer),
         versions={"translucent": found["translucent"], "python": found["python"], **_versions()},
         commit=commit,
         dirty=dirty,

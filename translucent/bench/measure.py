@@ -175,7 +175,7 @@ class CaseRun:
         targets = Targets(studio.gl, self.size)
         floor = Floor(studio, scene, targets)
         ready = [entry for entry in self._entries if entry.row.failure is None and entry.row.refusal is None]
-        failures: dict[str, str] = {}
+        failures: dict[str, Exception] = {}
         try:
             drawings: dict[str, Callable[[], Any]] = {}
             for entry in ready:
@@ -184,14 +184,14 @@ class CaseRun:
                     entry.drawn = drawing(studio, entry.contender, entry.scene, plan, targets, entry.assumed, self.cpu)
                     drawings[entry.row.method] = entry.drawn.draw
                 except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row
-                    failures[entry.row.method] = one_line(error)
+                    failures[entry.row.method] = error
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", TranslucentWarning)
                 found = interleaved(
                     floor.draw,
                     drawings,
                     self.seconds,
-                    lambda name, error: failures.update({name: one_line(error)}),
+                    lambda name, error: failures.update({name: error}),
                 )
         finally:
             for entry in ready:
@@ -357,9 +357,14 @@ def _scale(truth: Frame, case: CaseRecord) -> float:
     return float(np.sqrt(np.mean(truth.radiance[used] ** 2))) or 1.0
 
 
-def _with_times(row: Row, samples: Samples | None, failures: dict[str, str]) -> Row:
+def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception]) -> Row:
     if samples is None:
-        return dataclasses.replace(row, failure=row.failure or failures.get(row.method))
+        if (error := failures.get(row.method)) is None:
+            return row
+        # It has worked in a smaller frame: what the renderer says on purpose is a limit of this machine.
+        if isinstance(error, TranslucentError):
+            return dataclasses.replace(row, refusal=one_line(error))
+        return dataclasses.replace(row, failure=one_line(error))
     wall = timing(samples.wall)
     peeled = row.family == "DepthPeeling" and wall is not None and row.layers
     return dataclasses.replace(
@@ -367,15 +372,15 @@ def _with_times(row: Row, samples: Samples | None, failures: dict[str, str]) -> 
         wall=wall,
         gpu=timing(samples.gpu),
         frame=timing(samples.frame),
-        ratio=ratio(samples.wall, samples.floor),
-        frame_ratio=ratio(samples.frame, samples.floor),
+        ratio=ratio(samples.part, samples.floor),
+        frame_ratio=ratio(samples.whole, samples.floor),
         ms_per_layer=wall.median / row.layers if peeled and wall is not None and row.layers else None,
     )
 
 
 def _floor_row(found: Sequence[Samples]) -> Row:
     """The floor; its time is over all draws of it beside the others."""
-    floor = [seconds for samples in found for seconds in samples.floor]
+    floor = [seconds for samples in found for seconds in samples.floor_wall]
     row = Row(
         "depth only", "depth only", "", "floor", "the cost of drawing the geometry: no thickness", False, passes=1
     )

@@ -82,7 +82,7 @@ class Ratio:
     """Time as a multiple of the depth-only floor's.
 
     Each round measures the method between two floors, and their quotient is one sample: what disturbs the machine for
-    longer than that cancels.
+    longer than that cancels. With a software rasterizer, times in it are the processor's, of all threads.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Row:
     pareto : bool
         No row of the case beats it (see `translucent.bench.frontier`).
     refusal : str, optional
-        Why the planner does not run this method on this scene, which is an answer and no failure; there are no numbers.
+        Why the planner does not run this method on this scene, or this machine not at this size: an answer, no failure.
     failure : str, optional
         What went wrong where there should be numbers.
     """
@@ -269,13 +269,14 @@ class ScalePoint:
         Of the series' axis.
     wall, ratio : Timing and Ratio, optional
         As in a `Row`, to the floor at the same x.
-    failure : str, optional
-        Why there are no numbers.
+    refusal, failure : str, optional
+        Why there are no numbers: a limit of this machine or of the method, or something that went wrong.
     """
 
     x: int
     wall: Timing | None = None
     ratio: Ratio | None = None
+    refusal: str | None = None
     failure: str | None = None
 
 

@@ -9,13 +9,14 @@ from typing import Literal
 
 import numpy as np
 
-from translucent.bench.drawing import Floor, Planned, Size, Studio
+from translucent.bench.drawing import Floor, Planned, Size, Studio, is_software
 from translucent.bench.measure import one_line
 from translucent.bench.record import ScalePoint, Series
 from translucent.bench.shapes import lying_torus, plates
 from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.camera import Camera
 from translucent.environment import Environment
+from translucent.errors import TranslucentError
 from translucent.gpu.targets import Targets
 from translucent.medium import Medium
 from translucent.scene import Object, Scene
@@ -76,8 +77,8 @@ class ScalingRun:
 
     def ladders(self) -> list[Ladder]:
         """What is to be measured on this machine."""
-        software = "software" in self.studio.renderer.provenance["renderer"]
-        return [ladder for ladder in _ladders(software) for ladder in [_thinned(ladder) if self.quick else ladder]]
+        ladders = _ladders(is_software(self.studio.renderer))
+        return [_thinned(ladder) for ladder in ladders] if self.quick else ladders
 
     def steps(self) -> Iterator[tuple[str, tuple[Series, ...]]]:
         """Measure step by step: after each, its name and all series so far."""
@@ -88,25 +89,27 @@ class ScalingRun:
                 yield f"{ladder.axis} {x}", self._series(ladders)
 
     def _measure(self, ladder: Ladder, x: int, make: Callable[[], tuple[Scene, Size]]) -> None:
-        failures: dict[str, str] = {}
+        failures: dict[str, Exception] = {}
         found: dict[str, Samples] = {}
         try:
             scene, size = make()
             found = self._timed(scene, size, failures)
         except Exception as error:  # noqa: BLE001 - a step that cannot be measured leaves the others alone
-            failures = dict.fromkeys(METHODS, one_line(error))
-        floor = [seconds for samples in found.values() for seconds in samples.floor]
+            failures = dict.fromkeys(METHODS, error)
+        floor = [seconds for samples in found.values() for seconds in samples.floor_wall]
         points = {"depth only": ScalePoint(x, timing(floor), ratio(floor, floor))}
         for name in METHODS:
             samples = found.get(name)
-            if samples is None:
-                points[name] = ScalePoint(x, failure=failures.get(name, "not measured"))
+            if samples is not None:
+                points[name] = ScalePoint(x, timing(samples.wall), ratio(samples.part, samples.floor))
+            elif isinstance(failures[name], TranslucentError):  # said on purpose: no room for so many surfaces
+                points[name] = ScalePoint(x, refusal=one_line(failures[name]))
             else:
-                points[name] = ScalePoint(x, timing(samples.wall), ratio(samples.wall, samples.floor))
+                points[name] = ScalePoint(x, failure=one_line(failures[name]))
         for name, point in points.items():
             self._points.setdefault((ladder.axis, name), []).append(point)
 
-    def _timed(self, scene: Scene, size: Size, failures: dict[str, str]) -> dict[str, Samples]:
+    def _timed(self, scene: Scene, size: Size, failures: dict[str, Exception]) -> dict[str, Samples]:
         targets = Targets(self.studio.gl, size)
         floor = Floor(self.studio, scene, targets)
         drawings: dict[str, Planned] = {}
@@ -116,12 +119,12 @@ class ScalingRun:
                     plan = self.studio.renderer.plan(scene, method)
                     drawings[name] = Planned(self.studio, scene, targets, plan)
                 except Exception as error:  # noqa: BLE001 - the other methods go on
-                    failures[name] = one_line(error)
+                    failures[name] = error
             return interleaved(
                 floor.draw,
                 {name: drawn.draw for name, drawn in drawings.items()},
                 self.seconds,
-                lambda name, error: failures.update({name: one_line(error)}),
+                lambda name, error: failures.update({name: error}),
             )
         finally:
             for drawn in drawings.values():

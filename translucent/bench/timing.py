@@ -10,14 +10,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.bench.record import Ratio, Timing
-
-#: Seconds of one drawing, as `translucent.bench.drawing.Drawing.draw` tells them.
-Sample = tuple[float, float, float | None]
 
 #: Rounds that even the slowest takes part in, and that the fastest needs no more than.
 FEWEST, MOST = 3, 60
@@ -27,7 +25,27 @@ FEWEST_LONG, LONG = 2, 0.3
 FEWEST_LONGEST, LONGEST = 1, 2.0
 
 #: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
-FLOOR_SHARE, MOST_FLOORS = 0.15, 6
+FLOOR_SHARE, MOST_FLOORS = 0.3, 10
+
+
+class Sample(NamedTuple):
+    """Seconds of one drawing.
+
+    Attributes
+    ----------
+    wall, frame : float
+        By the clock: until the part that finds thickness is done, and until all is.
+    gpu : float or None
+        Of that part, by the GPU's timer.
+    part, whole : float
+        The same two, by the clock that drawings are compared by: see `translucent.bench.drawing.Studio`.
+    """
+
+    wall: float
+    frame: float
+    gpu: float | None
+    part: float
+    whole: float
 
 
 @dataclass
@@ -36,21 +54,35 @@ class Samples:
 
     Attributes
     ----------
-    wall, frame, gpu : list of float
+    wall, frame, gpu, part, whole : list of float
         As `Sample`.
-    floor : list of float
-        Of the floor around each.
+    floor, floor_wall : list of float
+        Of the floor around each: `Sample.part` and `Sample.wall`.
     """
 
     wall: list[float] = field(default_factory=list)
     frame: list[float] = field(default_factory=list)
     gpu: list[float] = field(default_factory=list)
+    part: list[float] = field(default_factory=list)
+    whole: list[float] = field(default_factory=list)
     floor: list[float] = field(default_factory=list)
+    floor_wall: list[float] = field(default_factory=list)
 
     @property
     def spent(self) -> float:
         """Seconds so far."""
-        return sum(self.frame) + sum(self.floor)
+        return sum(self.frame) + sum(self.floor_wall)
+
+    def add(self, sample: Sample, floor: float, floor_wall: float) -> None:
+        """Keep one more."""
+        for values, value in zip(
+            (self.wall, self.frame, self.part, self.whole, self.floor, self.floor_wall),
+            (sample.wall, sample.frame, sample.part, sample.whole, floor, floor_wall),
+            strict=True,
+        ):
+            values.append(value)
+        if sample.gpu is not None:
+            self.gpu.append(sample.gpu)
 
 
 def interleaved(
@@ -68,7 +100,7 @@ def interleaved(
         floor()
     found = {name: Samples() for name in warmed}
     share = 0.85 * seconds / max(len(warmed), 1)
-    typical = float(np.median([floor()[0] for _ in range(5)]))
+    typical = float(np.median([floor().wall for _ in range(5)]))
     while running := [name for name in warmed if not _enough(found[name], share)]:
         before = _floor(floor, typical, 0.0)
         for name in running:
@@ -78,13 +110,8 @@ def interleaved(
                 failed(name, error)
                 del warmed[name], found[name]
                 continue
-            after = _floor(floor, typical, sample[0])
-            samples = found[name]
-            samples.wall.append(sample[0])
-            samples.frame.append(sample[1])
-            samples.floor.append(0.5 * (before + after))
-            if sample[2] is not None:
-                samples.gpu.append(sample[2])
+            after = _floor(floor, typical, sample.wall)
+            found[name].add(sample, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1]))
             before = after
     return found
 
@@ -104,10 +131,11 @@ def _warm_up(
     return True
 
 
-def _floor(floor: Callable[[], Sample], typical: float, beside: float) -> float:
-    """Median of a few draws of the floor: the longer what is beside it takes, the more."""
+def _floor(floor: Callable[[], Sample], typical: float, beside: float) -> tuple[float, float]:
+    """Medians of a few draws of the floor, the longer what is beside it takes the more: by both clocks."""
     count = int(np.clip(round(FLOOR_SHARE * beside / typical), 1, MOST_FLOORS))
-    return float(np.median([floor()[0] for _ in range(count)]))
+    samples = [floor() for _ in range(count)]
+    return float(np.median([one.part for one in samples])), float(np.median([one.wall for one in samples]))
 
 
 def _enough(samples: Samples, share: float) -> bool:
