@@ -13,9 +13,9 @@ from translucent.assets import mesh_path
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZE = (960, 720)
-SAMPLES = 2
+SAMPLES = 16
 
-STUDIO = tl.Environment.studio()
+STUDIO = tl.Environment.studio(rotation=0.0)
 
 
 def mesh(name: str) -> tl.Mesh:
@@ -48,7 +48,7 @@ def jade() -> tl.Scene:
     """A jade bangle leaning towards the eye."""
     body = tl.Object(
         mesh("bangle"),
-        tl.scattering_medium((0.16, 0.55, 0.30), 0.004, ior=1.6),
+        tl.scattering_medium((0.07, 0.34, 0.17), 0.003, ior=1.6),
         transform=turned(-28.0),
         surface=tl.Surface(roughness=0.18, multiple_scattering=True),
     )
@@ -87,12 +87,10 @@ def bears() -> tl.Scene:
 
 
 def amber() -> tl.Scene:
-    """A leaf in amber."""
-    pebble = tl.Object(mesh("amber"), medium("amber"))
-    scale = np.diag([0.36, 0.36, 0.36, 1.0])
-    leaf = tl.Object(mesh("leaf"), None, turned(62.0, shift=(0.0, 0.0125, 0.0)) @ scale, color=(0.2, 0.24, 0.05))
-    camera = tl.Camera.look_at((0.0, 0.075, 0.14), (0.0, 0.0145, 0.0), fov_y=24.0)
-    return tl.Scene([pebble, leaf], camera, environment=STUDIO)
+    """A polished piece of amber."""
+    resin = tl.Medium.from_color((0.93, 0.46, 0.06), 0.02, ior=1.54)
+    camera = tl.Camera.look_at((0.0, 0.06, 0.15), (0.0, 0.0145, 0.0), fov_y=24.0)
+    return tl.Scene([tl.Object(mesh("amber"), resin, turned(35.0))], camera, environment=STUDIO)
 
 
 def candle() -> tl.Scene:
@@ -132,6 +130,19 @@ def main(names: list[str]) -> None:
             frame = renderer.render(GALLERY[name](), SIZE, samples=SAMPLES)
             frame.save(folder / f"{name}.png", tone="neutral")
             print(f"{name}: {frame.plan}\n", flush=True)
+    write_overview(folder)
+
+
+def write_overview(folder: Path) -> None:
+    """All pictures in one, for the README."""
+    from PIL import Image
+
+    tile = (SIZE[0] // 3, SIZE[1] // 3)
+    overview = Image.new("RGB", (3 * tile[0], 2 * tile[1]))
+    for i, name in enumerate(GALLERY):
+        with Image.open(folder / f"{name}.png") as picture:
+            overview.paste(picture.resize(tile, Image.Resampling.LANCZOS), (i % 3 * tile[0], i // 3 * tile[1]))
+    overview.save(folder / "overview.png", optimize=True)
 
 
 if __name__ == "__main__":
