@@ -204,8 +204,11 @@ class Frame:
             "type": OpenEXR.scanlineimage,
             "comments": "linear Rec.709; thickness in metres",
         }
-        with OpenEXR.File(header, channels) as file:
-            file.write(str(path))
+        try:
+            with OpenEXR.File(header, channels) as file:
+                file.write(str(path))
+        except RuntimeError as error:  # what a full disk is to OpenEXR
+            raise OSError(str(error)) from error
 
     def _repr_png_(self) -> bytes:
         """The picture, for notebooks."""
