@@ -21,6 +21,7 @@ from translucent.mesh import Mesh, load_mesh
 from translucent.scene import Object, Scene
 from translucent.showcase import framing, showcase
 from translucent.solids import Box, Sphere, Torus
+from translucent.surface import Surface
 
 Size = tuple[int, int]
 
@@ -72,6 +73,13 @@ class Case:
 
 def _shown(make: Callable[[], Mesh], size: Size) -> Scene:
     return showcase(make(), size=size)
+
+
+def _glass(mesh: Mesh, surface: Surface, size: Size) -> Scene:
+    """A body of green glass in a studio."""
+    scene = showcase(mesh, size=size, environment=Environment.studio())
+    glass = Medium.from_color((0.8, 0.95, 0.9), 0.3 * mesh.diagonal, ior=1.5)
+    return dataclasses.replace(scene, objects=[Object(mesh, glass, surface=surface)])
 
 
 def _toolkit(name: str) -> Mesh:
@@ -198,6 +206,41 @@ CASES: tuple[Case, ...] = (
         shrink=4,
         compared=80,
         tolerance=3e-4,
+    ),
+    Case(
+        "glass",
+        "Glass ball",
+        "borders that mirror, and bend rays twice",
+        lambda size: _glass(Sphere().tessellate(128), Surface(), size),
+        "borders",
+        compared=160,
+    ),
+    Case(
+        "glass knot",
+        "Glass knot",
+        "the same where rays leave and enter again",
+        lambda size: _glass(_toolkit("knot"), Surface(), size),
+        "borders",
+        quick=False,
+        compared=96,
+    ),
+    Case(
+        "frosted",
+        "Frosted glass ball",
+        "rough borders, that blur what they mirror and what is behind",
+        lambda size: _glass(Sphere().tessellate(128), Surface(roughness=0.4), size),
+        "borders",
+        quick=False,
+        compared=64,
+    ),
+    Case(
+        "dispersion",
+        "Ball of heavy flint",
+        "each channel bends on its own",
+        lambda size: _glass(Sphere().tessellate(128), Surface(dispersion=1.0), size),
+        "borders",
+        quick=False,
+        compared=128,
     ),
     Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),
 )

@@ -27,12 +27,12 @@ from translucent.thickness import (
 Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march"]
 
 #: What a scene has that makes some contenders worth a row, or no contest at all.
-Effect = Literal["absorption", "emission", "scattering", "density", "sheet"]
+Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "borders"]
 
 #: Refraction index of the thin layers that bend rays.
 REFRACTED_IOR = 1.5
 
-_ALL: tuple[Effect, ...] = get_args(Effect)
+_ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect != "borders")
 _STEPS = (8, 16, 32, 64, 128, 256, 512)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 
@@ -60,7 +60,8 @@ class Contender:
     pictured : tuple of str
         Cases of which the report shows its picture.
     ior : {"matched", "refracted"}, optional
-        Drawn with media of the index of refraction 1, or else of `REFRACTED_IOR` where they have none of their own.
+        Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
+        none of their own.
     """
 
     name: str
@@ -99,7 +100,7 @@ def _ordered() -> Iterable[Contender]:
     yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
     for k in (2, 4, 8):
         yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), quick=k == 8)
-    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=_SOURCES)
+    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), effects=(*_ALL, "borders"), pictured=_SOURCES)
 
 
 def _light_points() -> Iterable[Contender]:
@@ -153,7 +154,16 @@ CONTENDERS: tuple[Contender, ...] = (
         "counter-example",
         pictured=("absorption", "emission"),
     ),
-    Contender("SignedDepth", "SignedDepth", SignedDepth(), pictured=_ALL),
+    Contender("SignedDepth", "SignedDepth", SignedDepth(), effects=(*_ALL, "borders"), pictured=(*_ALL, "borders")),
+    Contender(
+        "straight rays",
+        "straight rays",
+        SignedDepth(),
+        kind="counter-example",
+        effects=("borders",),
+        pictured=("borders",),
+        ior="matched",
+    ),
     Contender(
         "SignedDepth from the camera",
         "SignedDepth",

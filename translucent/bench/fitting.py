@@ -28,7 +28,8 @@ def seen_by(contender: Contender, scene: Scene) -> Scene:
             return body
         own = body.medium.ior if body.medium.ior > 1 else REFRACTED_IOR
         ior = 1.0 if contender.ior == "matched" else own
-        return dataclasses.replace(body, medium=dataclasses.replace(body.medium, ior=ior))
+        surface = None if contender.ior == "matched" else body.surface
+        return dataclasses.replace(body, medium=dataclasses.replace(body.medium, ior=ior), surface=surface)
 
     return dataclasses.replace(scene, objects=[bent(body) for body in scene.objects])
 

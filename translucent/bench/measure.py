@@ -40,7 +40,11 @@ QUANTITY: dict[str, Quantity] = {
     "emission": "radiance",
     "scattering": "radiance",
     "density": "radiance",
+    "borders": "radiance",
 }
+
+#: Reflections that the reference follows where borders bend rays; what it leaves then is below the errors shown.
+BOUNCES = 12
 
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
@@ -83,7 +87,7 @@ class Truth:
     def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
         """Trace the scene."""
         begin = time.perf_counter()
-        frame = reference.render(scene, size, tolerance=tolerance)
+        frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES)
         seconds = time.perf_counter() - begin
         counts = reference.hit_counts(scene, size)
         return cls(frame, interior(counts), int(counts.max()), seconds)
