@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from translucent.bench import measure as measuring
 from translucent.bench import run as running
 from translucent.bench import scaling
 from translucent.bench.cases import CASES, Case
-from translucent.bench.contenders import CONTENDERS, check_names, contenders
+from translucent.bench.contenders import CONTENDERS, Effect, check_names, contenders
 from translucent.bench.drawing import Studio
 from translucent.bench.files import read_report, write_report
 from translucent.bench.measure import CaseRun
@@ -220,7 +221,7 @@ def test_all_that_is_promised_is_measured() -> None:
     quadratures = ("left", "exponential", "jittered", "equiangular", "gauss")
     assert {one.method.quadrature for one in CONTENDERS if isinstance(one.method, tl.RayMarched)} >= {*quadratures}
     assert len({case.name for case in CASES}) == len(CASES)
-    assert {"absorption", "sheet", "emission", "scattering", "density"} == {case.effect for case in CASES}
+    assert {case.effect for case in CASES} == set(get_args(Effect))
 
 
 def test_the_sponge_is_a_closed_body_of_known_volume() -> None:
