@@ -1,0 +1,310 @@
+"""A picture that is looked at while it is drawn: at once and coarse, then sharp, then smooth, without reading it back.
+
+A step draws a frame whose pixels have their centers on one of `stride` x `stride` pixels of the picture, so that no
+step takes long on a slow machine, and that after `stride`^2 of them each pixel is what a frame of the full size shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.aovs import EMPTY, SEEN, WRONG, false_colors
+from translucent.errors import RenderError
+from translucent.frame import Frame
+from translucent.gpu.job import FrameJob
+from translucent.gpu.renderer import GpuRenderer
+from translucent.gpu.shaders import build_program, set_uniform
+from translucent.render_plan import RenderPlan
+from translucent.sampling import sample_shifts
+from translucent.scene import Scene
+from translucent.tone import TONES
+
+Size = tuple[int, int]
+
+#: Strides of steps; the sides of pictures are multiples of the largest.
+STRIDES = (1, 2, 4, 8)
+
+#: Samples of a pixel after which its edges are smooth.
+SAMPLES = 16
+
+MODES = ("picture", "thickness", "transmittance", "validity")
+RIGHT_SIDES = ("same", "second", "difference")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How a picture is shown.
+
+    Attributes
+    ----------
+    mode : {"picture", "thickness", "transmittance", "validity"}
+    right_side : {"same", "second", "difference"}
+    split : float
+        Where the right side begins, 0 to 1.
+    thickest, worst : float
+        Thickness of the last false color, and the largest difference of thickness, in metres.
+    exposure : float
+    tone : str
+    """
+
+    mode: str = "picture"
+    right_side: str = "same"
+    split: float = 1.0
+    thickest: float = 1.0
+    worst: float = 1.0
+    exposure: float = 0.0
+    tone: str = "none"
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What a pixel holds.
+
+    Attributes
+    ----------
+    thickness : float
+        In metres.
+    optical_depth : tuple of 3 floats
+    covered, valid : bool
+    """
+
+    thickness: float
+    optical_depth: tuple[float, float, float]
+    covered: bool
+    valid: bool
+
+
+class _Side:
+    """The sums of one frame: radiance, optical depth and thickness, flags."""
+
+    def __init__(self, gl: moderngl.Context, size: Size) -> None:
+        self.size = size
+        try:
+            self.textures = [gl.texture(size, count, dtype="f4") for count in (4, 4, 1)]
+            for texture in self.textures:
+                texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            self.all = gl.framebuffer(self.textures)
+            self.light = gl.framebuffer(self.textures[:1])
+        except moderngl.Error as error:
+            found = f"OpenGL has no room for it ({error})"
+            raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
+        self.step = 0
+
+    def release(self) -> None:
+        """Free the textures."""
+        for resource in (self.all, self.light, *self.textures):
+            resource.release()
+
+
+class Viewport:
+    """The picture of a window, in a texture; a second frame beside it, to compare.
+
+    Parameters
+    ----------
+    engine : GpuRenderer
+        Draws with the context of the window.
+
+    Attributes
+    ----------
+    size : (width, height)
+    """
+
+    def __init__(self, engine: GpuRenderer) -> None:
+        self.engine = engine
+        gl = self._gl = engine.context.gl
+        vertex = "geometry/fullscreen.vert"
+        self._gather = build_program(
+            gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
+        )
+        units = dict(light_a=0, depths_a=1, trust_a=2, light_b=3, depths_b=4, trust_b=5, false_colors=6)
+        self._compare = build_program(gl, vertex, "present/compare.frag", **units)
+        self._gathering, self._comparing = (gl.vertex_array(program, []) for program in (self._gather, self._compare))
+        self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
+        for name, color in (("empty_color", EMPTY), ("seen_color", SEEN), ("wrong_color", WRONG)):
+            set_uniform(self._compare, name, tuple(v / 255.0 for v in color))
+        self._sides: list[_Side | None] = [None, None]
+        self._screen: moderngl.Framebuffer | None = None
+        self.size: Size = (0, 0)
+
+    @property
+    def texture(self) -> moderngl.Texture:
+        """The picture, sRGB-encoded; its first row is the bottom one, as OpenGL has it."""
+        assert self._screen is not None
+        return self._screen.color_attachments[0]
+
+    @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        """What draws into `texture`."""
+        assert self._screen is not None
+        return self._screen
+
+    def resize(self, size: Size) -> None:
+        """Make room for pictures of a size; rounded down to a multiple of the largest stride.
+
+        Raises
+        ------
+        RenderError
+            If OpenGL has no room for them.
+        """
+        unit = STRIDES[-1]
+        size = max(size[0] // unit, 1) * unit, max(size[1] // unit, 1) * unit
+        if size == self.size:
+            return
+        limit = int(self.engine.context.info["GL_MAX_TEXTURE_SIZE"])
+        if max(size) > limit:
+            raise RenderError(
+                f"viewport of {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "make the window smaller"
+            )
+        self._release_pictures()
+        try:
+            self._screen = self._gl.framebuffer([self._gl.texture(size, 4)])
+        except moderngl.Error as error:
+            found = f"OpenGL has no room for it ({error})"
+            raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
+        self.size = size
+
+    def restart(self) -> None:
+        """Begin anew: something else is to be seen."""
+        for side in self._sides:
+            if side is not None:
+                side.step = 0
+
+    def step(self, side: int, scene: Scene, plan: RenderPlan, stride: int) -> None:
+        """Draw the next sample of a side; all of a picture's must have the same stride."""
+        chosen = self._side(side, self.size)
+        phases = stride * stride
+        round_, number = divmod(chosen.step, phases)
+        phase, block = _order(stride)[number]
+        right, down = shifts()[(round_ - 1) % SAMPLES] if round_ else (0.0, 0.0)
+        engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
+        job = engine.prepare(scene, size, plan)
+        try:
+            job.place(((phase[0] + 0.5 + right) / stride - 0.5, (phase[1] + 0.5 + down) / stride - 0.5))
+            engine.run(job)
+            self._add(job, chosen, phase, stride, 1 if round_ else block, first=round_ == 0)
+        finally:
+            job.release()
+            engine.context.drain()
+        chosen.step += 1
+
+    def steps(self, side: int) -> int:
+        """How many samples a side has."""
+        found = self._sides[side]
+        return 0 if found is None else found.step
+
+    def put(self, frame: Frame) -> None:
+        """Let a frame, such as the reference, be the second side."""
+        side = self._side(1, frame.size)
+        height, width = frame.thickness.shape
+        light = np.ones((height, width, 4), dtype=np.float32)
+        with np.errstate(under="ignore", over="ignore"):
+            light[..., :3] = frame.radiance
+            depths = np.concatenate([frame.optical_depth, frame.thickness[..., None]], axis=2).astype(np.float32)
+        trust = frame.coverage.astype(np.float32) + 2.0 * frame.valid.astype(np.float32)
+        for texture, content in zip(side.textures, (light, depths, trust), strict=True):
+            texture.write(np.ascontiguousarray(content, dtype=np.float32))
+        side.step = 1
+
+    def present(self, shown: Shown) -> None:
+        """Develop what there is into the texture."""
+        first, second = self._side(0, self.size), self._sides[1]
+        other = first if second is None or not second.step else second
+        for unit, texture in enumerate([*first.textures, *other.textures, self._colors]):
+            texture.use(unit)
+        right = RIGHT_SIDES.index(shown.right_side) if other is not first else 0
+        values = {"mode": MODES.index(shown.mode), "right_side": right, "split": shown.split * self.size[0]}
+        values |= {"thickest": shown.thickest, "worst": shown.worst}
+        values |= {"stops": shown.exposure, "tone": TONES.index(shown.tone)}
+        for name, value in values.items():
+            set_uniform(self._compare, name, value)
+        self.framebuffer.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        self._comparing.render(moderngl.TRIANGLES, vertices=3)
+
+    def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
+        """What a pixel holds, counted from the top left; None if it is outside, or nothing is drawn yet."""
+        found = self._sides[side]
+        if found is None or not found.step or not (0 <= x < self.size[0] and 0 <= y < self.size[1]):
+            return None
+        x, y = x * found.size[0] // self.size[0], y * found.size[1] // self.size[1]
+        where = (x, y, 1, 1)
+        depths = np.frombuffer(found.all.read(where, 4, attachment=1, dtype="f4"), np.float32).astype(np.float64)
+        flags = int(np.frombuffer(found.all.read(where, 1, attachment=2, dtype="f4"), np.float32)[0])
+        red, green, blue, thickness = depths.tolist()
+        return Probe(thickness, (red, green, blue), bool(flags & 1), bool(flags & 2))
+
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        """(h, w, 3): the texture, read back."""
+        data = self.framebuffer.read(components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(self.size[1], self.size[0], 3)[::-1].copy()
+
+    def release(self) -> None:
+        """Free everything; the engine is somebody else's."""
+        self._release_pictures()
+        for resource in (self._gathering, self._comparing, self._gather, self._compare, self._colors):
+            resource.release()
+
+    def _release_pictures(self) -> None:
+        for side in self._sides:
+            if side is not None:
+                side.release()
+        self._sides = [None, None]
+        if self._screen is not None:
+            self._screen.color_attachments[0].release()
+            self._screen.release()
+            self._screen = None
+        self.size = (0, 0)
+
+    def _side(self, number: int, size: Size) -> _Side:
+        side = self._sides[number]
+        if side is None or side.size != size:
+            if side is not None:
+                side.release()
+                self._sides[number] = None
+            side = self._sides[number] = _Side(self._gl, size)
+        return side
+
+    def _add(self, job: FrameJob, side: _Side, phase: Size, stride: int, block: int, *, first: bool) -> None:
+        """Put the frame of a job into the pixels that it is of: over what they show, or adding to their radiance."""
+        result = job.targets.result()
+        radiance = job.picture.color_attachments[0]
+        for unit, texture in enumerate([radiance, *result.color_attachments[2:5]]):
+            texture.use(unit)
+        set_uniform(self._gather, "phase", phase)
+        set_uniform(self._gather, "stride", stride)
+        set_uniform(self._gather, "block", block)
+        if first:
+            side.all.use()
+            self._gl.enable_only(moderngl.NOTHING)
+        else:
+            side.light.use()
+            self._gl.enable_only(moderngl.BLEND)
+            self._gl.blend_equation = moderngl.FUNC_ADD
+            self._gl.blend_func = moderngl.ONE, moderngl.ONE
+        self._gathering.render(moderngl.TRIANGLES, vertices=3)
+
+
+@lru_cache(maxsize=1)
+def shifts() -> npt.NDArray[np.float64]:
+    """(SAMPLES, 2): where in a pixel its later samples are. Slow when first asked for."""
+    return sample_shifts(SAMPLES)
+
+
+@lru_cache(maxsize=4)
+def _order(stride: int) -> list[tuple[Size, int]]:
+    """Places within stride x stride pixels, in the order in which they are drawn, and how far each one's color goes."""
+    order: list[tuple[Size, int]] = [((0, 0), stride)]
+    block = stride // 2
+    while block:
+        # Diagonals first: half of the new pixels already make the picture look sharper in both directions.
+        known = {place for place, _ in order}
+        places = [(x, y) for y in range(0, stride, block) for x in range(0, stride, block) if (x, y) not in known]
+        places.sort(key=lambda place: (place[0] % (2 * block) == 0) + (place[1] % (2 * block) == 0))
+        order += [(place, block) for place in places]
+        block //= 2
+    return order
