@@ -93,7 +93,22 @@ class _Side:
         except moderngl.Error as error:
             found = f"OpenGL has no room for it ({error})"
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
-        self.step = 0
+        self.step, self.stride = 0, 1
+
+    def known(self) -> list[int]:
+        """Which place of the stride x stride ones stands in for each, and for those that no stride has, 0."""
+        order = _order(self.stride)
+        found = [0] * STRIDES[-1] ** 2
+        for (x, y), block in order[: max(self.step, 1)]:
+            for i in range(x, x + block):
+                for j in range(y, y + block):
+                    found[i + self.stride * j] = x + self.stride * y
+        return found
+
+    def kept(self, x: int, y: int) -> Size:
+        """Where a pixel is kept, once all of them are drawn."""
+        part = self.size[0] // self.stride, self.size[1] // self.stride
+        return x % self.stride * part[0] + x // self.stride, y % self.stride * part[1] + y // self.stride
 
     def release(self) -> None:
         """Free the textures."""
@@ -121,27 +136,35 @@ class Viewport:
         self._gather = build_program(
             gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
         )
-        units = dict(light_a=0, depths_a=1, trust_a=2, light_b=3, depths_b=4, trust_b=5, false_colors=6)
-        self._compare = build_program(gl, vertex, "present/compare.frag", **units)
-        self._gathering, self._comparing = (gl.vertex_array(program, []) for program in (self._gather, self._compare))
+        self._gathering = gl.vertex_array(self._gather, [])
+        self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
         self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
-        for name, color in (("empty_color", EMPTY), ("seen_color", SEEN), ("wrong_color", WRONG)):
-            set_uniform(self._compare, name, tuple(v / 255.0 for v in color))
         self._sides: list[_Side | None] = [None, None]
         self._screen: moderngl.Framebuffer | None = None
+        self._coarse: moderngl.Framebuffer | None = None
+        self._at_once = False
         self.size: Size = (0, 0)
 
     @property
     def texture(self) -> moderngl.Texture:
         """The picture, sRGB-encoded; its first row is the bottom one, as OpenGL has it."""
-        assert self._screen is not None
-        return self._screen.color_attachments[0]
+        return self.framebuffer.color_attachments[0]
 
     @property
     def framebuffer(self) -> moderngl.Framebuffer:
         """What draws into `texture`."""
-        assert self._screen is not None
-        return self._screen
+        chosen = self._coarse if self._at_once and self._coarse is not None else self._screen
+        assert chosen is not None
+        return chosen
+
+    def at_once(self, factor: float) -> moderngl.Framebuffer:
+        """A framebuffer for a whole picture that is smaller by a factor, to be shown instead, until `present`."""
+        size = max(round(self.size[0] / factor), 1), max(round(self.size[1] / factor), 1)
+        if self._coarse is None or self._coarse.size != size:
+            self._release_coarse()
+            self._coarse = self._gl.framebuffer([self._gl.texture(size, 4)])
+        self._at_once = True
+        return self._coarse
 
     def resize(self, size: Size) -> None:
         """Make room for pictures of a size; rounded down to a multiple of the largest stride.
@@ -177,16 +200,16 @@ class Viewport:
     def step(self, side: int, scene: Scene, plan: RenderPlan, stride: int) -> None:
         """Draw the next sample of a side; all of a picture's must have the same stride."""
         chosen = self._side(side, self.size)
-        phases = stride * stride
-        round_, number = divmod(chosen.step, phases)
-        phase, block = _order(stride)[number]
+        chosen.stride = stride
+        round_, number = divmod(chosen.step, stride * stride)
+        phase, _ = _order(stride)[number]
         right, down = shifts()[(round_ - 1) % SAMPLES] if round_ else (0.0, 0.0)
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
         job = engine.prepare(scene, size, plan)
         try:
             job.place(((phase[0] + 0.5 + right) / stride - 0.5, (phase[1] + 0.5 + down) / stride - 0.5))
             engine.run(job)
-            self._add(job, chosen, phase, stride, 1 if round_ else block, first=round_ == 0)
+            self._add(job, chosen, (phase[0] * size[0], phase[1] * size[1]), first=round_ == 0)
         finally:
             job.release()
             engine.context.drain()
@@ -208,7 +231,7 @@ class Viewport:
         trust = frame.coverage.astype(np.float32) + 2.0 * frame.valid.astype(np.float32)
         for texture, content in zip(side.textures, (light, depths, trust), strict=True):
             texture.write(np.ascontiguousarray(content, dtype=np.float32))
-        side.step = 1
+        side.step = side.stride = 1
 
     def present(self, shown: Shown) -> None:
         """Develop what there is into the texture."""
@@ -217,14 +240,37 @@ class Viewport:
         for unit, texture in enumerate([*first.textures, *other.textures, self._colors]):
             texture.use(unit)
         right = RIGHT_SIDES.index(shown.right_side) if other is not first else 0
-        values = {"mode": MODES.index(shown.mode), "right_side": right, "split": shown.split * self.size[0]}
-        values |= {"thickest": shown.thickest, "worst": shown.worst}
-        values |= {"stops": shown.exposure, "tone": TONES.index(shown.tone)}
+        program, fullscreen = self._variant(MODES.index(shown.mode), right, TONES.index(shown.tone))
+        values: dict[str, object] = {
+            "shift_a": STRIDES.index(first.stride),
+            "known_a": first.known(),
+            "shift_b": STRIDES.index(other.stride),
+            "known_b": other.known(),
+            "split": shown.split * self.size[0],
+            "thickest": shown.thickest,
+            "worst": shown.worst,
+            "stops": shown.exposure,
+        }
         for name, value in values.items():
-            set_uniform(self._compare, name, value)
+            if name in program:  # each variant uses some of them
+                set_uniform(program, name, value)
+        self._at_once = False
         self.framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
-        self._comparing.render(moderngl.TRIANGLES, vertices=3)
+        fullscreen.render(moderngl.TRIANGLES, vertices=3)
+
+    def _variant(self, mode: int, right: int, tone: int) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        key = mode, right, tone if mode in (0, 3) else 0
+        if key not in self._variants:
+            names = ("light_a", "depths_a", "trust_a", "light_b", "depths_b", "trust_b", "false_colors")
+            units = {name: i for i, name in enumerate(names)}
+            defines = dict(zip(("MODE", "RIGHT", "TONE"), key, strict=True))
+            program = build_program(self._gl, "geometry/fullscreen.vert", "present/compare.frag", defines, 330, **units)
+            for name, color in (("empty_color", EMPTY), ("seen_color", SEEN), ("wrong_color", WRONG)):
+                if name in program:
+                    set_uniform(program, name, tuple(v / 255.0 for v in color))
+            self._variants[key] = program, self._gl.vertex_array(program, [])
+        return self._variants[key]
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
         """What a pixel holds, counted from the top left; None if it is outside, or nothing is drawn yet."""
@@ -232,7 +278,7 @@ class Viewport:
         if found is None or not found.step or not (0 <= x < self.size[0] and 0 <= y < self.size[1]):
             return None
         x, y = x * found.size[0] // self.size[0], y * found.size[1] // self.size[1]
-        where = (x, y, 1, 1)
+        where = (*found.kept(x, y), 1, 1)
         depths = np.frombuffer(found.all.read(where, 4, attachment=1, dtype="f4"), np.float32).astype(np.float64)
         flags = int(np.frombuffer(found.all.read(where, 1, attachment=2, dtype="f4"), np.float32)[0])
         red, green, blue, thickness = depths.tolist()
@@ -240,25 +286,40 @@ class Viewport:
 
     def pixels(self) -> npt.NDArray[np.uint8]:
         """(h, w, 3): the texture, read back."""
-        data = self.framebuffer.read(components=3, alignment=1)
-        return np.frombuffer(data, np.uint8).reshape(self.size[1], self.size[0], 3)[::-1].copy()
+        shown = self.framebuffer
+        data = shown.read(components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(shown.height, shown.width, 3)[::-1].copy()
 
     def release(self) -> None:
         """Free everything; the engine is somebody else's."""
         self._release_pictures()
-        for resource in (self._gathering, self._comparing, self._gather, self._compare, self._colors):
+        for resource in (
+            self._gathering,
+            self._gather,
+            self._colors,
+            *(one for v in self._variants.values() for one in v),
+        ):
             resource.release()
+        self._variants.clear()
 
     def _release_pictures(self) -> None:
         for side in self._sides:
             if side is not None:
                 side.release()
         self._sides = [None, None]
+        self._release_coarse()
         if self._screen is not None:
             self._screen.color_attachments[0].release()
             self._screen.release()
             self._screen = None
         self.size = (0, 0)
+
+    def _release_coarse(self) -> None:
+        if self._coarse is not None:
+            self._coarse.color_attachments[0].release()
+            self._coarse.release()
+            self._coarse = None
+        self._at_once = False
 
     def _side(self, number: int, size: Size) -> _Side:
         side = self._sides[number]
@@ -269,21 +330,18 @@ class Viewport:
             side = self._sides[number] = _Side(self._gl, size)
         return side
 
-    def _add(self, job: FrameJob, side: _Side, phase: Size, stride: int, block: int, *, first: bool) -> None:
-        """Put the frame of a job into the pixels that it is of: over what they show, or adding to their radiance."""
+    def _add(self, job: FrameJob, side: _Side, origin: Size, *, first: bool) -> None:
+        """Keep the frame of a job: in place of what there was, or adding to its radiance."""
         result = job.targets.result()
         radiance = job.picture.color_attachments[0]
         for unit, texture in enumerate([radiance, *result.color_attachments[2:5]]):
             texture.use(unit)
-        set_uniform(self._gather, "phase", phase)
-        set_uniform(self._gather, "stride", stride)
-        set_uniform(self._gather, "block", block)
-        if first:
-            side.all.use()
-            self._gl.enable_only(moderngl.NOTHING)
-        else:
-            side.light.use()
-            self._gl.enable_only(moderngl.BLEND)
+        set_uniform(self._gather, "origin", origin)
+        into = side.all if first else side.light
+        into.viewport = (*origin, *job.targets.size)
+        into.use()
+        self._gl.enable_only(moderngl.NOTHING if first else moderngl.BLEND)
+        if not first:
             self._gl.blend_equation = moderngl.FUNC_ADD
             self._gl.blend_func = moderngl.ONE, moderngl.ONE
         self._gathering.render(moderngl.TRIANGLES, vertices=3)

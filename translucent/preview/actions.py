@@ -12,9 +12,9 @@ import numpy as np
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.medium import MAX_COEFFICIENT
+from translucent.presets import preset
 from translucent.preview import orbiting
 from translucent.preview.document import Document, Material, Model, Orbit, checked
-from translucent.presets import preset
 
 
 @dataclass(frozen=True)

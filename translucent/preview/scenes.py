@@ -116,7 +116,7 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         objects=_objects(document.material, scene),
         camera=camera_of(document.orbit),
         lights=lights,
-        environment=_environment(look, scene),
+        environment=_environment(look.environment, look.background, look.rotation, scene),
     )
 
 
@@ -150,10 +150,13 @@ def _light(look: Look) -> DirectionalLight:
     return DirectionalLight([-v for v in towards_light(look)], look.light_irradiance)
 
 
-def _environment(look: Look, scene: Scene) -> Environment:
-    lit = named_environment(look.environment) if look.environment else scene.environment
-    lit = dataclasses.replace(lit, rotation=lit.rotation + look.rotation)
-    return lit.with_background(named_environment(look.background)) if look.background else lit
+@lru_cache(maxsize=2)
+def _environment(name: str, background: str, rotation: float, scene: Scene) -> Environment:
+    """What lights the scene; kept, since what is made of it for rough surfaces is kept with it."""
+    lit = named_environment(name) if name else scene.environment
+    if lit.kind == "image" and rotation:
+        lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
+    return lit.with_background(named_environment(background)) if background else lit
 
 
 @lru_cache(maxsize=4)

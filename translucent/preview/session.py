@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +75,11 @@ def save_session(path: str | Path, document: Document) -> None:
         what = f"session {str(path)!r}"
         raise RenderError(what, "the package tomli-w is missing", "pip install 'translucent-shading[ui]'") from None
     text = tomli_w.dumps(to_table(document))
-    write_atomically(Path(path), partial(Path.write_text, data=text, encoding="utf-8"))
+    write_atomically(Path(path), lambda file: _write_text(file, text))
+
+
+def _write_text(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8")
 
 
 def load_session(path: str | Path) -> Document:

@@ -12,7 +12,7 @@ from typing import Any
 from translucent.errors import TranslucentError
 
 
-class Cancelled(Exception):
+class CancelledError(Exception):
     """Raised within a task that nobody waits for."""
 
 
@@ -65,9 +65,9 @@ class Task:
         self._cancelled.set()
 
     def report(self, share: float | None, detail: str = "") -> None:
-        """Tell how far the work is; raises `Cancelled` if nobody waits for it."""
+        """Tell how far the work is; raises `CancelledError` if nobody waits for it."""
         if self.cancelled:
-            raise Cancelled
+            raise CancelledError
         self.share, self.detail = share, detail
 
     def run(self) -> None:
@@ -75,7 +75,7 @@ class Task:
         try:
             if not self.cancelled:
                 self.result = self.work(self)
-        except Cancelled:
+        except CancelledError:
             pass
         except Exception as error:  # noqa: BLE001 - whatever it is, the window tells it and stays
             self.error = error
