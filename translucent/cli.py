@@ -14,6 +14,7 @@ from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
 from translucent.commands.material import material
 from translucent.commands.presets import presets
+from translucent.commands.preview import preview
 from translucent.commands.render import render
 from translucent.errors import InputError, TranslucentError
 
@@ -57,7 +58,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, explain, extinction, presets, material, doctor):
+for command in (render, preview, explain, extinction, presets, material, doctor):
     cli.add_command(command)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,14 +70,6 @@ class Truth:
     method: Method | None
     frame: Frame
     level: int
-
-
-@dataclass(frozen=True, eq=False)
-class Bake:
-    """A baked map of the model, and how it is to be seen."""
-
-    map: Any
-    scene: Scene
 
 
 @dataclass(frozen=True)
@@ -164,16 +156,27 @@ def _index_matched(item: Object) -> Object:
     return dataclasses.replace(item, medium=medium, surface=None)
 
 
-def truth_levels(task: Task, scene: Scene, method: Method | None, size: Size, deliver: Any) -> None:
-    """The reference of the whole picture, coarse first; each level goes to `deliver`."""
-    bent = any(item.has_interface for item in scene.objects)
-    if bent and any(any(item.surface.textures) for item in scene.objects if item.surface is not None):
-        scene, bent = straight(scene), False
-    levels = BENT_LEVELS if bent else LEVELS
+def truth_levels(
+    task: Task,
+    scene: Scene,
+    method: Method | None,
+    size: Size,
+    deliver: Callable[[Truth], None],
+    levels: tuple[int, ...] | None = None,
+) -> None:
+    """The reference of the whole picture, coarse first; each level goes to `deliver`.
+
+    With `levels` given it is that of straight rays, for differences of thickness.
+    """
+    bent = any(item.has_interface for item in scene.objects) and levels is None
+    seen = scene
+    if not bent or any(item.surface is not None and any(item.surface.textures) for item in scene.objects):
+        seen, bent = straight(scene), False
+    levels = levels or (BENT_LEVELS if bent else LEVELS)
     for number, level in enumerate(levels):
-        task.report(number / len(levels), f"reference at 1/{level}")
+        task.report(number / len(levels), f"at 1/{level}")
         small = max(size[0] // level, 1), max(size[1] // level, 1)
-        deliver(Truth(scene, method, reference.render(scene, small, method), level))
+        deliver(Truth(scene, method, reference.render(seen, small, method), level))
 
 
 def crossing(scene: Scene, size: Size, pixel: Size) -> Crossing:

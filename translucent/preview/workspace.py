@@ -8,20 +8,23 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from translucent.errors import InputError, TranslucentError
 from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, View
+from translucent.preview.baking import Bake, bake_map
 from translucent.preview.document import Document, Model, Orbit
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
-from translucent.preview.measuring import Bake, Measured, Measuring, Truth
-from translucent.preview.scenes import Loaded, load, scene_of
+from translucent.preview.measuring import Measured, Measuring, Truth, truth_levels
+from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Lane, Task
 from translucent.scene import Scene
+from translucent.thickness import Method
 
 #: Lines that the window keeps.
 MAX_MESSAGES = 50
@@ -71,12 +74,14 @@ class Workspace:
         self.measured: Measured | None = None
         self.truth: Truth | None = None
         self.bake: Bake | None = None
+        self.show_bake = True
         self._measuring = Measuring()
         self.lanes = {
             "load": Lane("load"),
             "draw": Lane("draw", self._measuring.close),
             "truth": Lane("truth"),
             "bake": Lane("bake"),
+            "ray": Lane("ray"),
         }
         self._models: list[Loaded] = []
         self._refused: Model | None = None
@@ -140,10 +145,16 @@ class Workspace:
         else:
             self.tell("info", done)
 
-    def frame(self) -> None:
-        """See the whole model, from the side where the camera is."""
+    def frame(self, number: int | None = None) -> None:
+        """See the whole model, or one of its objects, from the side where the camera is."""
         if self.loaded is not None:
-            self.do(View(orbiting.framed(self.document.orbit, self.loaded.scene.objects, self.size)))
+            objects = self.loaded.scene.objects
+            chosen = [objects[number]] if number is not None and number < len(objects) else objects
+            self.do(View(orbiting.framed(self.document.orbit, chosen, self.size)))
+
+    def reframe(self) -> None:
+        """See the model as it was seen when it was opened."""
+        self._complete()
 
     def update(self) -> None:
         """Take over what the background has done, and ask it for what is missing."""
@@ -157,6 +168,8 @@ class Workspace:
         document, loaded = self.document, self.loaded
         if loaded is None or document.orbit is None:
             return None
+        if self.bake is not None and self.show_bake:
+            return self.bake.seen_from(document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
             same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))
@@ -174,6 +187,29 @@ class Workspace:
     def measure(self, work: Callable[[Measuring, Task], Any], name: str, then: Callable[[Any], None]) -> None:
         """Draw something in the background, with a renderer of its own."""
         self.lanes["draw"].start(name, lambda task: work(self._measuring, task), then)
+
+    def draw_truth(
+        self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
+    ) -> None:
+        """Draw the reference of the whole picture in the background; `truth` is the finest that is there."""
+
+        def deliver(truth: Truth) -> None:
+            self.truth = truth
+
+        work = partial(truth_levels, scene=scene, method=method, size=size, deliver=deliver, levels=levels)
+        self.lanes["truth"].start("float64 reference", work, lambda _: None)
+
+    def start_bake(self, mode: str, size: int, rays: int) -> None:
+        """Bake a map of the first body, and show it."""
+        if self.loaded is None:
+            return
+        body = (self.loaded.scene.bodies or tuple(self.loaded.scene.objects))[0]
+        medium = medium_of(self.document.material)
+
+        def show(bake: Bake) -> None:
+            self.bake, self.show_bake = bake, True
+
+        self.lanes["bake"].start(f"baking {mode}", lambda task: bake_map(task, body, medium, mode, size, rays), show)
 
     def export(self, path: str, work: Callable[[Measuring, Task], None]) -> None:
         """Draw a file in the background."""
