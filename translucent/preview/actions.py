@@ -11,7 +11,8 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
-from translucent.medium import MAX_COEFFICIENT
+from translucent.materials.color_distance import color_at
+from translucent.medium import MAX_COEFFICIENT, Medium
 from translucent.presets import preset
 from translucent.preview import orbiting
 from translucent.preview.document import Document, Material, Model, Orbit, checked
@@ -153,7 +154,7 @@ def _resourced(material: Material, edited: str) -> Material:
         absorption = absorption_of_color(material)
         return dataclasses.replace(material, source="color", preset="", absorption=absorption)
     if edited in _BY_COEFFICIENTS or (edited in _OF_PRESET and material.source == "preset"):
-        return dataclasses.replace(material, source="coefficients", preset="")
+        return _stated(dataclasses.replace(material, source="coefficients", preset=""))
     if material.source == "file" and edited != "source":
         return dataclasses.replace(material, source="coefficients")
     return material
@@ -184,7 +185,7 @@ def _opened(document: Document, action: Open) -> Document:
 def _of_preset(material: Material, name: str) -> Material:
     found = preset(name)
     medium = found.medium
-    return dataclasses.replace(
+    filled = dataclasses.replace(
         material,
         source="preset",
         preset=found.name,
@@ -194,3 +195,12 @@ def _of_preset(material: Material, name: str) -> Material:
         anisotropy=float(medium.anisotropy),
         ior=float(medium.ior),
     )
+    return _stated(filled)
+
+
+def _stated(material: Material) -> Material:
+    """The material with the color at a distance that its coefficients make, as ``translucent extinction`` states it."""
+    medium = Medium(material.absorption, material.scattering)
+    color, distance = color_at(medium, None if medium.extinction.any() else 1.0)
+    red, green, blue = np.asarray(color).tolist()
+    return dataclasses.replace(material, color=(red, green, blue), distance=float(distance))

@@ -176,7 +176,7 @@ class _Window:
         docking = hello_imgui.DockingParams()
         docking.docking_splits = [
             hello_imgui.DockingSplit("MainDockSpace", "Right", imgui.Dir.right, 0.27),
-            hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.30),
+            hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.34),
             hello_imgui.DockingSplit("Right", "Below", imgui.Dir.down, 0.16),
         ]
         panels: list[tuple[str, str, Callable[[Any], None]]] = [

@@ -136,7 +136,7 @@ def begin_rows(name: str) -> bool:
     """A table of labels and fields."""
     if not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_stretch_prop):
         return False
-    imgui.table_setup_column("label", imgui.TableColumnFlags_.width_fixed, em(9.6))
+    imgui.table_setup_column("label", imgui.TableColumnFlags_.width_fixed, em(9.2))
     imgui.table_setup_column("field", imgui.TableColumnFlags_.width_stretch, 1.0)
     return True
 
@@ -167,8 +167,8 @@ def slider(
 
 
 def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
-    """Three numbers of the document, at least 0."""
-    row(label, tip)
+    """Three numbers of the document, at least 0, on a line of their own; not in a table."""
+    wide_row(label, tip)
     value = list(desk.get(name))
     changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
     if imgui.is_item_activated():
@@ -186,6 +186,14 @@ def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: st
             if imgui.selectable(word, word == now)[0]:
                 desk.change(name, word, step=True)
         imgui.end_combo()
+
+
+def wide_row(label: str, tip: str = "") -> None:
+    """The label of a field that takes the whole line below it, in a table that has just ended or not begun."""
+    imgui.text(label)
+    if tip and imgui.is_item_hovered():
+        imgui.set_tooltip(tip)
+    imgui.set_next_item_width(-1.0)
 
 
 def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:

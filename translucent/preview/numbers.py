@@ -36,12 +36,11 @@ def length_text(metres: float, unit: str) -> str:
 def told(material: Material) -> dict[str, Any]:
     """What ``translucent extinction`` tells of this medium, ready for text."""
     medium = medium_of(material)
-    if material.source in ("file", "color"):
-        color, distance = np.asarray(material.color), material.distance
-        if material.source == "file":
-            color = medium.transmittance(distance)
-    else:
-        color, distance = color_at(medium, None if medium.extinction.any() else 1.0)
+    color, distance = np.asarray(material.color), material.distance
+    if material.source != "color" or medium.scatters:
+        color = medium.transmittance(distance)
+    if not (color > 0).all():  # too dark to be stated there
+        color, distance = color_at(medium, None)
     return summary(color, float(distance), medium.extinction)
 
 

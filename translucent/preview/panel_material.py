@@ -49,7 +49,9 @@ def material_panel(desk: Desk) -> None:
     imgui.separator_text("Volume")
     if begin_rows("volume"):
         _color(desk, material)
-        _distance(desk, material)
+        imgui.end_table()
+    _distance(desk, material)
+    if begin_rows("thickness"):
         slider(desk, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True, tip=THICKNESS_TIP)
         imgui.end_table()
     _swatches(desk, material)
@@ -62,11 +64,11 @@ def material_panel(desk: Desk) -> None:
         slider(desk, "dispersion", "material.dispersion", 0.0, 10.0, tip="20 / Abbe number.")
         imgui.end_table()
     imgui.separator_text("Scattering and emission")
+    triple(desk, "absorption, 1/m", "material.absorption", 0.5)
+    triple(desk, "scattering, 1/m", "material.scattering", 0.5)
+    triple(desk, "emission, radiance per m", "material.emission", 0.05)
     if begin_rows("scattering"):
-        triple(desk, "absorption 1/m", "material.absorption", 0.5)
-        triple(desk, "scattering 1/m", "material.scattering", 0.5)
         slider(desk, "anisotropy g", "material.anisotropy", -0.99, 0.99)
-        triple(desk, "emission 1/m", "material.emission", 0.05, tip="Radiance per metre.")
         check(desk, "multiple", "material.multiple_scattering", tip="Light scattered more than once, approximately.")
         imgui.end_table()
     imgui.separator_text("Numbers")
@@ -137,8 +139,8 @@ def _typed_color(desk: Desk, text: str) -> str:
 def _distance(desk: Desk, material: Material) -> None:
     unit = desk.get("display.unit")
     scale = metres_per_unit(unit)
-    row("attenuationDist.", "attenuationDistance")
-    imgui.set_next_item_width(-em(4.0))
+    imgui.text("attenuationDistance")
+    imgui.set_next_item_width(-em(4.2))
     flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
     changed, value = imgui.slider_float(
         "##distance", material.distance / scale, 1e-5 / scale, 1e2 / scale, "%.5g", flags

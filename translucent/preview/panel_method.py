@@ -45,7 +45,8 @@ def _plan(plan: RenderPlan, timing: Timing) -> None:
     if begin_rows("plan"):
         exact = "exact" if plan.exact else "not exact everywhere"
         fact("runs", f"{type(plan.method).__name__}: {exact}", None if plan.exact else WARNING)
-        fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * timing.gpu:.1f} ms")
+        part = "" if timing.share == 1.0 else f", for 1/{1 / timing.share:.3g} of the pixels"
+        fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * timing.gpu:.1f} ms{part}")
         for step in plan.passes:
             spent = (timing.passes or {}).get(step.name)
             fact(step.name, f"{step.reason}" + (f" ({1e3 * spent:.1f} ms)" if spent is not None else ""))

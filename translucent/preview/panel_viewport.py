@@ -139,7 +139,7 @@ def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
         red, green, blue = (int(v) for v in colors[round(i * 255 / (parts - 1))])
         color = 0xFF000000 | blue << 16 | green << 8 | red
         begin, end = left + width * i / parts, left + width * (i + 1) / parts
-        over.add_rect_filled(ImVec2(begin, top), ImVec2(end, top + height), color)
+        over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + height), color)
     most = desk.stage.thickest(desk.work) / metres_per_unit(display.unit)
     free = left - em(1.0)
     for value in marks(most):
@@ -215,7 +215,7 @@ def probe_lines(desk: Desk, place: tuple[float, float]) -> list[str]:
     lines = [
         f"thickness {numbers.length_text(probe.thickness, display.unit)}",
         f"sigma_t d {numbers.triple_text(probe.optical_depth)}",
-        f"T         {numbers.triple_text(passed)}",
+        f"T {numbers.triple_text(passed)}",
         "valid" if probe.valid else f"not valid: {why_not(desk, right)}",
     ]
     if known is not None:

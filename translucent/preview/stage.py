@@ -34,10 +34,11 @@ Factor = TypeVar("Factor", int, float)
 
 @dataclass
 class Timing:
-    """What the last frame of a side took, were it drawn at once: seconds, by the clock and per pass on the GPU."""
+    """What the last step of a side took: seconds, by the clock and per pass on the GPU; and the share of pixels in it."""
 
     wall: float = 0.0
     passes: dict[str, float] | None = None
+    share: float = 1.0
 
     @property
     def gpu(self) -> float:
@@ -68,6 +69,8 @@ class Stage:
 
     def __init__(self, context: Any = None) -> None:
         self._context = context
+        # Whoever owns the window draws into it next, wherever we have drawn.
+        self._window = None if context is None else context.detect_framebuffer()
         self.renderer = Renderer(context=context) if context is not None else Renderer()
         with self.renderer.gpu.context.current():
             self.viewport = Viewport(self.renderer.gpu)
@@ -96,6 +99,9 @@ class Stage:
                 self.problem = ""
             except TranslucentError as error:
                 self.problem, more = str(error), False
+            finally:
+                if self._window is not None:
+                    self._window.use()
         self.drawing = time.perf_counter() - started
         return more
 
@@ -147,12 +153,12 @@ class Stage:
 
     def _finish(self, side: int, plan: RenderPlan, stride: float, begun: float) -> None:
         self.renderer.gpu.context.gl.finish()
-        seconds = (time.perf_counter() - begun) * stride * stride
+        wall = time.perf_counter() - begun
+        seconds = wall * stride * stride
         known = self._costs.get(_kind(plan))
         # The first of its kind compiles shaders.
         self._costs[_kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
-        passes = {name: time_ * stride * stride for name, time_ in self.renderer.gpu.pass_seconds().items()}
-        self.timings[side] = Timing(seconds, passes)
+        self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def _factor(self, plan: RenderPlan | None, factors: tuple[Factor, ...]) -> Factor:
         """The least of the factors with which a picture is drawn quickly, as far as one can tell."""
