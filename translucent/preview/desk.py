@@ -45,10 +45,12 @@ class Desk:
     stage: Stage
     drag: int = 0
     more: bool = True
+    pressed_at: tuple[float, float] = (0.0, 0.0)
     dragging_split: bool = False
     texts: dict[str, str] = field(default_factory=dict)
     probed: Probed | None = None
     hovered: tuple[float, float] | None = None
+    pointer: tuple[float, float] | None = None
     pinned: tuple[float, float] | None = None
     selected: int | None = None
     dialogs: list[tuple[str, Any]] = field(default_factory=list)

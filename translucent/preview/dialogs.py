@@ -67,5 +67,6 @@ def accept_drops(take: Callable[[str], None]) -> object:
 
     callback = _Callback(dropped)
     library = ctypes.CDLL(str(libraries[0]))
-    library.glfwSetDropCallback(ctypes.c_void_p(hello_imgui.get_glfw_window_address()), callback)
+    window: int = getattr(hello_imgui, "get_glfw_window_address")()  # noqa: B009 - its stubs do not know it
+    library.glfwSetDropCallback(ctypes.c_void_p(window), callback)
     return callback

@@ -47,11 +47,12 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
     io = imgui.get_io()
     if imgui.is_item_activated():
         desk.drag += 1
+        desk.pressed_at = io.mouse_pos.x, io.mouse_pos.y
     if imgui.is_item_active() and (io.mouse_delta.x or io.mouse_delta.y):
         right, down = io.mouse_delta.x, io.mouse_delta.y
         turning = imgui.is_mouse_dragging(0, 0.0)
         split = desk.get("display.split") if desk.get("display.compare") != "off" else None
-        started = imgui.get_io().mouse_clicked_pos[0].x - corner.x
+        started = desk.pressed_at[0] - corner.x
         if split is not None and turning and (desk.dragging_split or abs(started - split * room.x) < em(0.7)):
             desk.dragging_split = True
             place = (io.mouse_pos.x - corner.x) / room.x
@@ -69,8 +70,8 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
     if imgui.is_item_hovered() and io.mouse_wheel:
         at = io.mouse_pos.x - corner.x - 0.5 * room.x, io.mouse_pos.y - corner.y - 0.5 * room.y
         desk.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
-    clicked = imgui.is_item_deactivated() and not imgui.is_mouse_drag_past_threshold(0)
-    if clicked and desk.probed is not None and desk.probed.crossing is not None:
+    moved = math.hypot(io.mouse_pos.x - desk.pressed_at[0], io.mouse_pos.y - desk.pressed_at[1])
+    if imgui.is_item_deactivated() and moved < em(0.3) and desk.probed is not None and desk.probed.crossing is not None:
         desk.selected = desk.probed.crossing.body
     desk.hovered = None
     if imgui.is_item_hovered() and not imgui.is_any_mouse_down():

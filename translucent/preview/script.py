@@ -4,7 +4,8 @@ Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, valu
 (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
 ``undo``, ``redo``, ``frame``. Of the window: ``probe`` (x, y: shares of the viewport), ``select`` (panel), ``wait``
 (seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file),
-``session`` (file).
+``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``, ``release`` (button), ``wheel``
+(steps).
 """
 
 from __future__ import annotations
@@ -47,6 +48,10 @@ _WORDS: dict[str, dict[str, Any]] = {
     "bake": {"mode": "cone", "size": 256, "rays": 16},
     "save": {"kind": str, "file": str},
     "session": {"file": str},
+    "point": {"x": 0.5, "y": 0.5},
+    "press": {"button": 0},
+    "release": {"button": 0},
+    "wheel": {"steps": 1.0},
 }
 
 
@@ -82,6 +87,7 @@ class Script:
 
     def step(self, desk: Desk) -> bool:
         """Do the next action, if it is time; whether all are done."""
+        hold_pointer(desk)
         if self._waiting is not None:
             if not self._rested(desk):
                 return False
@@ -168,6 +174,10 @@ def perform(desk: Desk, step: Step) -> None:
         "bake": lambda: work.start_bake(v["mode"], v["size"], v["rays"]),
         "save": lambda: _use_file(desk, v["kind"], v["file"]),
         "session": lambda: work.open_session(v["file"]),
+        "point": lambda: setattr(desk, "pointer", (v["x"], v["y"])),
+        "press": lambda: _io().add_mouse_button_event(v["button"], True),
+        "release": lambda: _io().add_mouse_button_event(v["button"], False),
+        "wheel": lambda: _io().add_mouse_wheel_event(0.0, v["steps"]),
     }
     verbs[step.do]()
 
@@ -176,6 +186,19 @@ def _use_file(desk: Desk, kind: str, path: str) -> None:
     from translucent.preview.answers import use_file
 
     use_file(desk, kind, path)
+
+
+def hold_pointer(desk: Desk) -> None:
+    """Keep the mouse where the script has put it, whatever the system says."""
+    if desk.pointer is not None:
+        size = _io().display_size
+        _io().add_mouse_pos_event(desk.pointer[0] * size.x, desk.pointer[1] * size.y)
+
+
+def _io() -> Any:
+    from imgui_bundle import imgui
+
+    return imgui.get_io()
 
 
 def _select(panel: str) -> None:

@@ -34,7 +34,7 @@ Factor = TypeVar("Factor", int, float)
 
 @dataclass
 class Timing:
-    """What the last step of a side took: seconds, by the clock and per pass on the GPU; and the share of pixels in it."""
+    """What the last step of a side took: seconds, by the clock and per pass on the GPU; and its share of the pixels."""
 
     wall: float = 0.0
     passes: dict[str, float] | None = None
