@@ -162,7 +162,10 @@ class Viewport:
         size = max(round(self.size[0] / factor), 1), max(round(self.size[1] / factor), 1)
         if self._coarse is None or self._coarse.size != size:
             self._release_coarse()
-            self._coarse = self._gl.framebuffer([self._gl.texture(size, 4)])
+            texture = self._gl.texture(size, 4)
+            if factor == 1.0:
+                texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            self._coarse = self._gl.framebuffer([texture])
         self._at_once = True
         return self._coarse
 
@@ -185,7 +188,9 @@ class Viewport:
             )
         self._release_pictures()
         try:
-            self._screen = self._gl.framebuffer([self._gl.texture(size, 4)])
+            screen = self._gl.texture(size, 4)
+            screen.filter = moderngl.NEAREST, moderngl.NEAREST
+            self._screen = self._gl.framebuffer([screen])
         except moderngl.Error as error:
             found = f"OpenGL has no room for it ({error})"
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error

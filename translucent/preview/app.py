@@ -20,7 +20,10 @@ from translucent.preview.workspace import Workspace
 #: What the window is called in the system.
 TITLE = "translucent"
 
-#: Seconds that a window without anything to do sleeps between frames.
+#: sRGB of what is behind panels.
+BACKGROUND = (0.135, 0.14, 0.15, 1.0)
+
+#: Frames per second of a window that has nothing to do.
 IDLE_FPS = 9.0
 
 
@@ -117,7 +120,7 @@ class _Window:
 
     def params(self, size: tuple[int, int], scale: float) -> Any:
         """What the window is made of."""
-        from imgui_bundle import hello_imgui
+        from imgui_bundle import hello_imgui, imgui
 
         params = hello_imgui.RunnerParams()
         window = params.app_window_params
@@ -130,6 +133,10 @@ class _Window:
         else:
             params.ini_folder_type = hello_imgui.IniFolderType.app_user_config_folder
             params.ini_filename = "translucent/preview.ini"
+        # The window is text and one picture that is smooth already: eight samples of it would be lost time.
+        options = hello_imgui.OpenGlOptions()
+        options.anti_aliasing_samples = 0
+        params.renderer_backend_options.open_gl_options = options
         if scale != 1.0:
             params.dpi_aware_params.dpi_window_size_factor = scale
         imgui_window = params.imgui_window_params
@@ -139,6 +146,8 @@ class _Window:
         imgui_window.show_status_bar = True
         imgui_window.show_status_fps = False
         params.fps_idling.fps_idle = IDLE_FPS
+        imgui_window.background_color = imgui.ImVec4(*BACKGROUND)
+        params.callbacks.setup_imgui_style = self._guarded(self._style)
         params.callbacks.post_init = self._guarded(self._opened)
         params.callbacks.before_exit = self._guarded(self._closed)
         params.callbacks.show_menus = self._guarded(self._menus)
@@ -192,13 +201,30 @@ class _Window:
             window = hello_imgui.DockableWindow(label, space)
             window.gui_function = self._guarded(partial(self._show, panel))
             window.can_be_closed = False
+            if label == "Viewport":
+                window.imgui_window_flags = imgui.WindowFlags_.no_scrollbar
             windows.append(window)
         docking.dockable_windows = windows
         return docking
 
     def _show(self, panel: Callable[[Any], None]) -> None:
-        if self.desk is not None:
-            panel(self.desk)
+        from imgui_bundle import ImVec2, imgui
+
+        if self.desk is None:
+            return
+        if not imgui.is_window_docked():  # windows have no background of their own, see _style
+            low, size = imgui.get_window_pos(), imgui.get_window_size()
+            color = imgui.get_color_u32(imgui.ImVec4(*BACKGROUND))
+            imgui.get_window_draw_list().add_rect_filled(low, ImVec2(low.x + size.x, low.y + size.y), color)
+        panel(self.desk)
+
+    def _style(self) -> None:
+        """Backgrounds are what the window is cleared to: on a software rasteriser they took most of a frame's time."""
+        from imgui_bundle import imgui
+
+        style = imgui.get_style()
+        for part in (imgui.Col_.window_bg, imgui.Col_.docking_empty_bg, imgui.Col_.child_bg):
+            style.set_color_(part, imgui.ImVec4(0.0, 0.0, 0.0, 0.0))
 
     def _opened(self) -> None:
         from imgui_bundle import implot

@@ -92,7 +92,6 @@ class Stage:
         What goes wrong is told in `problem`, and the last picture stays.
         """
         started = time.perf_counter()
-        self.watch(workspace)
         with self.renderer.gpu.context.current():
             try:
                 more = self._draw(workspace, size)
@@ -115,7 +114,9 @@ class Stage:
         both = display.compare == "method"
         wanted = (scene, methods[0], methods[1] if both else None, self.viewport.size, self.renderer)
         fresh = wanted != self._shown
-        if fresh:
+        if not fresh:
+            self.watch(workspace)
+        else:
             self.plans = [
                 self.renderer.plan(scene, methods[0]),
                 self.renderer.plan(scene, methods[1]) if both else None,
