@@ -56,7 +56,9 @@ def main() -> int:
         app.run(Document(Model(str(path))), (2700, 808), script=orbit)
     frames, inside = np.diff(orbit.frames)[5:], np.array(orbit.inside[1:])[5:]
     print(f"{len(ball.faces)} triangles, viewport {orbit.sizes}, {len(frames)} frames")
-    print(f"{1 / np.median(frames):.1f} frames per second (median), {1 / np.quantile(frames, 0.95):.1f} (95th percentile)")
+    print(
+        f"{1 / np.median(frames):.1f} frames per second (median), {1 / np.quantile(frames, 0.95):.1f} (95th percentile)"
+    )
     print(f"renderer {1e3 * np.median(inside):.1f} ms, whole frame {1e3 * np.median(frames):.1f} ms,")
     print(f"share outside the renderer {1 - np.median(inside) / np.median(frames):.0%}")
     return 0

@@ -139,6 +139,9 @@ class Viewport:
         self._gathering = gl.vertex_array(self._gather, [])
         self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
         self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
+        # moderngl goes back to the framebuffer in use whenever it makes another one, and fails if that is gone. So
+        # before any is released, ours or the engine's, this one is put to use.
+        self._rest = gl.framebuffer([gl.texture((1, 1), 1)])
         self._sides: list[_Side | None] = [None, None]
         self._screen: moderngl.Framebuffer | None = None
         self._coarse: moderngl.Framebuffer | None = None
@@ -160,6 +163,7 @@ class Viewport:
     def at_once(self, factor: float) -> moderngl.Framebuffer:
         """A framebuffer for a whole picture that is smaller by a factor, to be shown instead, until `present`."""
         size = max(round(self.size[0] / factor), 1), max(round(self.size[1] / factor), 1)
+        self._rest.use()
         if self._coarse is None or self._coarse.size != size:
             self._release_coarse()
             texture = self._gl.texture(size, 4)
@@ -209,6 +213,7 @@ class Viewport:
         round_, number = divmod(chosen.step, stride * stride)
         phase, _ = _order(stride)[number]
         right, down = shifts()[(round_ - 1) % SAMPLES] if round_ else (0.0, 0.0)
+        self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
         job = engine.prepare(scene, size, plan)
         try:
@@ -306,8 +311,12 @@ class Viewport:
         ):
             resource.release()
         self._variants.clear()
+        self._gl.detect_framebuffer(0).use()
+        self._rest.color_attachments[0].release()
+        self._rest.release()
 
     def _release_pictures(self) -> None:
+        self._rest.use()
         for side in self._sides:
             if side is not None:
                 side.release()
@@ -329,6 +338,7 @@ class Viewport:
     def _side(self, number: int, size: Size) -> _Side:
         side = self._sides[number]
         if side is None or side.size != size:
+            self._rest.use()
             if side is not None:
                 side.release()
                 self._sides[number] = None
