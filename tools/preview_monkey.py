@@ -78,7 +78,7 @@ class Monkey:
         self.work.update()
         for _ in range(self.random.choice((1, 1, 2, 5))):
             self.stage.draw(self.work, self.size)
-        with self.stage.renderer.gpu.context.current() as gl:
+        with self.stage.current() as gl:
             if (error := gl.error) != "GL_NO_ERROR":
                 raise AssertionError(f"action {number}, {verb.__name__}: {error}")
         return verb.__name__

@@ -206,13 +206,13 @@ class Viewport:
             if side is not None:
                 side.step = 0
 
-    def step(self, side: int, scene: Scene, plan: RenderPlan, stride: int) -> None:
-        """Draw the next sample of a side; all of a picture's must have the same stride."""
+    def step(self, side: int, scene: Scene, plan: RenderPlan, stride: int, samples: int = SAMPLES) -> None:
+        """Draw the next sample of a side, of `samples` a pixel besides its center; a picture has one stride."""
         chosen = self._side(side, self.size)
         chosen.stride = stride
         round_, number = divmod(chosen.step, stride * stride)
         phase, _ = _order(stride)[number]
-        right, down = shifts()[(round_ - 1) % SAMPLES] if round_ else (0.0, 0.0)
+        right, down = shifts(samples)[(round_ - 1) % samples] if round_ else (0.0, 0.0)
         self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
         job = engine.prepare(scene, size, plan)
@@ -362,10 +362,10 @@ class Viewport:
         self._gathering.render(moderngl.TRIANGLES, vertices=3)
 
 
-@lru_cache(maxsize=1)
-def shifts() -> npt.NDArray[np.float64]:
-    """(SAMPLES, 2): where in a pixel its later samples are. Slow when first asked for."""
-    return sample_shifts(SAMPLES)
+@lru_cache(maxsize=4)
+def shifts(samples: int) -> npt.NDArray[np.float64]:
+    """(samples, 2): where in a pixel its later samples are. Slow when first asked for."""
+    return sample_shifts(samples)
 
 
 @lru_cache(maxsize=4)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from translucent.assets import shader_path
 from translucent.errors import TranslucentError
+from translucent.gpu.context import open_context
 from translucent.gpu.viewport import STRIDES, Probe, Shown, Viewport
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of
@@ -68,11 +70,12 @@ class Stage:
     """
 
     def __init__(self, context: Any = None) -> None:
-        self._context = context
         # Whoever owns the window draws into it next, wherever we have drawn.
         self._window = None if context is None else context.detect_framebuffer()
-        self.renderer = Renderer(context=context) if context is not None else Renderer()
-        with self.renderer.gpu.context.current():
+        self._own = open_context() if context is None else None
+        self._gl = context if self._own is None else self._own.gl
+        with self.current():
+            self.renderer = Renderer(context=self._gl)
             self.viewport = Viewport(self.renderer.gpu)
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
@@ -86,13 +89,17 @@ class Stage:
         self._watched = time.monotonic()
         self._newest = _newest_shader()
 
+    def current(self) -> AbstractContextManager[Any]:
+        """The context is current within: a window's always is, and our own is made so."""
+        return nullcontext(self._gl) if self._own is None else self._own.current()
+
     def draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
         """Draw a step, if there is one left; whether more are.
 
         What goes wrong is told in `problem`, and the last picture stays.
         """
         started = time.perf_counter()
-        with self.renderer.gpu.context.current():
+        with self.current():
             try:
                 more = self._draw(workspace, size)
                 self.problem = ""
@@ -148,7 +155,7 @@ class Stage:
         if plan is None or self.viewport.steps(side) >= stride * stride * (1 + samples):
             return False
         begun = time.perf_counter()
-        self.viewport.step(side, scene, plan, stride)
+        self.viewport.step(side, scene, plan, stride, max(samples, 1))
         self._finish(side, plan, stride, begun)
         return True
 
@@ -214,7 +221,7 @@ class Stage:
         done = self._strides[side] ** 2 if side == 0 or self.plans[1] is not None else 1
         if self.viewport.steps(side) < done:
             return None
-        with self.renderer.gpu.context.current():
+        with self.current():
             return self.viewport.probe(x, y, side)
 
     def watch(self, workspace: Workspace) -> None:
@@ -229,8 +236,8 @@ class Stage:
     def reload(self, workspace: Workspace) -> None:
         """Compile the shaders anew; if that fails, go on with those there are, and tell why."""
         scene = workspace.scene()
-        with self.renderer.gpu.context.current() as gl:
-            fresh = Renderer(context=gl)
+        with self.current():
+            fresh = Renderer(context=self._gl)
             viewport = None
             try:
                 viewport = Viewport(fresh.gpu)
@@ -242,8 +249,7 @@ class Stage:
                 self.shader_problem = str(error)
                 if viewport is not None:
                     viewport.release()
-                if self._context is not None:
-                    fresh.close()
+                fresh.close()
                 return
             viewport.release()
             self._take_over(fresh)
@@ -252,10 +258,7 @@ class Stage:
     def _take_over(self, fresh: Renderer) -> None:
         size, self.shader_problem = self.viewport.size, ""
         self.viewport.release()
-        if self._context is not None:
-            self.renderer.close()
-        else:
-            fresh = self.renderer
+        self.renderer.close()
         self.renderer = fresh
         self.viewport = Viewport(fresh.gpu)
         self.viewport.resize(size)
@@ -263,9 +266,11 @@ class Stage:
 
     def close(self) -> None:
         """Free everything."""
-        with self.renderer.gpu.context.current():
+        with self.current():
             self.viewport.release()
-        self.renderer.close()
+            self.renderer.close()
+        if self._own is not None:
+            self._own.gl.release()
 
 
 def _kind(plan: RenderPlan) -> tuple[str, ...]:
