@@ -118,8 +118,15 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     _label(over, ImVec2(max(x - width - em(0.8), corner.x + em(0.3)), top), left)
     _label(over, ImVec2(min(x + em(0.8), corner.x + room.x - imgui.calc_text_size(name).x - em(0.5)), top), name)
     if display.compare == "error" and desk.stage.has_truth():
-        worst = numbers.length_text(desk.stage.worst(desk.work), display.unit)
-        _label(over, ImVec2(x + em(0.8), top + em(1.6)), f"blue: thinner, red: thicker, full at {worst}")
+        worst = desk.stage.worst(desk.work) / metres_per_unit(display.unit)
+        lines = (
+            f"blue: {worst:.2g} {display.unit} thinner",
+            f"red: {worst:.2g} {display.unit} thicker",
+            "orange: not valid",
+        )
+        for i, line in enumerate(lines, 1):
+            rightmost = corner.x + room.x - imgui.calc_text_size(line).x - em(0.5)
+            _label(over, ImVec2(min(x + em(0.8), rightmost), top + em(1.6) * i), line)
 
 
 def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
