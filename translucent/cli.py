@@ -15,6 +15,7 @@ from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
 from translucent.commands.material import material
 from translucent.commands.presets import presets
+from translucent.commands.preview import preview
 from translucent.commands.render import render
 from translucent.commands.report import report
 from translucent.errors import InputError, TranslucentError
@@ -59,7 +60,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, bake, explain, extinction, presets, material, report, doctor):
+for command in (render, preview, bake, explain, extinction, presets, material, report, doctor):
     cli.add_command(command)
 
 

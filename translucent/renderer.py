@@ -15,7 +15,7 @@ from translucent.backdrop import Backdrop
 from translucent.camera import check_size
 from translucent.environment import Environment
 from translucent.errors import InputError, RenderError, TranslucentWarning
-from translucent.frame import Frame
+from translucent.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
@@ -24,6 +24,7 @@ from translucent.plan_limits import LIGHTS_LEFT_OUT
 from translucent.render_plan import RenderPlan
 from translucent.scene import Scene
 from translucent.thickness import Method
+from translucent.tone import tone_curve
 from translucent.version import VERSION
 
 if TYPE_CHECKING:
@@ -190,6 +191,7 @@ class Renderer:
         framebuffer: moderngl.Framebuffer,
         method: Method | None = None,
         exposure: float = 0.0,
+        tone: str = "none",
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -201,10 +203,21 @@ class Renderer:
         method : Method, optional
         exposure : float
             Stops brighter.
+        tone : {"none", "neutral", "agx"}
+            Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
+
+        Raises
+        ------
+        InputError
+            If no method can render the scene, there is no such curve, or the exposure is beyond 100 stops.
+        RenderError
+            If the framebuffer is larger than this OpenGL allows, or the renderer has none.
         """
         self._require_open()
+        tone_curve(tone)
+        check_exposure(exposure)
         chosen = self.plan(scene, method)
-        self.gpu.draw(scene, framebuffer, chosen, exposure)
+        self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
         return chosen
 
     def close(self) -> None:

@@ -1,6 +1,6 @@
-// A linear picture on a display: exposure, clamp, sRGB. The picture's row 0 is its top row.
+// A linear picture on a display: exposure, tone curve (TONE counts those in translucent.tone.TONES), sRGB. The picture's row 0 is its top row.
 
-#include "lib/color.glsl"
+#include "present/develop.glsl"
 
 uniform sampler2D picture;
 uniform float stops;
@@ -9,6 +9,6 @@ layout(location = 0) out vec4 encoded;
 
 void main() {
     ivec2 size = textureSize(picture, 0);
-    vec3 linear = texelFetch(picture, ivec2(gl_FragCoord.x, float(size.y) - gl_FragCoord.y), 0).rgb;
-    encoded = vec4(linear_to_srgb(clamp(linear * exposure_scale(stops), 0.0, 1.0)), 1.0);
+    vec3 radiance = texelFetch(picture, ivec2(gl_FragCoord.x, float(size.y) - gl_FragCoord.y), 0).rgb;
+    encoded = vec4(develop(radiance, stops), 1.0);
 }

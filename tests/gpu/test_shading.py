@@ -304,16 +304,17 @@ def test_samples_average_transmittance_not_thickness(renderer: tl.Renderer) -> N
     assert set(np.unique(single.transmittance)) <= {0.0, 1.0}
 
 
-def test_present_shows_the_picture_that_save_writes(renderer: tl.Renderer) -> None:
+@pytest.mark.parametrize("tone", ["none", "neutral", "agx"])
+def test_present_shows_the_picture_that_save_writes(renderer: tl.Renderer, tone: str) -> None:
     scene = tl.showcase(BOX.tessellate(), size=SIZE)
     with renderer.gpu.context.current() as gl:
         window = gl.framebuffer([gl.texture(SIZE, 4)])
-    plan = renderer.draw(scene, window, exposure=0.5)
+    plan = renderer.draw(scene, window, exposure=0.5, tone=tone)
     with renderer.gpu.context.current():
         shown = np.frombuffer(window.read(components=3, alignment=1), np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1]
     frame = renderer.render(scene, SIZE)
     assert plan is frame.plan
-    assert np.abs(shown.astype(int) - frame.to_srgb8(exposure=0.5)).max() <= 1
+    assert np.abs(shown.astype(int) - frame.to_srgb8(exposure=0.5, tone=tone)).max() <= 1
 
 
 def test_arrays_are_contiguous_and_the_callers_own(renderer: tl.Renderer) -> None:

@@ -97,7 +97,9 @@ class GpuRenderer:
                 job.release()
                 self.context.drain()
 
-    def draw(self, scene: Scene, framebuffer: moderngl.Framebuffer, plan: RenderPlan, exposure: float) -> None:
+    def draw(
+        self, scene: Scene, framebuffer: moderngl.Framebuffer, plan: RenderPlan, exposure: float, tone: str
+    ) -> None:
         """Run a plan of the scene and show its radiance, `exposure` stops brighter, in a framebuffer of the context."""
         with self.context.current():
             job = self.prepare(scene, framebuffer.size, plan)
@@ -105,7 +107,7 @@ class GpuRenderer:
                 self.run(job)
                 if self._present is None:
                     self._present = PresentPass(self.context.gl)
-                self._present.run(job, framebuffer, exposure)
+                self._present.run(job, framebuffer, exposure, tone)
             finally:
                 job.release()
                 self.context.drain()
@@ -137,6 +139,10 @@ class GpuRenderer:
             step = self._pass(PASSES[spec.name])  # compiles on first use, which is no part of the frame
             with self._timer.measure(spec.name):
                 step.run(job, spec)
+
+    def pass_seconds(self) -> dict[str, float]:
+        """Seconds that the GPU spent on each pass of the last frame; waits for it."""
+        return self._timer.seconds()
 
     def read(self, job: FrameJob, samples: int = 1) -> Frame:
         """The frame that the passes have left in the job's targets, radiance and transmittance averaged if sampled."""

@@ -1,0 +1,50 @@
+"""A display for the tests that open the window: Xvfb, if it is there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def display() -> Iterator[str]:
+    """The name of a display of our own."""
+    pytest.importorskip("imgui_bundle", reason="the extra 'ui' is not installed")
+    if shutil.which("Xvfb") is None:
+        pytest.skip("no Xvfb: the window is not tested (apt-get install xvfb)")
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "2600x1700x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        with os.fdopen(read) as stream:
+            number = stream.readline().strip()
+        if not number:
+            pytest.skip("Xvfb does not start here: the window is not tested")
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait(10)
+
+
+Preview = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def preview(display: str, tmp_path: Path) -> Preview:
+    """Runs ``translucent preview`` on that display."""
+
+    def run(*arguments: str, script: str = "") -> subprocess.CompletedProcess[str]:
+        (tmp_path / "script.toml").write_text(script or '[[action]]\ndo = "frame"\n')
+        command = [sys.executable, "-m", "translucent", "preview", *arguments, "--size", "640x480", "--json"]
+        command += ["--script", str(tmp_path / "script.toml"), "--screenshot", str(tmp_path / "window.png")]
+        environment = {**os.environ, "DISPLAY": display, "XDG_CONFIG_HOME": str(tmp_path)}
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment, check=False)
+
+    return run

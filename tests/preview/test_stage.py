@@ -1,0 +1,222 @@
+"""What draws the viewport, without a window: the same pictures and numbers as render, and nothing that ends it."""
+
+from __future__ import annotations
+
+import runpy
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent import assets as data
+from translucent.preview import stage as stages
+from translucent.preview.actions import Change, Turn
+from translucent.preview.document import Document, Model
+from translucent.preview.measuring import Measuring, crossing, measure
+from translucent.preview.stage import Stage
+from translucent.preview.tasks import Task
+from translucent.preview.workspace import Workspace
+
+SIZE = (160, 96)
+
+
+def wait(work: Workspace, done: Callable[[], object], seconds: float = 30.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "it takes too long"
+        work.update()
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def work() -> Iterator[Workspace]:
+    made = Workspace(Document(Model("sphere")))
+    made.size = SIZE
+    wait(made, lambda: made.loaded is not None)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    made = Stage()
+    yield made
+    made.close()
+
+
+def finish(stage: Stage, work: Workspace) -> None:
+    for _ in range(2000):
+        if not stage.draw(work, SIZE):
+            return
+    pytest.fail("the picture is never done")
+
+
+def pixels(stage: Stage) -> np.ndarray:
+    with stage.current():
+        return stage.viewport.pixels().astype(int)
+
+
+@pytest.mark.parametrize("budget", [1e9, 0.0])
+def test_the_picture_is_the_one_that_render_makes(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch, budget: float
+) -> None:
+    """At once, and from the smallest steps: these differ by float32 rounding at silhouettes only."""
+    monkeypatch.setattr(stages, "BUDGET", budget)
+    work.do(Change("display.antialias", False))
+    finish(stage, work)
+    work.do(Turn(20.0, 10.0))  # by now the stage knows what a step takes
+    finish(stage, work)
+    scene = work.scene()
+    assert scene is not None
+    with stage.current():
+        frame = stage.renderer.render(scene, SIZE)
+    different = np.abs(pixels(stage) - frame.to_srgb8()).max(axis=2) > 1
+    assert different.mean() < 2e-3
+    y, x = np.argwhere(frame.coverage)[frame.coverage.sum() // 2]
+    probe = stage.probe(int(x), int(y))
+    assert probe is not None
+    assert probe.thickness == pytest.approx(frame.thickness[y, x], rel=1e-5)
+    assert (probe.covered, probe.valid) == (True, True)
+    found = crossing(scene, SIZE, (int(x), int(y)))
+    assert found.thickness == pytest.approx(frame.thickness[y, x], rel=1e-4)
+    assert found.layers % 2 == 0
+    assert found.body == 0
+
+
+def test_smooth_edges_are_those_of_many_samples(stage: Stage, work: Workspace) -> None:
+    finish(stage, work)
+    scene = work.scene()
+    assert scene is not None
+    with stage.current():
+        frames = [stage.renderer.render(scene, SIZE, samples=n) for n in (64, 1)]
+    smooth, sharp = (frame.to_srgb8().astype(int) for frame in frames)
+    shown = pixels(stage)
+    assert np.abs(shown - smooth).mean() < 0.5 * np.abs(sharp - smooth).mean()
+
+
+def test_a_split_shows_another_method_and_then_the_reference(stage: Stage, work: Workspace) -> None:
+    work.do(Change("display.mode", "thickness"))
+    work.do(Change("display.compare", "method"))
+    finish(stage, work)
+    scene = work.scene()
+    assert scene is not None
+    left, right = (stage.viewport.steps(side) for side in (0, 1))
+    assert left == right > 0
+    sheet = stage.probe(80, 48, 1)
+    solid = stage.probe(80, 48, 0)
+    assert sheet is not None
+    assert solid is not None
+    assert sheet.thickness != solid.thickness
+    work.do(Change("display.compare", "reference"))
+    work.draw_truth(scene, None, SIZE, (1,))
+    wait(work, lambda: work.truth is not None and work.lanes["truth"].task is None)
+    finish(stage, work)
+    assert stage.has_truth()
+    truth = stage.probe(80, 48, 1)
+    assert truth is not None
+    assert truth.thickness == pytest.approx(solid.thickness, rel=1e-4, abs=1e-9)
+
+
+def test_a_shader_that_does_not_compile_leaves_the_last_good_one(
+    stage: Stage, work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work.do(Change("display.antialias", False))
+    finish(stage, work)
+    before = pixels(stage)
+    shutil.copytree(data._folder("shaders"), tmp_path / "shaders")
+    monkeypatch.setattr(data, "_folder", lambda kind: tmp_path / kind)
+    broken = tmp_path / "shaders" / "thickness" / "signed_depth.frag"
+    good = broken.read_text()
+    broken.write_text(good + "\nvoid broken( {\n")
+    stage.reload(work)
+    assert "shaders/thickness/signed_depth.frag:" in stage.shader_problem
+    work.do(Turn(1.0, 0.0))
+    work.do(Turn(-1.0, 0.0))
+    finish(stage, work)
+    assert stage.problem == ""
+    assert (np.abs(pixels(stage) - before).max(axis=2) > 1).mean() < 2e-3
+    broken.write_text(good)
+    stage.reload(work)
+    assert stage.shader_problem == ""
+    finish(stage, work)
+    assert (np.abs(pixels(stage) - before).max(axis=2) > 1).mean() < 2e-3
+
+
+def test_a_picture_that_is_too_large_is_told_and_the_stage_goes_on(stage: Stage, work: Workspace) -> None:
+    finish(stage, work)
+    assert not stage.draw(work, (1 << 20, 8))
+    assert "this OpenGL ends at" in stage.problem
+    finish(stage, work)
+    assert stage.problem == ""
+
+
+@pytest.mark.parametrize("content", [b"", b"glTF\x02\x00\x00\x00\xff\x00\x00\x00", None])
+def test_a_file_that_is_no_model_is_told_and_changes_nothing(
+    work: Workspace, tmp_path: Path, content: bytes | None
+) -> None:
+    before = work.document
+    if content is not None:
+        (tmp_path / "bad.glb").write_bytes(content)
+    work.open(Model(str(tmp_path / "bad.glb")))
+    wait(work, lambda: work.lanes["load"].task is None)
+    assert work.document == before
+    assert "bad.glb" in work.messages[-1].text
+    assert work.messages[-1].kind == "error"
+
+
+def test_undo_brings_the_last_model_back(work: Workspace) -> None:
+    work.open(Model("soap"))
+    wait(work, lambda: work.loaded is not None and work.loaded.model.path == "soap")
+    work.undo()
+    wait(work, lambda: work.loaded is not None and work.loaded.model.path == "sphere")
+    assert work.scene() is not None
+
+
+def test_the_error_is_measured(work: Workspace) -> None:
+    scene = work.scene()
+    assert scene is not None
+    measuring = Measuring()
+    try:
+        found = measure(measuring, Task("", lambda _: None, lambda _: None), scene, None, SIZE)
+    finally:
+        measuring.close()
+    thickness, transmittance = found.errors
+    # Signed depth is exact up to float32 in units of the diagonal.
+    assert thickness.median < 1e-6 * scene.diagonal
+    assert transmittance.median < 1e-5
+    assert found.seen.pixels == found.seen.thickness.size > 100
+
+
+def test_a_cancelled_task_hands_nothing_over(work: Workspace) -> None:
+    taken: list[object] = []
+
+    def slow(task: Task) -> str:
+        for i in range(1000):
+            task.report(i / 1000)
+            time.sleep(0.01)
+        return "done"
+
+    task = work.lanes["truth"].start("slow", slow, taken.append)
+    wait(work, lambda: task.share)
+    task.cancel()
+    wait(work, lambda: task.finished)
+    work.update()
+    assert not taken
+    assert not work.busy
+
+
+def test_a_defect_in_a_task_is_a_message(work: Workspace) -> None:
+    work.lanes["truth"].start("faulty", lambda _: 1 / 0, lambda _: None)
+    wait(work, lambda: work.lanes["truth"].task is None)
+    assert "unexpected ZeroDivisionError" in work.messages[-1].text
+
+
+def test_random_actions() -> None:
+    tool = Path(tl.__file__).parents[1] / "tools" / "preview_monkey.py"
+    with np.errstate(all="warn"):
+        told = runpy.run_path(str(tool))["play"](120, 11, 30.0)
+    assert told["actions"] > 50

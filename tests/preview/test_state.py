@@ -1,0 +1,221 @@
+"""The previewer's state: documents, actions, undo, sessions, cameras. No window, no GPU."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.cli import main
+from translucent.preview import numbers, orbiting
+from translucent.preview.actions import Change, ChoosePreset, Open, Pan, Turn, View, Zoom, apply
+from translucent.preview.document import RANGES, Document, Material, Orbit
+from translucent.preview.history import MAX_STEPS, History
+from translucent.preview.scenes import material_of, medium_of
+from translucent.preview.script import read_script
+from translucent.preview.session import load_session, save_session
+from translucent.showcase import framing, showcase
+
+ORBIT = Orbit((0.1, 0.2, 0.3), 40.0, 20.0, 2.0)
+
+
+def test_a_change_makes_a_new_document_and_leaves_the_old_one() -> None:
+    before = Document()
+    after = apply(before, Change("material.roughness", 0.25))
+    assert (before.material.roughness, after.material.roughness) == (0.0, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("material.roughness", 1.5, "material.roughness = 1.5; out of its range"),
+        ("material.roughness", float("nan"), "not a finite number"),
+        ("material.color", [0.0, 0.5, 0.5], "out of its range"),
+        ("material.color", [0.5, 0.5], "not three numbers"),
+        ("material.distance", 0.0, "out of its range"),
+        ("material.distance", True, "of the wrong type"),
+        ("display.method", "guess", "not one of its words"),
+        ("material.rougness", 0.5, "there is none to change"),
+        ("history.past", (), "there is none to change"),
+    ],
+)
+def test_a_bad_value_is_refused(field: str, value: object, message: str) -> None:
+    with pytest.raises(tl.InputError, match=message):
+        apply(Document(), Change(field, value))
+
+
+def test_every_range_is_of_a_field() -> None:
+    document = dataclasses.replace(Document(), orbit=Orbit())
+    for name in RANGES:
+        section, key = name.split(".")
+        assert hasattr(getattr(document, section), key)
+
+
+def test_a_drag_is_one_step_of_undo() -> None:
+    history = History()
+    for value in (0.1, 0.2, 0.3):
+        history = history.done(Change("material.roughness", value, drag=1))
+    history = history.done(Change("material.roughness", 0.9, drag=2))
+    history = history.done(Change("material.transmission", 0.4, drag=2))
+    assert [step.material.roughness for step in history.past] == [0.0, 0.3, 0.9]
+    back = history.undone().undone()
+    assert back.present.material.roughness == 0.3
+    assert back.redone().redone().present == history.present
+    assert back.undone().undone().present == Document()
+
+
+def test_a_drag_after_undo_is_a_step_of_its_own() -> None:
+    history = History().done(Change("material.roughness", 0.1, drag=1)).undone()
+    history = history.done(Change("material.roughness", 0.2, drag=1))
+    assert len(history.past) == 1
+    assert history.future == ()
+
+
+def test_undo_leaves_the_camera_where_it_is() -> None:
+    history = History(dataclasses.replace(Document(), orbit=ORBIT)).done(Change("look.exposure", 1.0))
+    turned = history.done(Turn(30.0, 0.0))
+    assert len(turned.past) == 1
+    assert turned.undone().present.orbit == turned.present.orbit != ORBIT
+
+
+def test_history_has_an_end() -> None:
+    history = History()
+    for i in range(MAX_STEPS + 20):
+        history = history.done(Change("look.exposure", float(i % 7)))
+    assert len(history.past) == MAX_STEPS
+
+
+def test_a_session_comes_back_to_the_last_digit(tmp_path: Path) -> None:
+    drawn = random.Random(3)
+    document = dataclasses.replace(apply(Document(), ChoosePreset("skim milk")), orbit=ORBIT)
+    for name in ("material.distance", "material.roughness", "look.exposure", "orbit.yaw", "display.split"):
+        document = apply(document, Change(name, drawn.random()))
+    document = apply(document, Change("material.color", [drawn.random() for _ in range(3)]))
+    save_session(tmp_path / "a.toml", document)
+    assert load_session(tmp_path / "a.toml") == document
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "version None"),
+        ("version = 1\n[material]\nrougness = 0.5", "unknown key 'rougness'"),
+        ("version = 1\n[material]\nroughness = 7", "out of its range"),
+        ("version = 1\n[weather]\nrain = 1", "unknown .weather."),
+        ("version = ", "no TOML"),
+    ],
+)
+def test_what_is_no_session_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "a.toml").write_text(text)
+    with pytest.raises(tl.InputError, match=message):
+        load_session(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[[action]]\ndo = "trun"', "did you mean turn"),
+        ('[[action]]\ndo = "turn"\nleft = 3', "turn knows no 'left'"),
+        ('[[action]]\ndo = "open"', "open without 'model'"),
+        ('[[action]]\ndo = "turn"\nright = "far"', "give a float"),
+        ("action = 3", "not a list"),
+    ],
+)
+def test_what_is_no_script_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "a.toml").write_text(text)
+    with pytest.raises(tl.InputError, match=message):
+        read_script(tmp_path / "a.toml")
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[list[str]]:
+    assert main(["extinction", *arguments]) == 0
+    return [line.split() for line in capsys.readouterr().out.splitlines()[:4]]
+
+
+def test_the_numbers_are_those_that_extinction_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    document = apply(Document(), Change("material.color", numbers.from_display([0x7B / 255, 0x1E / 255, 0x3A / 255])))
+    document = apply(document, Change("material.distance", 0.01))
+    merlot = apply(Document(), ChoosePreset("merlot"))
+    for shown, arguments in ((document, ("#7b1e3a", "1cm")), (merlot, ("--preset", "merlot"))):
+        lines = [f"{label} {text}".split() for label, text in numbers.extinction_lines(shown.material)]
+        assert lines == printed(capsys, *arguments)
+
+
+def test_color_fields_hold_eight_bits_and_are_never_black() -> None:
+    color = numbers.from_display([0.0, 0.5, 1.0])
+    assert color[0] == numbers.DARKEST
+    assert numbers.from_display(numbers.to_display(color)) == color
+
+
+def test_a_preset_is_the_medium_that_it_names() -> None:
+    material = apply(Document(), ChoosePreset("Marble")).material
+    assert medium_of(material) == tl.preset("marble").medium
+    edited = apply(apply(Document(), ChoosePreset("Marble")), Change("material.scattering", [0.0, 0.0, 0.0])).material
+    assert (edited.source, edited.preset) == ("coefficients", "")
+
+
+def test_the_material_of_a_model_is_its_medium() -> None:
+    mesh = tl.Mesh(np.eye(4, 3), [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    medium = tl.Medium(absorption=(3, 2, 1), scattering=(0.5, 0, 0), anisotropy=0.2, ior=1.3)
+    material = material_of(showcase(mesh, medium))
+    assert medium_of(material) == medium
+
+
+def test_a_scene_brings_its_own_material_and_a_mesh_leaves_it() -> None:
+    red = apply(Document(), Change("material.color", [0.9, 0.1, 0.1]))
+    assert apply(red, Open("other.ply")).material == red.material
+    assert apply(red, Open("other.glb")).material == Material()
+
+
+def test_the_model_is_framed_as_render_frames_it() -> None:
+    scene = showcase(tl.load_mesh(Path(tl.__file__).parents[1] / "meshes" / "leaf.ply"), size=(320, 200))
+    found = orbiting.camera_of(orbiting.framed(None, scene.objects, (320, 200)))
+    np.testing.assert_allclose(found.pose, framing(scene.objects, (320, 200)).pose, atol=1e-12)
+
+
+def seen_at(orbit: Orbit, point: np.ndarray) -> np.ndarray:
+    """Place of a point in the picture, in heights right and up of its center."""
+    camera = orbiting.camera_of(orbit)
+    local = (point - camera.eye) @ camera.pose[:3, :3]
+    half = camera.half_extent((1, 1))[1]
+    return local[:2] / (2 * half) / (-local[2] if camera.fov_y is not None else 1.0)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_zoom_keeps_what_is_under_the_cursor(orthographic: bool) -> None:
+    orbit = dataclasses.replace(ORBIT, orthographic=orthographic)
+    camera, height = orbiting.camera_of(orbit), orbiting.height_at_target(orbit)
+    point = np.asarray(orbit.target) + height * (0.3 * camera.right - 0.2 * camera.up)
+    np.testing.assert_allclose(seen_at(orbit, point), (0.3, -0.2), atol=1e-12)
+    closer = apply(dataclasses.replace(Document(), orbit=orbit), Zoom(1.7, 0.3, 0.2)).orbit
+    assert closer is not None
+    assert closer.distance == pytest.approx(orbit.distance / 1.7)
+    np.testing.assert_allclose(seen_at(closer, point), (0.3, -0.2), atol=1e-12)
+
+
+def test_pan_moves_the_picture_with_the_mouse() -> None:
+    moved = apply(dataclasses.replace(Document(), orbit=ORBIT), Pan(0.25, 0.1)).orbit
+    assert moved is not None
+    np.testing.assert_allclose(seen_at(moved, np.asarray(ORBIT.target)), (0.25, -0.1), atol=1e-12)
+
+
+def test_orthographic_and_perspective_show_the_target_alike() -> None:
+    document = dataclasses.replace(Document(), orbit=ORBIT)
+    flat = apply(document, Change("orbit.orthographic", True)).orbit
+    assert flat is not None
+    assert orbiting.camera_of(flat).height == pytest.approx(orbiting.height_at_target(ORBIT))
+
+
+def test_a_camera_comes_back_from_its_orbit() -> None:
+    camera = orbiting.camera_of(ORBIT)
+    again = orbiting.camera_of(orbiting.orbit_of(camera, ORBIT.target))
+    np.testing.assert_allclose(again.pose, camera.pose, atol=1e-12)
+
+
+def test_nothing_moves_before_there_is_a_model() -> None:
+    assert apply(Document(), Turn(5.0, 5.0)) == Document()
+    assert apply(Document(), View(ORBIT)).orbit == ORBIT

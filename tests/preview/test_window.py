@@ -1,0 +1,142 @@
+"""The window itself, on a display of its own; skipped where there is none."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from translucent.cli import main
+
+SCRIPT = """
+[[action]]
+do = "change"
+field = "material.color"
+value = [0.6, 0.1, 0.2]
+[[action]]
+do = "change"
+field = "display.compare"
+value = "method"
+[[action]]
+do = "point"
+x = 0.45
+y = 0.5
+[[action]]
+do = "press"
+[[action]]
+do = "point"
+x = 0.5
+y = 0.45
+[[action]]
+do = "release"
+[[action]]
+do = "wheel"
+steps = 1.0
+[[action]]
+do = "select"
+panel = "Look"
+[[action]]
+do = "wait"
+seconds = 0.1
+[[action]]
+do = "select"
+panel = "Files"
+[[action]]
+do = "open"
+model = "{bad}"
+[[action]]
+do = "save"
+kind = "save session"
+file = "{session}"
+[[action]]
+do = "save"
+kind = "png"
+file = "{picture}"
+"""
+
+
+def test_no_display_names_the_way_without_one(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if not sys.platform.startswith("linux"):
+        pytest.skip("only Linux has machines without a display")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["preview", "goblet"]) == 1
+    error = capsys.readouterr().err
+    assert "there is no display" in error
+    assert "translucent render MODEL" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--script", "none.toml"), "cannot be read"),
+        (("--session", "none.toml"), "cannot be read"),
+        (("--session", "none.toml", "goblet"), "goblet is given, too"),
+        (("--screenshot", "a.jpg"), "no .png"),
+        (("--scale", "9"), "not in 0.5 to 4"),
+    ],
+)
+def test_bad_arguments_are_told_before_a_window_opens(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
+    assert main(["preview", *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_display_that_does_not_answer_is_told() -> None:
+    pytest.importorskip("imgui_bundle")
+    command = [sys.executable, "-m", "translucent", "preview", "leaf"]
+    environment = {**os.environ, "DISPLAY": ":987", "WAYLAND_DISPLAY": ""}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    assert done.returncode == 1
+    assert "no window can be opened on display ':987'" in done.stderr
+
+
+def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    bad, session, picture = (tmp_path / name for name in ("bad.glb", "session.toml", "picture.png"))
+    bad.write_bytes(b"")
+    done = preview("leaf", script=SCRIPT.format(bad=bad, session=session, picture=picture))
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["model"] == "leaf"
+    texts = {kind: [m["text"] for m in told["messages"] if m["kind"] == kind] for kind in ("info", "warning", "error")}
+    assert len(texts["error"]) == 1
+    assert "bad.glb" in texts["error"][0]
+    assert f"wrote {picture}" in texts["info"]
+    assert "color = [" in session.read_text()
+    window = np.asarray(Image.open(tmp_path / "window.png").convert("RGB"))
+    assert window.shape == (480, 640, 3)
+    # Panels are dark, the model's backdrop is bright: both are there.
+    assert (window.max(axis=2) > 200).mean() > 0.1
+    assert (window.max(axis=2) < 60).mean() > 0.2
+    with Image.open(picture) as saved:
+        assert saved.size[0] > 100
+
+
+def test_the_first_picture_is_there_soon(display: str) -> None:
+    """Of the window from the toolkit's start; the bound is loose, since other work may share the processor."""
+    code = (
+        "import time; begun = time.perf_counter()\n"
+        "from translucent.preview import app\n"
+        "from translucent.preview.document import Document\n"
+        "from translucent.preview.script import Script\n"
+        "class First(Script):\n"
+        "    def step(self, desk):\n"
+        "        return desk.stage.viewport.steps(0) > 0 or desk.stage.timings[0].wall > 0\n"
+        "app.run(Document(), (1280, 800), script=First([]))\n"
+        "print(time.perf_counter() - begun)\n"
+    )
+    environment = {**os.environ, "DISPLAY": display}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.splitlines()[-1]) < 10.0, done.stdout

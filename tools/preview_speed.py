@@ -1,0 +1,68 @@
+"""Frames per second of the previewer while a mesh of 81920 triangles is orbited, and what the frames are spent on.
+
+``python tools/preview_speed.py [SECONDS]``, on a display (``xvfb-run -a`` where there is none). The viewport has
+1280 x 720 pixels, all of them drawn in every frame; around it are the panels as they are at the start.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from translucent.preview import app, stage
+from translucent.preview.actions import Change, Turn
+from translucent.preview.desk import Desk
+from translucent.preview.document import Document, Model
+from translucent.preview.script import Script
+
+VIEWPORT = (1280, 720)
+
+
+class Orbit(Script):
+    """Turns the camera in every frame, and keeps the times."""
+
+    seconds = 8.0
+
+    def step(self, desk: Desk) -> bool:
+        self.frames: list[float]
+        if desk.work.loaded is None or desk.work.scene() is None:
+            return False
+        if not hasattr(self, "started"):
+            self.started, self.frames, self.inside, self.sizes = time.perf_counter(), [], [], set()
+            desk.work.do(Change("display.inset", False))
+        self.frames.append(time.perf_counter())
+        self.inside.append(desk.stage.drawing)
+        self.sizes.add(desk.stage.viewport.size)
+        desk.work.do(Turn(2.0, 0.0))
+        return time.perf_counter() - self.started > self.seconds
+
+
+def main() -> int:
+    """Measure and print."""
+    stage.FACTORS = (1.0,)  # no coarser picture while it moves
+    ball = trimesh.creation.icosphere(subdivisions=6, radius=0.05)
+    ball.vertices *= 1.0 + 0.15 * np.sin(40.0 * ball.vertices)
+    orbit = Orbit([])
+    if len(sys.argv) > 1:
+        orbit.seconds = float(sys.argv[1])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "ball.ply"
+        ball.export(path)
+        app.run(Document(Model(str(path))), (2700, 808), script=orbit)
+    frames, inside = np.diff(orbit.frames)[5:], np.array(orbit.inside[1:])[5:]
+    print(f"{len(ball.faces)} triangles, viewport {orbit.sizes}, {len(frames)} frames")
+    print(
+        f"{1 / np.median(frames):.1f} frames per second (median), {1 / np.quantile(frames, 0.95):.1f} (95th percentile)"
+    )
+    print(f"renderer {1e3 * np.median(inside):.1f} ms, whole frame {1e3 * np.median(frames):.1f} ms,")
+    print(f"share outside the renderer {1 - np.median(inside) / np.median(frames):.0%}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,61 @@
+"""``translucent preview``: a window in which a material is tried on a model."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import click
+
+from translucent.commands.common import common_options, read_size, unit_option
+from translucent.errors import InputError
+
+
+@click.command(epilog="Example: translucent preview goblet")
+@click.argument("model", required=False)
+@unit_option
+@click.option("--session", type=click.Path(path_type=Path), metavar="FILE", help="Begin with a session, a .toml file.")
+@click.option("--size", default="1600x1000", show_default=True, metavar="WxH", help="Size of the window.")
+@click.option("--scale", type=float, default=1.0, show_default=True, help="Makes letters and fields larger.")
+@click.option("--script", type=click.Path(path_type=Path), metavar="FILE", help="Do what a .toml file says; close.")
+@click.option("--screenshot", type=click.Path(path_type=Path), metavar="PNG", help="Of the window, at the end.")
+@common_options
+def preview(
+    model: str | None,
+    unit: str,
+    session: Path | None,
+    size: str,
+    scale: float,
+    script: Path | None,
+    screenshot: Path | None,
+    as_json: bool,
+) -> None:
+    """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without it: a goblet.
+
+    With --script, the window does what the script says, and closes; --screenshot keeps a picture of it.
+    """
+    from translucent.preview.app import require_display, run
+    from translucent.preview.document import Document, Model
+    from translucent.preview.script import Script, read_script
+    from translucent.preview.session import load_session
+
+    if session is not None and model is not None:
+        raise InputError(f"--session {str(session)!r}", f"{model} is given, too", "give one of them")
+    if not 0.5 <= scale <= 4.0:
+        raise InputError(f"--scale {scale}", "not in 0.5 to 4", "give for example 2")
+    if screenshot is not None and (screenshot.suffix.lower() != ".png" or not screenshot.parent.is_dir()):
+        raise InputError(f"--screenshot {str(screenshot)!r}", "no .png in a folder that is there", "give such a path")
+    pixels = read_size(size)
+    document = Document() if session is None else load_session(session)
+    if model is not None:
+        document = dataclasses.replace(document, model=Model(model, unit))
+    todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
+    require_display()
+    work = run(document, pixels, scale, todo, str(screenshot) if screenshot is not None else None)
+    if as_json:
+        told = [{"kind": message.kind, "text": message.text} for message in work.messages]
+        click.echo(json.dumps({"model": work.document.model.path, "messages": told}))
+    elif todo is not None:
+        for message in work.messages:
+            click.echo(f"{message.kind}: {message.text}", err=True)

@@ -1,0 +1,383 @@
+"""A picture that is looked at while it is drawn: at once and coarse, then sharp, then smooth, without reading it back.
+
+A step draws a frame whose pixels have their centers on one of `stride` x `stride` pixels of the picture, so that no
+step takes long on a slow machine, and that after `stride`^2 of them each pixel is what a frame of the full size shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.aovs import EMPTY, SEEN, WRONG, false_colors
+from translucent.errors import RenderError
+from translucent.frame import Frame
+from translucent.gpu.job import FrameJob
+from translucent.gpu.renderer import GpuRenderer
+from translucent.gpu.shaders import build_program, set_uniform
+from translucent.render_plan import RenderPlan
+from translucent.sampling import sample_shifts
+from translucent.scene import Scene
+from translucent.tone import TONES
+
+Size = tuple[int, int]
+
+#: Strides of steps; the sides of pictures are multiples of the largest.
+STRIDES = (1, 2, 4, 8)
+
+#: Samples of a pixel after which its edges are smooth.
+SAMPLES = 16
+
+MODES = ("picture", "thickness", "transmittance", "validity")
+RIGHT_SIDES = ("same", "second", "difference")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How a picture is shown.
+
+    Attributes
+    ----------
+    mode : {"picture", "thickness", "transmittance", "validity"}
+    right_side : {"same", "second", "difference"}
+    split : float
+        Where the right side begins, 0 to 1.
+    thickest, worst : float
+        Thickness of the last false color, and the largest difference of thickness, in metres.
+    exposure : float
+    tone : str
+    """
+
+    mode: str = "picture"
+    right_side: str = "same"
+    split: float = 1.0
+    thickest: float = 1.0
+    worst: float = 1.0
+    exposure: float = 0.0
+    tone: str = "none"
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What a pixel holds.
+
+    Attributes
+    ----------
+    thickness : float
+        In metres.
+    optical_depth : tuple of 3 floats
+    covered, valid : bool
+    """
+
+    thickness: float
+    optical_depth: tuple[float, float, float]
+    covered: bool
+    valid: bool
+
+
+class _Side:
+    """The sums of one frame: radiance, optical depth and thickness, flags."""
+
+    def __init__(self, gl: moderngl.Context, size: Size) -> None:
+        self.size = size
+        try:
+            self.textures = [gl.texture(size, count, dtype="f4") for count in (4, 4, 1)]
+            for texture in self.textures:
+                texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            self.all = gl.framebuffer(self.textures)
+            self.light = gl.framebuffer(self.textures[:1])
+        except moderngl.Error as error:
+            found = f"OpenGL has no room for it ({error})"
+            raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
+        self.step, self.stride = 0, 1
+
+    def known(self) -> list[int]:
+        """Which place of the stride x stride ones stands in for each, and for those that no stride has, 0."""
+        order = _order(self.stride)
+        found = [0] * STRIDES[-1] ** 2
+        for (x, y), block in order[: max(self.step, 1)]:
+            for i in range(x, x + block):
+                for j in range(y, y + block):
+                    found[i + self.stride * j] = x + self.stride * y
+        return found
+
+    def kept(self, x: int, y: int) -> Size:
+        """Where a pixel is kept, once all of them are drawn."""
+        part = self.size[0] // self.stride, self.size[1] // self.stride
+        return x % self.stride * part[0] + x // self.stride, y % self.stride * part[1] + y // self.stride
+
+    def release(self) -> None:
+        """Free the textures."""
+        for resource in (self.all, self.light, *self.textures):
+            resource.release()
+
+
+class Viewport:
+    """The picture of a window, in a texture; a second frame beside it, to compare.
+
+    Parameters
+    ----------
+    engine : GpuRenderer
+        Draws with the context of the window.
+
+    Attributes
+    ----------
+    size : (width, height)
+    """
+
+    def __init__(self, engine: GpuRenderer) -> None:
+        self.engine = engine
+        gl = self._gl = engine.context.gl
+        vertex = "geometry/fullscreen.vert"
+        self._gather = build_program(
+            gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
+        )
+        self._gathering = gl.vertex_array(self._gather, [])
+        self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
+        self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
+        # moderngl goes back to the framebuffer in use whenever it makes another one, and fails if that is gone. So
+        # before any is released, ours or the engine's, this one is put to use.
+        self._rest = gl.framebuffer([gl.texture((1, 1), 1)])
+        self._sides: list[_Side | None] = [None, None]
+        self._screen: moderngl.Framebuffer | None = None
+        self._coarse: moderngl.Framebuffer | None = None
+        self._at_once = False
+        self.size: Size = (0, 0)
+
+    @property
+    def texture(self) -> moderngl.Texture:
+        """The picture, sRGB-encoded; its first row is the bottom one, as OpenGL has it."""
+        return self.framebuffer.color_attachments[0]
+
+    @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        """What draws into `texture`."""
+        chosen = self._coarse if self._at_once and self._coarse is not None else self._screen
+        assert chosen is not None
+        return chosen
+
+    def at_once(self, factor: float) -> moderngl.Framebuffer:
+        """A framebuffer for a whole picture that is smaller by a factor, to be shown instead, until `present`."""
+        size = max(round(self.size[0] / factor), 1), max(round(self.size[1] / factor), 1)
+        self._rest.use()
+        if self._coarse is None or self._coarse.size != size:
+            self._release_coarse()
+            texture = self._gl.texture(size, 4)
+            if factor == 1.0:
+                texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            self._coarse = self._gl.framebuffer([texture])
+        self._at_once = True
+        return self._coarse
+
+    def resize(self, size: Size) -> None:
+        """Make room for pictures of a size; rounded down to a multiple of the largest stride.
+
+        Raises
+        ------
+        RenderError
+            If OpenGL has no room for them.
+        """
+        unit = STRIDES[-1]
+        size = max(size[0] // unit, 1) * unit, max(size[1] // unit, 1) * unit
+        if size == self.size:
+            return
+        limit = int(self.engine.context.info["GL_MAX_TEXTURE_SIZE"])
+        if max(size) > limit:
+            raise RenderError(
+                f"viewport of {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "make the window smaller"
+            )
+        self._release_pictures()
+        try:
+            screen = self._gl.texture(size, 4)
+            screen.filter = moderngl.NEAREST, moderngl.NEAREST
+            self._screen = self._gl.framebuffer([screen])
+        except moderngl.Error as error:
+            found = f"OpenGL has no room for it ({error})"
+            raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
+        self.size = size
+
+    def restart(self) -> None:
+        """Begin anew: something else is to be seen."""
+        for side in self._sides:
+            if side is not None:
+                side.step = 0
+
+    def step(self, side: int, scene: Scene, plan: RenderPlan, stride: int, samples: int = SAMPLES) -> None:
+        """Draw the next sample of a side, of `samples` a pixel besides its center; a picture has one stride."""
+        chosen = self._side(side, self.size)
+        chosen.stride = stride
+        round_, number = divmod(chosen.step, stride * stride)
+        phase, _ = _order(stride)[number]
+        right, down = shifts(samples)[(round_ - 1) % samples] if round_ else (0.0, 0.0)
+        self._rest.use()
+        engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
+        job = engine.prepare(scene, size, plan)
+        try:
+            job.place(((phase[0] + 0.5 + right) / stride - 0.5, (phase[1] + 0.5 + down) / stride - 0.5))
+            engine.run(job)
+            self._add(job, chosen, (phase[0] * size[0], phase[1] * size[1]), first=round_ == 0)
+        finally:
+            job.release()
+            engine.context.drain()
+        chosen.step += 1
+
+    def steps(self, side: int) -> int:
+        """How many samples a side has."""
+        found = self._sides[side]
+        return 0 if found is None else found.step
+
+    def put(self, frame: Frame) -> None:
+        """Let a frame, such as the reference, be the second side."""
+        side = self._side(1, frame.size)
+        height, width = frame.thickness.shape
+        light = np.ones((height, width, 4), dtype=np.float32)
+        with np.errstate(under="ignore", over="ignore"):
+            light[..., :3] = frame.radiance
+            depths = np.concatenate([frame.optical_depth, frame.thickness[..., None]], axis=2).astype(np.float32)
+        trust = frame.coverage.astype(np.float32) + 2.0 * frame.valid.astype(np.float32)
+        for texture, content in zip(side.textures, (light, depths, trust), strict=True):
+            texture.write(np.ascontiguousarray(content, dtype=np.float32))
+        side.step = side.stride = 1
+
+    def present(self, shown: Shown) -> None:
+        """Develop what there is into the texture."""
+        first, second = self._side(0, self.size), self._sides[1]
+        other = first if second is None or not second.step else second
+        for unit, texture in enumerate([*first.textures, *other.textures, self._colors]):
+            texture.use(unit)
+        right = RIGHT_SIDES.index(shown.right_side) if other is not first else 0
+        program, fullscreen = self._variant(MODES.index(shown.mode), right, TONES.index(shown.tone))
+        values: dict[str, object] = {
+            "shift_a": STRIDES.index(first.stride),
+            "known_a": first.known(),
+            "shift_b": STRIDES.index(other.stride),
+            "known_b": other.known(),
+            "split": shown.split * self.size[0],
+            "thickest": shown.thickest,
+            "worst": shown.worst,
+            "stops": shown.exposure,
+        }
+        for name, value in values.items():
+            if name in program:  # each variant uses some of them
+                set_uniform(program, name, value)
+        self._at_once = False
+        self.framebuffer.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        fullscreen.render(moderngl.TRIANGLES, vertices=3)
+
+    def _variant(self, mode: int, right: int, tone: int) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        key = mode, right, tone if mode in (0, 3) else 0
+        if key not in self._variants:
+            names = ("light_a", "depths_a", "trust_a", "light_b", "depths_b", "trust_b", "false_colors")
+            units = {name: i for i, name in enumerate(names)}
+            defines = dict(zip(("MODE", "RIGHT", "TONE"), key, strict=True))
+            program = build_program(self._gl, "geometry/fullscreen.vert", "present/compare.frag", defines, 330, **units)
+            for name, color in (("empty_color", EMPTY), ("seen_color", SEEN), ("wrong_color", WRONG)):
+                if name in program:
+                    set_uniform(program, name, tuple(v / 255.0 for v in color))
+            self._variants[key] = program, self._gl.vertex_array(program, [])
+        return self._variants[key]
+
+    def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
+        """What a pixel holds, counted from the top left; None if it is outside, or nothing is drawn yet."""
+        found = self._sides[side]
+        if found is None or not found.step or not (0 <= x < self.size[0] and 0 <= y < self.size[1]):
+            return None
+        x, y = x * found.size[0] // self.size[0], y * found.size[1] // self.size[1]
+        where = (*found.kept(x, y), 1, 1)
+        depths = np.frombuffer(found.all.read(where, 4, attachment=1, dtype="f4"), np.float32).astype(np.float64)
+        flags = int(np.frombuffer(found.all.read(where, 1, attachment=2, dtype="f4"), np.float32)[0])
+        red, green, blue, thickness = depths.tolist()
+        return Probe(thickness, (red, green, blue), bool(flags & 1), bool(flags & 2))
+
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        """(h, w, 3): the texture, read back."""
+        shown = self.framebuffer
+        data = shown.read(components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(shown.height, shown.width, 3)[::-1].copy()
+
+    def release(self) -> None:
+        """Free everything; the engine is somebody else's."""
+        self._release_pictures()
+        for resource in (
+            self._gathering,
+            self._gather,
+            self._colors,
+            *(one for v in self._variants.values() for one in v),
+        ):
+            resource.release()
+        self._variants.clear()
+        self._gl.detect_framebuffer(0).use()
+        self._rest.color_attachments[0].release()
+        self._rest.release()
+
+    def _release_pictures(self) -> None:
+        self._rest.use()
+        for side in self._sides:
+            if side is not None:
+                side.release()
+        self._sides = [None, None]
+        self._release_coarse()
+        if self._screen is not None:
+            self._screen.color_attachments[0].release()
+            self._screen.release()
+            self._screen = None
+        self.size = (0, 0)
+
+    def _release_coarse(self) -> None:
+        if self._coarse is not None:
+            self._coarse.color_attachments[0].release()
+            self._coarse.release()
+            self._coarse = None
+        self._at_once = False
+
+    def _side(self, number: int, size: Size) -> _Side:
+        side = self._sides[number]
+        if side is None or side.size != size:
+            self._rest.use()
+            if side is not None:
+                side.release()
+                self._sides[number] = None
+            side = self._sides[number] = _Side(self._gl, size)
+        return side
+
+    def _add(self, job: FrameJob, side: _Side, origin: Size, *, first: bool) -> None:
+        """Keep the frame of a job: in place of what there was, or adding to its radiance."""
+        result = job.targets.result()
+        radiance = job.picture.color_attachments[0]
+        for unit, texture in enumerate([radiance, *result.color_attachments[2:5]]):
+            texture.use(unit)
+        set_uniform(self._gather, "origin", origin)
+        into = side.all if first else side.light
+        into.viewport = (*origin, *job.targets.size)
+        into.use()
+        self._gl.enable_only(moderngl.NOTHING if first else moderngl.BLEND)
+        if not first:
+            self._gl.blend_equation = moderngl.FUNC_ADD
+            self._gl.blend_func = moderngl.ONE, moderngl.ONE
+        self._gathering.render(moderngl.TRIANGLES, vertices=3)
+
+
+@lru_cache(maxsize=4)
+def shifts(samples: int) -> npt.NDArray[np.float64]:
+    """(samples, 2): where in a pixel its later samples are. Slow when first asked for."""
+    return sample_shifts(samples)
+
+
+@lru_cache(maxsize=4)
+def _order(stride: int) -> list[tuple[Size, int]]:
+    """Places within stride x stride pixels, in the order in which they are drawn, and how far each one's color goes."""
+    order: list[tuple[Size, int]] = [((0, 0), stride)]
+    block = stride // 2
+    while block:
+        # Diagonals first: half of the new pixels already make the picture look sharper in both directions.
+        known = {place for place, _ in order}
+        places = [(x, y) for y in range(0, stride, block) for x in range(0, stride, block) if (x, y) not in known]
+        places.sort(key=lambda place: (place[0] % (2 * block) == 0) + (place[1] % (2 * block) == 0))
+        order += [(place, block) for place in places]
+        block //= 2
+    return order

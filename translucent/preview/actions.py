@@ -1,0 +1,206 @@
+"""What a user can do to a document: small values, and the pure function that does them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from translucent.errors import InputError
+from translucent.gltf.load import SUFFIXES
+from translucent.materials.color_distance import color_at
+from translucent.medium import MAX_COEFFICIENT, Medium
+from translucent.presets import preset
+from translucent.preview import orbiting
+from translucent.preview.document import Document, Material, Model, Orbit, checked
+
+
+@dataclass(frozen=True)
+class Change:
+    """Give a field, such as ``material.roughness``, a value. Changes of one `drag` are one step of undo."""
+
+    field: str
+    value: Any
+    drag: int | None = None
+
+
+@dataclass(frozen=True)
+class Open:
+    """Show another model."""
+
+    path: str
+    unit: str = "m"
+
+
+@dataclass(frozen=True)
+class ChoosePreset:
+    """Fill the bodies with a named medium."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Adopt:
+    """Take over the material that a model came with; no step of undo."""
+
+    material: Material
+
+
+@dataclass(frozen=True)
+class Replace:
+    """Show another document altogether: a session."""
+
+    document: Document
+
+
+@dataclass(frozen=True)
+class View:
+    """Put the camera there."""
+
+    orbit: Orbit | None
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Orbit by degrees: to the right, and upwards."""
+
+    right: float
+    up: float
+
+
+@dataclass(frozen=True)
+class Pan:
+    """Move the picture by shares of its height: to the right, and down."""
+
+    right: float
+    down: float
+
+
+@dataclass(frozen=True)
+class Zoom:
+    """Get closer by a factor, to what is at a place in the picture: heights right of and below its center."""
+
+    factor: float
+    right: float = 0.0
+    down: float = 0.0
+
+
+Action = Change | Open | ChoosePreset | Adopt | Replace | View | Turn | Pan | Zoom
+
+#: What moves the camera is no step of undo, and undo leaves the camera where it is.
+CAMERA_ACTIONS = (View, Turn, Pan, Zoom)
+
+#: Fields that make the medium one of a color at a distance, or one of coefficients.
+_BY_COLOR = ("color", "distance")
+_BY_COEFFICIENTS = ("absorption",)
+_OF_PRESET = ("scattering", "anisotropy", "emission")
+
+
+def apply(document: Document, action: Action) -> Document:
+    """The document after an action.
+
+    Raises
+    ------
+    InputError
+        If there is no such field or preset, or a value is out of its range; the document is as it was.
+    """
+    match action:
+        case Change():
+            return _changed(document, action)
+        case Open():
+            return _opened(document, action)
+        case ChoosePreset():
+            return dataclasses.replace(document, material=_of_preset(document.material, action.name))
+        case Adopt():
+            return dataclasses.replace(document, material=action.material)
+        case Replace():
+            return action.document
+        case View():
+            return dataclasses.replace(document, orbit=action.orbit)
+        case _:
+            if document.orbit is None:  # nothing is loaded yet, so that there is nothing to move
+                return document
+            return dataclasses.replace(document, orbit=_moved(document.orbit, action))
+
+
+def _moved(orbit: Orbit, action: Turn | Pan | Zoom) -> Orbit:
+    match action:
+        case Turn():
+            return orbiting.turned(orbit, action.right, action.up)
+        case Pan():
+            return orbiting.panned(orbit, action.right, action.down)
+        case Zoom():
+            return orbiting.zoomed(orbit, action.factor, (action.right, action.down))
+
+
+def _changed(document: Document, action: Change) -> Document:
+    section, _, name = action.field.partition(".")
+    owner = getattr(document, section, None) if section in document.__dataclass_fields__ else None
+    if owner is None or name not in owner.__dataclass_fields__ or action.field == "model.path":
+        raise InputError(f"field {action.field!r}", "there is none to change", "use for example material.roughness")
+    value = checked(action.field, action.value, getattr(owner, name))
+    changed = dataclasses.replace(owner, **{name: value})
+    if isinstance(changed, Material):
+        changed = _resourced(changed, name)
+    return dataclasses.replace(document, **{section: changed})
+
+
+def _resourced(material: Material, edited: str) -> Material:
+    """The material with the source that an edited field makes it have."""
+    if edited in _BY_COLOR:
+        absorption = absorption_of_color(material)
+        return dataclasses.replace(material, source="color", preset="", absorption=absorption)
+    if edited in _BY_COEFFICIENTS or (edited in _OF_PRESET and material.source == "preset"):
+        return _stated(dataclasses.replace(material, source="coefficients", preset=""))
+    if material.source == "file" and edited != "source":
+        return dataclasses.replace(material, source="coefficients")
+    return material
+
+
+def absorption_of_color(material: Material) -> tuple[float, float, float]:
+    """Absorption in 1/m of a color at a distance."""
+    from translucent.conversion import extinction_from_colors
+
+    absorption = extinction_from_colors(material.color, material.distance)
+    if not (absorption <= MAX_COEFFICIENT).all():
+        raise InputError(
+            f"distance {material.distance:g} m", "so short that the extinction overflows", "check the unit"
+        )
+    red, green, blue = absorption.tolist()
+    return red, green, blue
+
+
+def _opened(document: Document, action: Open) -> Document:
+    model = Model(action.path, checked("model.unit", action.unit, "m"))
+    material = document.material
+    # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
+    if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
+        material = Material()
+    return dataclasses.replace(document, model=model, material=material, orbit=None)
+
+
+def _of_preset(material: Material, name: str) -> Material:
+    found = preset(name)
+    medium = found.medium
+    filled = dataclasses.replace(
+        material,
+        source="preset",
+        preset=found.name,
+        absorption=tuple(found.absorption.tolist()),
+        scattering=tuple(found.scattering.tolist()),
+        emission=tuple(np.asarray(medium.emission).tolist()),
+        anisotropy=float(medium.anisotropy),
+        ior=float(medium.ior),
+    )
+    return _stated(filled)
+
+
+def _stated(material: Material) -> Material:
+    """The material with the color at a distance that its coefficients make, as ``translucent extinction`` states it."""
+    medium = Medium(material.absorption, material.scattering)
+    color, distance = color_at(medium, None if medium.extinction.any() else 1.0)
+    red, green, blue = np.asarray(color).tolist()
+    return dataclasses.replace(material, color=(red, green, blue), distance=float(distance))

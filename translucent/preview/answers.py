@@ -1,0 +1,72 @@
+"""What is done with the files that dialogs and scripts name."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from translucent.errors import InputError
+from translucent.gltf.load import SUFFIXES
+from translucent.materials.gltf_write import write_medium
+from translucent.preview.actions import Change
+from translucent.preview.desk import Desk
+from translucent.preview.dialogs import answer
+from translucent.preview.document import Model
+from translucent.preview.exports import write_picture, write_turntable
+from translucent.preview.scenes import medium_of, method_of
+
+
+def take_answers(desk: Desk) -> None:
+    """Do what the user has asked for in dialogs that have been answered."""
+    for entry in list(desk.dialogs):
+        path = answer(entry[1])
+        if path is None:
+            continue
+        desk.dialogs.remove(entry)
+        if path:
+            use_file(desk, entry[0], path)
+
+
+def use_file(desk: Desk, kind: str, path: str) -> None:
+    """Read or write a file, by what it was asked for."""
+    work = desk.work
+    match kind:
+        case "open":
+            work.open(Model(path, desk.get("model.unit")))
+        case "open session":
+            work.open_session(path)
+        case "save session":
+            work.save_session(path)
+        case "environment" | "background":
+            work.do(Change(f"look.{kind}", path))
+        case "save glb":
+            work.attempt(lambda: _save_medium(desk, path), f"wrote {path}")
+        case "map":
+            if work.bake is not None:
+                bake = work.bake
+                work.attempt(lambda: bake.map.save(path), f"wrote {path}")
+        case _:
+            _export(desk, kind, path)
+
+
+def _export(desk: Desk, kind: str, path: str) -> None:
+    scene, document = desk.work.scene(), desk.work.document
+    if scene is None:
+        return
+    method, size = method_of(document.display.method, document.material), desk.stage.viewport.size
+    look = document.look.exposure, document.look.tone
+    if kind == "turntable":
+        work = partial(write_turntable, path=path, scene=scene, method=method, size=size, look=look)
+        desk.work.export(path, partial(work, count=desk.export["pictures"]))
+    else:
+        work = partial(write_picture, path=path, scene=scene, method=method, size=size, look=look)
+        desk.work.export(path, partial(work, transparent=desk.export["transparent"]))
+
+
+def _save_medium(desk: Desk, path: str) -> None:
+    """The model's file, with the medium in its materials; of another kind of file there is nothing to keep."""
+    source, material = desk.get("model.path"), desk.work.document.material
+    if Path(source).suffix.lower() not in SUFFIXES:
+        do = "copy the medium as glTF, or export the model as .glb first"
+        raise InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do)
+    write_medium(source, path, medium_of(material), distance=material.distance)

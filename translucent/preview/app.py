@@ -1,0 +1,285 @@
+"""The window: docked panels around a viewport, menus, and what a frame does."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from translucent.errors import RenderError
+from translucent.preview.document import Document
+from translucent.preview.script import Script
+from translucent.preview.workspace import Workspace
+
+#: What the window is called in the system.
+TITLE = "translucent"
+
+#: sRGB of what is behind panels.
+BACKGROUND = (0.135, 0.14, 0.15, 1.0)
+
+#: Frames per second of a window that has nothing to do.
+IDLE_FPS = 9.0
+
+
+def require_display() -> None:
+    """Raise where there is nowhere to open a window, or no package that could.
+
+    Raises
+    ------
+    RenderError
+        It names the way without a window.
+    """
+    without = "without a window: translucent render MODEL -o picture.png"
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise RenderError("preview", "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)", without)
+    try:
+        import imgui_bundle  # noqa: F401
+    except ImportError:
+        found = "the package imgui-bundle is missing"
+        raise RenderError("preview", found, f"pip install 'translucent-shading[ui]', or {without}") from None
+
+
+def run(
+    document: Document,
+    size: tuple[int, int] = (1600, 1000),
+    scale: float = 1.0,
+    script: Script | None = None,
+    screenshot: str | None = None,
+) -> Workspace:
+    """Open the window, and come back when it is closed.
+
+    Parameters
+    ----------
+    document : Document
+    size : (width, height)
+        Of the window.
+    scale : float
+        Of letters and fields, besides that of the display.
+    script : Script, optional
+        Does what it says, one action a frame, and then closes the window.
+    screenshot : str, optional
+        A .png of the window as it was at the end.
+
+    Raises
+    ------
+    RenderError
+        If there is no display, or the window cannot be opened.
+    """
+    require_display()
+    from imgui_bundle import hello_imgui
+
+    window = _Window(document, script)
+    params = window.params(size, scale)
+    with _told_as_messages(window.work):
+        try:
+            hello_imgui.run(params)
+        except RuntimeError as error:
+            if "glfw" not in str(error).lower():
+                raise
+            found = f"no window can be opened on display {os.environ.get('DISPLAY', '')!r}"
+            raise RenderError("preview", found, "without a window: translucent render MODEL -o picture.png") from error
+        finally:
+            window.work.close()
+    if window.failure is not None:
+        raise window.failure
+    if screenshot is not None:
+        from translucent.frame import write_atomically, write_png
+
+        pixels = hello_imgui.final_app_window_screenshot()
+        write_atomically(Path(screenshot), partial(write_png, pixels=pixels))
+    return window.work
+
+
+@contextmanager
+def _told_as_messages(work: Workspace) -> Iterator[None]:
+    """Warnings go to the window, not to a terminal that nobody sees."""
+    before = warnings.showwarning
+    warnings.showwarning = lambda message, *_, **__: work.tell("warning", str(message))
+    try:
+        yield
+    finally:
+        warnings.showwarning = before
+
+
+class _Window:
+    """Callbacks of the window."""
+
+    def __init__(self, document: Document, script: Script | None) -> None:
+        # The model is read while the window opens.
+        self.work = Workspace(document)
+        self.script = script
+        self.failure: BaseException | None = None
+        self.desk: Any = None
+        self._drops: object = None
+
+    def params(self, size: tuple[int, int], scale: float) -> Any:
+        """What the window is made of."""
+        from imgui_bundle import hello_imgui, imgui
+
+        params = hello_imgui.RunnerParams()
+        window = params.app_window_params
+        window.window_title, window.window_geometry.size = TITLE, size
+        window.restore_previous_geometry = self.script is None
+        if self.script is not None:
+            params.ini_folder_type = hello_imgui.IniFolderType.temp_folder
+            params.ini_disable = True
+            window.window_geometry.size_auto = False
+        else:
+            params.ini_folder_type = hello_imgui.IniFolderType.app_user_config_folder
+            params.ini_filename = "translucent/preview.ini"
+        # The window is text and one picture that is smooth already: eight samples of it would be lost time.
+        options = hello_imgui.OpenGlOptions()
+        options.anti_aliasing_samples = 0
+        params.renderer_backend_options.open_gl_options = options
+        if scale != 1.0:
+            params.dpi_aware_params.dpi_window_size_factor = scale
+        imgui_window = params.imgui_window_params
+        imgui_window.default_imgui_window_type = hello_imgui.DefaultImGuiWindowType.provide_full_screen_dock_space
+        imgui_window.show_menu_bar = True
+        imgui_window.show_menu_app = imgui_window.show_menu_view = False
+        imgui_window.show_status_bar = True
+        imgui_window.show_status_fps = False
+        params.fps_idling.fps_idle = IDLE_FPS
+        imgui_window.background_color = imgui.ImVec4(*BACKGROUND)
+        params.callbacks.setup_imgui_style = self._guarded(self._style)
+        params.callbacks.post_init = self._guarded(self._opened)
+        params.callbacks.before_exit = self._guarded(self._closed)
+        params.callbacks.show_menus = self._guarded(self._menus)
+        params.callbacks.show_status = self._guarded(self._status)
+        params.callbacks.pre_new_frame = self._guarded(self._step)
+        params.docking_params = self._docking()
+        return params
+
+    def _guarded(self, callback: Callable[[], None]) -> Callable[[], None]:
+        """An exception in a callback would end the process; it closes the window instead, and is raised then."""
+
+        def call() -> None:
+            try:
+                callback()
+            except BaseException as error:  # noqa: BLE001 - raised when the window is closed
+                self._fail(error)
+
+        return call
+
+    def _fail(self, error: BaseException) -> None:
+        from imgui_bundle import hello_imgui
+
+        self.failure = self.failure or error
+        hello_imgui.get_runner_params().app_shall_exit = True
+
+    def _docking(self) -> Any:
+        from imgui_bundle import hello_imgui, imgui
+
+        from translucent.preview.panel_look import files_panel, look_panel
+        from translucent.preview.panel_material import material_panel
+        from translucent.preview.panel_messages import messages_panel
+        from translucent.preview.panel_method import method_panel
+        from translucent.preview.panel_viewport import viewport_panel
+
+        docking = hello_imgui.DockingParams()
+        docking.docking_splits = [
+            hello_imgui.DockingSplit("MainDockSpace", "Right", imgui.Dir.right, 0.27),
+            hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.34),
+            hello_imgui.DockingSplit("Right", "Below", imgui.Dir.down, 0.16),
+        ]
+        panels: list[tuple[str, str, Callable[[Any], None]]] = [
+            ("Viewport", "MainDockSpace", viewport_panel),
+            ("Material", "Left", material_panel),
+            ("Method", "Right", method_panel),
+            ("Look", "Right", look_panel),
+            ("Files", "Right", files_panel),
+            ("Messages", "Below", messages_panel),
+        ]
+        windows = []
+        for label, space, panel in panels:
+            window = hello_imgui.DockableWindow(label, space)
+            window.gui_function = self._guarded(partial(self._show, panel))
+            window.can_be_closed = False
+            if label == "Viewport":
+                window.imgui_window_flags = imgui.WindowFlags_.no_scrollbar
+            windows.append(window)
+        docking.dockable_windows = windows
+        return docking
+
+    def _show(self, panel: Callable[[Any], None]) -> None:
+        from imgui_bundle import ImVec2, imgui
+
+        if self.desk is None:
+            return
+        if not imgui.is_window_docked():  # windows have no background of their own, see _style
+            low, size = imgui.get_window_pos(), imgui.get_window_size()
+            color = imgui.get_color_u32(imgui.ImVec4(*BACKGROUND))
+            imgui.get_window_draw_list().add_rect_filled(low, ImVec2(low.x + size.x, low.y + size.y), color)
+        panel(self.desk)
+
+    def _style(self) -> None:
+        """Backgrounds are what the window is cleared to: on a software rasteriser they took most of a frame's time."""
+        from imgui_bundle import imgui
+
+        style = imgui.get_style()
+        for part in (imgui.Col_.window_bg, imgui.Col_.docking_empty_bg, imgui.Col_.child_bg):
+            style.set_color_(part, imgui.ImVec4(0.0, 0.0, 0.0, 0.0))
+
+    def _opened(self) -> None:
+        from imgui_bundle import implot
+
+        from translucent.gpu.context import open_context
+        from translucent.preview.desk import Desk
+        from translucent.preview.dialogs import accept_drops
+        from translucent.preview.recent import read_recent
+        from translucent.preview.stage import Stage
+
+        implot.create_context()
+        self.desk = Desk(self.work, Stage(open_context("window").gl))
+        self._drops = accept_drops(self._dropped)
+        if self.script is None:
+            self.work.recent = read_recent()
+
+    def _dropped(self, path: str) -> None:
+        if Path(path).suffix.lower() == ".toml":
+            self.work.open_session(path)
+        else:
+            self.work.open(dataclasses.replace(self.work.document.model, path=path))
+
+    def _closed(self) -> None:
+        from imgui_bundle import implot
+
+        from translucent.preview.recent import write_recent
+
+        if self.script is None:
+            write_recent(self.work.recent)
+        if self.desk is not None:
+            self.desk.stage.close()
+            self.desk = None
+            implot.destroy_context()
+
+    def _step(self) -> None:
+        from imgui_bundle import hello_imgui
+
+        from translucent.preview.answers import take_answers
+
+        if self.desk is None:
+            return
+        take_answers(self.desk)
+        idling = hello_imgui.get_runner_params().fps_idling
+        idling.enable_idling = not self.desk.more and self.script is None
+        if self.script is not None and self.script.step(self.desk):
+            hello_imgui.get_runner_params().app_shall_exit = True
+
+    def _menus(self) -> None:
+        from translucent.preview.menus import menus
+
+        if self.desk is not None:
+            menus(self.desk)
+
+    def _status(self) -> None:
+        from translucent.preview.menus import status
+
+        if self.desk is not None:
+            status(self.desk)

@@ -1,0 +1,83 @@
+"""Baking a thickness map in the background, and the model painted with it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import translucent as tl
+from translucent.aovs import EMPTY, false_colors
+from translucent.color import srgb_to_linear
+from translucent.environment import Environment
+from translucent.medium import Medium
+from translucent.preview.document import Orbit
+from translucent.preview.numbers import length_text
+from translucent.preview.orbiting import camera_of
+from translucent.preview.tasks import Task
+from translucent.scene import Object, Scene
+from translucent.surface import Surface
+from translucent.texture import Texture
+
+
+@dataclass(eq=False)
+class Bake:
+    """A baked map, and the scene in which the model is painted with it.
+
+    Attributes
+    ----------
+    map : ThicknessMap
+        As `tl.bake_thickness` gives it.
+    mode : str
+    """
+
+    map: Any
+    mode: str
+    scene: Scene | None
+    _seen: tuple[Orbit, Scene] | None = None
+
+    @property
+    def covered(self) -> float:
+        """Share of the texels that have a value."""
+        return float(np.mean(self.map.coverage))
+
+    def thickest_text(self, unit: str) -> str:
+        """The largest value."""
+        values = self.map.values[self.map.coverage]
+        most = float(values.max(initial=0.0))
+        return f"{most:.3g}" if self.mode == "local" else length_text(most, unit)
+
+    def seen_from(self, orbit: Orbit) -> Scene | None:
+        """The painted model; the same object while the camera stays. None without texture coordinates."""
+        if self.scene is None:
+            return None
+        if self._seen is None or self._seen[0] != orbit:
+            self._seen = orbit, dataclasses.replace(self.scene, camera=camera_of(orbit))
+        return self._seen[1]
+
+
+def bake_map(task: Task, body: Object, medium: Medium, mode: str, size: int, rays: int) -> Bake:
+    """Bake a map of a body."""
+
+    def progress(done: int, total: int, cast: int) -> None:
+        task.report(done / max(total, 1), f"{cast / 1e6:.1f} million rays")
+
+    options: dict[str, Any] = {"medium": medium} if mode == "transmittance" else {}
+    baked = tl.bake_thickness(body.mesh, size=size, mode=mode, rays=rays, progress=progress, **options)  # type: ignore[attr-defined, unused-ignore]
+    mesh = getattr(baked, "mesh", None) or body.mesh
+    return Bake(baked, mode, painted(dataclasses.replace(body, mesh=mesh), baked) if mesh.uv is not None else None)
+
+
+def painted(body: Object, baked: Any) -> Scene:
+    """The body in the false colors of a map, unshaded but for a white surrounding."""
+    values = np.where(baked.coverage, baked.values, 0.0)
+    most = float(values.max(initial=0.0)) or 1.0
+    colors = false_colors()[np.rint(np.clip(values / most, 0.0, 1.0) * 255).astype(np.intp)]
+    colors[~np.asarray(baked.coverage, dtype=bool)] = EMPTY
+    paint = Surface(
+        transmission=0.0, roughness=1.0, color_texture=Texture(srgb_to_linear(colors / 255.0).astype(np.float32))
+    )
+    shown = dataclasses.replace(body, medium=Medium(absorption=1.0), surface=paint, sheet_thickness=None)
+    return Scene([shown], camera_of(Orbit()), environment=Environment.constant((1.0, 1.0, 1.0)))

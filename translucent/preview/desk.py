@@ -1,0 +1,227 @@
+"""What panels share: the workspace, the stage, and what only the window needs to remember. And the ways of a row."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from imgui_bundle import hello_imgui, imgui
+
+from translucent.preview.actions import Change
+from translucent.preview.dialogs import open_dialog
+from translucent.preview.document import RANGES
+from translucent.preview.measuring import Crossing, Measured, measure
+from translucent.preview.scenes import method_of
+from translucent.preview.stage import Stage
+from translucent.preview.workspace import Workspace
+from translucent.scene import Scene
+
+#: Seconds after which a view counts as still, and the name of what then begins.
+STILL = 0.25
+MEASURING = "measuring"
+
+#: sRGB of lines that warn, that tell of errors, and that matter less.
+WARNING, ERROR, FAINT = (1.0, 0.75, 0.35, 1.0), (1.0, 0.45, 0.35, 1.0), (0.62, 0.64, 0.68, 1.0)
+
+
+@dataclass
+class Probed:
+    """A pixel that the user wants to know about, and what the reference says of it."""
+
+    pixel: tuple[int, int]
+    scene: object
+    crossing: Crossing | None = None
+    asked: bool = False
+
+
+@dataclass
+class Desk:
+    """The window's own state; none of it is part of the document."""
+
+    work: Workspace
+    stage: Stage
+    drag: int = 0
+    more: bool = True
+    pressed_at: tuple[float, float] = (0.0, 0.0)
+    dragging_split: bool = False
+    texts: dict[str, str] = field(default_factory=dict)
+    probed: Probed | None = None
+    hovered: tuple[float, float] | None = None
+    pointer: tuple[float, float] | None = None
+    pinned: tuple[float, float] | None = None
+    selected: int | None = None
+    dialogs: list[tuple[str, Any]] = field(default_factory=list)
+    export: dict[str, Any] = field(default_factory=lambda: {"transparent": False, "pictures": 36})
+    baking: dict[str, Any] = field(default_factory=lambda: {"mode": "cone", "size": 512, "rays": 64})
+    _inset: tuple[Any, Any] | None = None
+    _measured_for: object = None
+    _asked: bool = False
+    _still_since: float = 0.0
+
+    def change(self, name: str, value: Any, *, step: bool = False) -> None:
+        """Give a field of the document a value; while the mouse is down, all of it is one step of undo."""
+        self.work.do(Change(name, value, None if step else self.drag))
+
+    def get(self, name: str) -> Any:
+        """A field of the document."""
+        section, _, key = name.partition(".")
+        return getattr(getattr(self.work.document, section), key)
+
+    def draw(self, pixels: tuple[int, int]) -> bool:
+        """Let the stage draw a step, and the background measure what has come to rest; whether more is to come."""
+        self.work.size = pixels
+        self.work.update()
+        more = self.stage.draw(self.work, pixels)
+        scene = self.work.scene()
+        wanted = (scene, self.work.document.display.method, self.work.document.display.compare)
+        if wanted != self._measured_for:
+            self._measured_for, self._still_since = wanted, time.monotonic()
+            self._asked = False
+        if scene is not None and not self._asked and time.monotonic() - self._still_since > STILL:
+            self._asked = True
+            self._measure(scene)
+        return more or not self._asked or bool(self.work.busy)
+
+    def _measure(self, scene: Scene) -> None:
+        document, size = self.work.document, self.stage.viewport.size
+        method = method_of(document.display.method, document.material)
+        lane = self.work.lanes["draw"].task
+        # What the user has asked for, a picture or a turntable, is not to be cut short.
+        if document.display.inset and (lane is None or lane.name == MEASURING):
+            self.work.measure(lambda own, task: measure(own, task, scene, method, size), MEASURING, self._take)
+        if document.display.compare in ("reference", "error"):
+            levels = (1,) if document.display.compare == "error" else None
+            self.work.draw_truth(scene, method, size, levels)
+
+    def _take(self, measured: Measured) -> None:
+        self.work.measured = measured
+
+    def frame(self) -> None:
+        """See the whole model, or the object that was clicked."""
+        self.work.frame(self.selected)
+
+    def turn_light(self, right: float, up: float) -> None:
+        """Move the light around and upwards, by degrees; it goes on if it was off."""
+        if not self.get("look.light"):
+            self.change("look.light", True)
+        self.change("look.light_yaw", math.remainder(self.get("look.light_yaw") + right, 360.0))
+        self.change("look.light_pitch", min(max(self.get("look.light_pitch") + up, -89.0), 89.0))
+
+    def ask_file(self, kind: str) -> None:
+        """Ask for a file to read or to write, in a dialog of the system."""
+        dialog = open_dialog(kind)
+        if dialog is not None:
+            self.dialogs.append((kind, dialog))
+        else:
+            self.work.tell("error", "no file dialog here: drop files on the window, or name them when starting")
+
+    def inset_texture(self, pixels: Any) -> Any:
+        """The reference's small picture as a texture."""
+        if self._inset is None or self._inset[0] is not pixels:
+            if self._inset is not None:
+                self._inset[1].release()
+            height, width = pixels.shape[:2]
+            gl = self.stage.renderer.gpu.context.gl
+            self._inset = pixels, gl.texture((width, height), 3, np.ascontiguousarray(pixels).tobytes(), alignment=1)
+        return self._inset[1]
+
+
+def em(count: float) -> float:
+    """Pixels of so many letters' heights, whatever the display's scale."""
+    return float(hello_imgui.em_size(count))
+
+
+def begin_rows(name: str) -> bool:
+    """A table of labels and fields."""
+    if not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_stretch_prop):
+        return False
+    imgui.table_setup_column("label", imgui.TableColumnFlags_.width_fixed, em(9.2))
+    imgui.table_setup_column("field", imgui.TableColumnFlags_.width_stretch, 1.0)
+    return True
+
+
+def row(label: str, tip: str = "") -> None:
+    """The label of the next field."""
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.align_text_to_frame_padding()
+    imgui.text(label)
+    if tip and imgui.is_item_hovered():
+        imgui.set_tooltip(tip)
+    imgui.table_next_column()
+    imgui.set_next_item_width(-1.0)
+
+
+def slider(
+    desk: Desk, label: str, name: str, low: float, high: float, form: str = "%.3f", *, log: bool = False, tip: str = ""
+) -> None:
+    """A number of the document."""
+    row(label, tip)
+    flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
+    changed, value = imgui.slider_float(f"##{name}", float(desk.get(name)), low, high, form, flags)
+    if imgui.is_item_activated():
+        desk.drag += 1
+    if changed and math.isfinite(value):
+        desk.change(name, value)
+
+
+def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
+    """Three numbers of the document, at least 0, on a line of their own; not in a table."""
+    wide_row(label, tip)
+    value = list(desk.get(name))
+    changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
+    if imgui.is_item_activated():
+        desk.drag += 1
+    if changed and all(math.isfinite(v) for v in values):
+        desk.change(name, [max(v, 0.0) for v in values])
+
+
+def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
+    """One of some words."""
+    row(label, tip)
+    now = desk.get(name)
+    if imgui.begin_combo(f"##{name}", str(now)):
+        for word in words:
+            if imgui.selectable(word, word == now)[0]:
+                desk.change(name, word, step=True)
+        imgui.end_combo()
+
+
+def wide_row(label: str, tip: str = "") -> None:
+    """The label of a field that takes the whole line below it, in a table that has just ended or not begun."""
+    imgui.text(label)
+    if tip and imgui.is_item_hovered():
+        imgui.set_tooltip(tip)
+    imgui.set_next_item_width(-1.0)
+
+
+def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:
+    """Yes or no."""
+    row(label, tip)
+    changed, value = imgui.checkbox(f"##{name}", bool(desk.get(name)))
+    if changed:
+        desk.change(name, value, step=True)
+
+
+def fact(label: str, text: str, color: tuple[float, float, float, float] | None = None) -> None:
+    """A label and what there is to tell, over as many lines as it takes."""
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.text_colored(FAINT, label)
+    imgui.table_next_column()
+    imgui.push_text_wrap_pos(0.0)
+    if color is None:
+        imgui.text(text)
+    else:
+        imgui.text_colored(color, text)
+    imgui.pop_text_wrap_pos()
+
+
+def wrapped(text: str, color: tuple[float, float, float, float]) -> None:
+    """A line that may take several."""
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(color, text)
+    imgui.pop_text_wrap_pos()

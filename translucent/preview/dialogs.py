@@ -1,0 +1,72 @@
+"""The system's file dialogs, without waiting for them, and files dropped on the window."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import imgui_bundle
+from imgui_bundle import hello_imgui, portable_file_dialogs
+
+MODELS = ["Models", "*.glb *.gltf *.obj *.stl *.ply *.off", "All files", "*"]
+SESSIONS = ["Sessions", "*.toml", "All files", "*"]
+PANORAMAS = ["Pictures of all directions", "*.hdr *.exr *.png *.jpg", "All files", "*"]
+
+#: What is asked for: the title, the file that is proposed where one is written, and the kinds.
+_QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
+    "open": ("Open a model", None, MODELS),
+    "open session": ("Open a session", None, SESSIONS),
+    "save session": ("Save the session", "session.toml", SESSIONS),
+    "environment": ("Light with a picture", None, PANORAMAS),
+    "background": ("A picture behind the model", None, PANORAMAS),
+    "png": ("Save the picture", "picture.png", ["PNG", "*.png"]),
+    "exr": ("Save the picture and its quantities", "picture.exr", ["OpenEXR", "*.exr"]),
+    "turntable": ("Save a turntable", "turntable.gif", ["Animations", "*.gif *.webp *.mp4"]),
+    "save glb": ("Save the medium into a copy of the model", "model.glb", ["glTF", "*.glb *.gltf"]),
+    "map": ("Save the thickness map", "thickness.exr", ["Maps", "*.exr *.png *.npy *.glb"]),
+}
+
+
+def open_dialog(kind: str) -> Any | None:
+    """A dialog that is now open, or None where the system has none."""
+    if sys.platform.startswith("linux") and not any(map(shutil.which, ("zenity", "kdialog", "matedialog", "qarma"))):
+        return None
+    title, proposed, kinds = _QUESTIONS[kind]
+    if proposed is None:
+        return portable_file_dialogs.open_file(title, "", kinds)
+    return portable_file_dialogs.save_file(title, proposed, kinds)
+
+
+def answer(dialog: Any) -> str | None:
+    """The file that the user has chosen; empty if none, None while the dialog is open."""
+    if not dialog.ready(0):
+        return None
+    result = dialog.result()
+    return result if isinstance(result, str) else (result[0] if result else "")
+
+
+_Callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
+
+
+def accept_drops(take: Callable[[str], None]) -> object:
+    """Call `take` for each file that is dropped on the window; what is returned has to be kept. None: not possible."""
+    folder = Path(imgui_bundle.__file__).parent
+    # The very file that the window uses: another copy of the library would know no windows.
+    names = ("libglfw.so.3", "libglfw.3.dylib", "glfw3.dll")
+    libraries = [folder / name for name in names if (folder / name).exists()]
+    if not libraries:
+        return None
+
+    def dropped(_: int, count: int, paths: Any) -> None:
+        for i in range(count):
+            take(paths[i].decode("utf-8", "surrogateescape"))
+
+    callback = _Callback(dropped)
+    library = ctypes.CDLL(str(libraries[0]))
+    window: int = getattr(hello_imgui, "get_glfw_window_address")()  # noqa: B009 - its stubs do not know it
+    library.glfwSetDropCallback(ctypes.c_void_p(window), callback)
+    return callback

@@ -1,0 +1,259 @@
+"""What the previewer shows, as one frozen value: it can be compared, undone, written to a file, and needs no window."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from translucent.camera import MAX_COORDINATE
+from translucent.environment import MAX_EXPOSURE
+from translucent.errors import InputError
+from translucent.lights import MAX_RADIANCE
+from translucent.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR
+from translucent.showcase import DEFAULT_COLOR
+from translucent.surface import MAX_DISPERSION
+from translucent.thickness import METHODS
+from translucent.tone import TONES
+from translucent.units import METRES_PER_UNIT
+
+Triple = tuple[float, float, float]
+Source = Literal["file", "color", "preset", "coefficients"]
+Mode = Literal["picture", "thickness", "transmittance", "validity"]
+Compare = Literal["off", "method", "reference", "error"]
+
+#: The planner picks.
+AUTO = "auto"
+
+#: Of lengths, the ones that panels offer.
+SHOWN_UNITS = ("mm", "cm", "m", "in")
+
+#: Nothing on a display is closer to the poles than this: "up" would lose its meaning.
+MAX_PITCH = 89.9
+
+
+@dataclass(frozen=True)
+class Model:
+    """A file, or one of the toolkit's own meshes by name, and the unit of its coordinates."""
+
+    path: str = "goblet"
+    unit: str = "m"
+
+
+@dataclass(frozen=True)
+class Material:
+    """What fills the bodies, and what their border does. Names of glTF where it has one.
+
+    Attributes
+    ----------
+    source : {"file", "color", "preset", "coefficients"}
+        Where absorption comes from: the model itself, `color` at `distance`, or `absorption` (of a preset, or edited).
+    color : tuple of 3 floats
+        attenuationColor, linear Rec.709.
+    distance : float
+        attenuationDistance in metres.
+    preset : str
+        Name of the preset that the coefficients come from, or nothing.
+    absorption, scattering : tuple of 3 floats
+        1/m.
+    emission : tuple of 3 floats
+        Radiance per metre.
+    anisotropy : float
+        Henyey-Greenstein g.
+    ior, roughness, transmission, dispersion : float
+    multiple_scattering : bool
+    thickness : float
+        thicknessFactor in metres, written to files and taken by thin layers.
+    """
+
+    source: Source = "file"
+    color: Triple = DEFAULT_COLOR
+    distance: float = 0.02
+    preset: str = ""
+    absorption: Triple = (0.0, 0.0, 0.0)
+    scattering: Triple = (0.0, 0.0, 0.0)
+    emission: Triple = (0.0, 0.0, 0.0)
+    anisotropy: float = 0.0
+    ior: float = 1.0
+    roughness: float = 0.0
+    transmission: float = 1.0
+    dispersion: float = 0.0
+    multiple_scattering: bool = False
+    thickness: float = 0.001
+
+
+@dataclass(frozen=True)
+class Look:
+    """What lights the model, what is behind it, and how the picture is developed.
+
+    Attributes
+    ----------
+    environment, background : str
+        As ``translucent render`` takes them; no background: the environment itself. No environment: the scene's own.
+    rotation : float
+        Of the environment about +Y, in degrees.
+    exposure : float
+        Stops.
+    tone : {"none", "neutral", "agx"}
+    light : bool
+        A directional light besides, from `light_yaw` and `light_pitch` (degrees) with `light_irradiance` (W/m^2).
+    """
+
+    environment: str = ""
+    background: str = ""
+    rotation: float = 0.0
+    exposure: float = 0.0
+    tone: str = "none"
+    light: bool = False
+    light_yaw: float = 45.0
+    light_pitch: float = 45.0
+    light_irradiance: float = 3.0
+
+
+@dataclass(frozen=True)
+class Display:
+    """What the viewport shows of the model, and how it is found.
+
+    Attributes
+    ----------
+    method, method_b : str
+        Names of methods, or ``auto``: the planner's choice.
+    mode : {"picture", "thickness", "transmittance", "validity"}
+    compare : {"off", "method", "reference", "error"}
+        What is right of the split: nothing, `method_b`, the float64 reference, or the signed error against it.
+    split : float
+        Place of the split, 0 to 1 from the left.
+    inset : bool
+        Measure against the reference while the view is still, and show that reference in a corner.
+    antialias : bool
+        Refine the edges while the view is still.
+    unit : str
+        In which lengths are shown.
+    """
+
+    method: str = AUTO
+    method_b: str = "thin-layer"
+    mode: Mode = "picture"
+    compare: Compare = "off"
+    split: float = 0.5
+    inset: bool = True
+    antialias: bool = True
+    unit: str = "mm"
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A camera that goes around a target.
+
+    Attributes
+    ----------
+    target : tuple of 3 floats
+        In metres.
+    yaw, pitch : float
+        Where the camera is, as seen from the target, in degrees: yaw about +Y, 0 on +Z, 90 on +X; pitch upwards.
+    distance : float
+        From the target, in metres.
+    fov_y : float
+        Vertical angle of view in degrees.
+    orthographic : bool
+        The same height at the target, without perspective.
+    """
+
+    target: Triple = (0.0, 0.0, 0.0)
+    yaw: float = 24.0
+    pitch: float = 18.0
+    distance: float = 1.0
+    fov_y: float = 30.0
+    orthographic: bool = False
+
+
+@dataclass(frozen=True)
+class Document:
+    """Everything that a session holds. No orbit: the model is to be framed."""
+
+    model: Model = field(default_factory=Model)
+    material: Material = field(default_factory=Material)
+    look: Look = field(default_factory=Look)
+    display: Display = field(default_factory=Display)
+    orbit: Orbit | None = None
+
+
+@dataclass(frozen=True)
+class _Range:
+    """What a field may hold: numbers in a range, or one of some words."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+    words: tuple[str, ...] = ()
+
+
+_METHODS = (AUTO, *METHODS)
+_POSITIVE = _Range(0.0, 1e12, above=True)
+
+#: Fields that do not hold just anything of their type, by section and name.
+RANGES: dict[str, _Range] = {
+    "model.unit": _Range(words=tuple(METRES_PER_UNIT)),
+    "material.source": _Range(words=get_args(Source)),
+    "material.color": _Range(0.0, 1.0, above=True),
+    "material.distance": _POSITIVE,
+    "material.absorption": _Range(0.0, MAX_COEFFICIENT),
+    "material.scattering": _Range(0.0, MAX_COEFFICIENT),
+    "material.emission": _Range(0.0, MAX_EMISSION),
+    "material.anisotropy": _Range(-0.999, 0.999),
+    "material.ior": _Range(1.0, MAX_IOR),
+    "material.roughness": _Range(0.0, 1.0),
+    "material.transmission": _Range(0.0, 1.0),
+    "material.dispersion": _Range(0.0, MAX_DISPERSION),
+    "material.thickness": _POSITIVE,
+    "look.rotation": _Range(-1e6, 1e6),
+    "look.exposure": _Range(-MAX_EXPOSURE, MAX_EXPOSURE),
+    "look.tone": _Range(words=TONES),
+    "look.light_yaw": _Range(-1e6, 1e6),
+    "look.light_pitch": _Range(-MAX_PITCH, MAX_PITCH),
+    "look.light_irradiance": _Range(0.0, MAX_RADIANCE),
+    "display.method": _Range(words=_METHODS),
+    "display.method_b": _Range(words=_METHODS),
+    "display.mode": _Range(words=get_args(Mode)),
+    "display.compare": _Range(words=get_args(Compare)),
+    "display.split": _Range(0.0, 1.0),
+    "display.unit": _Range(words=SHOWN_UNITS),
+    "orbit.target": _Range(-MAX_COORDINATE, MAX_COORDINATE),
+    "orbit.yaw": _Range(-1e6, 1e6),
+    "orbit.pitch": _Range(-MAX_PITCH, MAX_PITCH),
+    "orbit.distance": _Range(0.0, MAX_COORDINATE, above=True),
+    "orbit.fov_y": _Range(1.0, 150.0),
+}
+
+
+def checked(name: str, value: Any, like: Any) -> Any:
+    """The value, in the type of `like`, if the field `name` (``material.roughness``) may hold it.
+
+    Raises
+    ------
+    InputError
+        If it may not.
+    """
+    range_ = RANGES.get(name, _Range())
+    if isinstance(like, bool) or isinstance(value, bool):
+        if not (isinstance(like, bool) and isinstance(value, bool)):
+            raise InputError(f"{name} = {value!r}", "of the wrong type", f"give for example {like!r}")
+        return value
+    if isinstance(like, str):
+        if not isinstance(value, str) or (range_.words and value not in range_.words):
+            raise InputError(f"{name} = {value!r}", "not one of its words", f"use {', '.join(range_.words) or 'text'}")
+        return value
+    if isinstance(like, tuple):
+        if not isinstance(value, tuple | list) or len(value) != 3:
+            raise InputError(f"{name} = {value!r}", "not three numbers", "give for example [0.2, 0.6, 0.4]")
+        return tuple(_number(name, one, range_) for one in value)
+    return _number(name, value, range_)
+
+
+def _number(name: str, value: Any, range_: _Range) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{name} = {value!r}", "not a finite number", "give a number")
+    if not range_.low <= value <= range_.high or (range_.above and value == range_.low):
+        least = f"above {range_.low:g}" if range_.above else f"at least {range_.low:g}"
+        raise InputError(f"{name} = {value:g}", "out of its range", f"give {least} and at most {range_.high:g}")
+    return float(value)

@@ -1,0 +1,61 @@
+"""Undo and redo: documents before and after each step, with drags as one step."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+from translucent.preview.actions import CAMERA_ACTIONS, Action, Adopt, Change, apply
+from translucent.preview.document import Document
+
+#: Steps that can be undone.
+MAX_STEPS = 200
+
+
+@dataclass(frozen=True)
+class History:
+    """A document, what it was, and what it will be again.
+
+    Attributes
+    ----------
+    present : Document
+    past, future : tuple of Document
+        The last of `past` is what undo shows, the last of `future` what redo shows.
+    drag : tuple of (str, int), optional
+        Field and number of the drag that made the present one.
+    """
+
+    present: Document = dataclasses.field(default_factory=Document)
+    past: tuple[Document, ...] = ()
+    future: tuple[Document, ...] = ()
+    drag: tuple[str, int] | None = None
+
+    def done(self, action: Action) -> History:
+        """After an action; one that changes nothing leaves no step, and a drag leaves one."""
+        after = apply(self.present, action)
+        if isinstance(action, (*CAMERA_ACTIONS, Adopt)):
+            return dataclasses.replace(self, present=after)
+        if after == self.present:
+            return self
+        drag = (action.field, action.drag) if isinstance(action, Change) and action.drag is not None else None
+        if drag is not None and drag == self.drag:
+            return dataclasses.replace(self, present=after, future=())
+        return History(after, (*self.past, self.present)[-MAX_STEPS:], (), drag)
+
+    def undone(self) -> History:
+        """A step back; the camera stays, unless the model is another."""
+        if not self.past:
+            return self
+        before = _seen_as(self.present, self.past[-1])
+        return History(before, self.past[:-1], (*self.future, self.present))
+
+    def redone(self) -> History:
+        """A step forward again."""
+        if not self.future:
+            return self
+        after = _seen_as(self.present, self.future[-1])
+        return History(after, (*self.past, self.present), self.future[:-1])
+
+
+def _seen_as(present: Document, other: Document) -> Document:
+    return dataclasses.replace(other, orbit=present.orbit) if other.model == present.model else other

@@ -1,0 +1,187 @@
+"""From a document and a loaded model to the scene that is rendered, and from a model to the material that it has."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from translucent.environment import Environment
+from translucent.environment_files import READERS
+from translucent.errors import InputError
+from translucent.lights import DirectionalLight
+from translucent.materials.color_distance import color_at
+from translucent.medium import Medium
+from translucent.preview.document import AUTO, Document, Look, Material, Model
+from translucent.preview.orbiting import camera_of
+from translucent.scene import Object, Scene
+from translucent.showcase import DEFAULT_COLOR, DEFAULT_REACH, LIGHT_TABLE
+from translucent.surface import Surface
+from translucent.thickness import Method, ThinLayer, method_from_name
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A model that has been read: its scene, and the material that its bodies came with."""
+
+    model: Model
+    scene: Scene
+    material: Material
+
+    @property
+    def triangles(self) -> int:
+        """How many are drawn."""
+        return sum(len(item.mesh.faces) for item in self.scene.objects)
+
+
+def load(model: Model) -> Loaded:
+    """Read a model, and work out all that would hold up its first picture.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    from translucent.assets import mesh_names, mesh_path
+    from translucent.gltf.load import SUFFIXES, load_scene
+    from translucent.mesh import load_mesh
+    from translucent.showcase import showcase
+
+    if Path(model.path).suffix.lower() in SUFFIXES:
+        scene: Scene = load_scene(model.path, model.unit)
+    elif model.path in mesh_names() and not Path(model.path).exists():
+        scene = showcase(load_mesh(mesh_path(model.path)))
+    else:
+        scene = showcase(load_mesh(model.path, unit=model.unit))
+    for item in scene.objects:
+        _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
+    return Loaded(model, scene, material_of(scene))
+
+
+def material_of(scene: Scene) -> Material:
+    """The material of the first body; of an opaque model, what it would be filled with."""
+    diagonal = scene.diagonal or 1.0
+    if not scene.bodies:
+        return Material(color=DEFAULT_COLOR, distance=DEFAULT_REACH * diagonal, thickness=0.1 * diagonal)
+    body = scene.bodies[0]
+    medium, surface = body.medium or Medium(), body.surface or Surface()
+    reach = DEFAULT_REACH * diagonal
+    # Where the showcase states it; if that is too dark or too bright to tell, where 1/e is left.
+    near = reach if (medium.transmittance(reach) > 1e-3).all() else None
+    color, distance = color_at(medium, near)
+    triples = (np.asarray(v).tolist() for v in (color, medium.absorption, medium.scattering, medium.emission))
+    given = tuple((float(r), float(g), float(b)) for r, g, b in triples)
+    return Material(
+        color=given[0],
+        distance=float(distance) if math.isfinite(distance) else reach,
+        absorption=given[1],
+        scattering=given[2],
+        emission=given[3],
+        anisotropy=medium.anisotropy,
+        ior=medium.ior,
+        roughness=surface.roughness,
+        transmission=surface.transmission,
+        dispersion=surface.dispersion,
+        multiple_scattering=surface.multiple_scattering,
+        thickness=body.sheet_thickness or 0.1 * diagonal,
+    )
+
+
+def medium_of(material: Material) -> Medium:
+    """What fills the bodies: for a color at a distance, exactly what ``translucent extinction`` makes of it."""
+    absorption: object = material.absorption
+    if material.source == "color":
+        absorption = Medium.from_color(material.color, material.distance).absorption
+    return Medium(absorption, material.scattering, material.emission, material.anisotropy, material.ior)  # type: ignore[arg-type]
+
+
+def scene_of(document: Document, loaded: Loaded) -> Scene:
+    """The scene of a document with an orbit; a model without bodies is filled altogether.
+
+    Raises
+    ------
+    InputError
+        If the environment cannot be read.
+    """
+    if document.orbit is None:
+        raise InputError("a picture", "nobody has framed the model", "frame it first")
+    scene, look = loaded.scene, document.look
+    lights = (*scene.lights, _light(look)) if look.light else scene.lights
+    return dataclasses.replace(
+        scene,
+        objects=_objects(document.material, scene),
+        camera=camera_of(document.orbit),
+        lights=lights,
+        environment=_environment(look.environment, look.background, look.rotation, scene),
+    )
+
+
+@lru_cache(maxsize=2)
+def _objects(material: Material, scene: Scene) -> tuple[Object, ...]:
+    """The scene's objects with the material in its bodies; kept, so that turning the camera makes none anew."""
+    if material.source == "file" and scene.bodies:
+        return tuple(scene.objects)
+    medium, chosen = medium_of(material), scene.bodies or tuple(scene.objects)
+    return tuple(_filled(item, material, medium) if item in chosen else item for item in scene.objects)
+
+
+def _filled(item: Object, material: Material, medium: Medium) -> Object:
+    surface = dataclasses.replace(
+        item.surface or Surface(),
+        roughness=material.roughness,
+        transmission=material.transmission,
+        dispersion=material.dispersion,
+        multiple_scattering=material.multiple_scattering,
+    )
+    return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
+
+
+def towards_light(look: Look) -> tuple[float, float, float]:
+    """Unit vector to the light that the look adds."""
+    yaw, pitch = math.radians(look.light_yaw), math.radians(look.light_pitch)
+    return math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)
+
+
+def _light(look: Look) -> DirectionalLight:
+    return DirectionalLight([-v for v in towards_light(look)], look.light_irradiance)
+
+
+@lru_cache(maxsize=2)
+def _environment(name: str, background: str, rotation: float, scene: Scene) -> Environment:
+    """What lights the scene; kept, since what is made of it for rough surfaces is kept with it."""
+    lit = named_environment(name) if name else scene.environment
+    if lit.kind == "image" and rotation:
+        lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
+    return lit.with_background(named_environment(background)) if background else lit
+
+
+@lru_cache(maxsize=4)
+def named_environment(name: str) -> Environment:
+    """light-table, studio, checkerboard, a color, or a file with a picture of all directions.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    if name == "studio":
+        return Environment.studio()
+    if Path(name).suffix.lower() in READERS:
+        return Environment.image(name)
+    if name == "light-table":
+        return LIGHT_TABLE
+    if name == "checkerboard":
+        return Environment.checkerboard(tiles=12)
+    return Environment.constant(name)
+
+
+def method_of(name: str, material: Material) -> Method | None:
+    """The method of a name; a thin layer is as thick as the material says."""
+    if name == AUTO:
+        return None
+    method = method_from_name(name)
+    return ThinLayer(material.thickness) if isinstance(method, ThinLayer) else method

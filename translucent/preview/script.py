@@ -1,0 +1,210 @@
+"""Scripts: what a user would do, as a list of actions in TOML; for tests, pictures of the window and demonstrations.
+
+Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
+(name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
+``undo``, ``redo``, ``frame``. Of the window: ``probe`` (x, y: shares of the viewport), ``select`` (panel), ``wait``
+(seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file),
+``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``, ``release`` (button), ``wheel``
+(steps).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from translucent.errors import InputError
+from translucent.preview.actions import Change, ChoosePreset, Pan, Turn, Zoom
+from translucent.preview.document import Model
+from translucent.preview.session import read_toml
+
+if TYPE_CHECKING:
+    from translucent.preview.desk import Desk
+
+#: Seconds after which a script goes on, whatever is under way.
+PATIENCE = 120.0
+
+#: Frames between two actions: what an action changes is seen before the next one.
+FRAMES = 2
+
+_WORDS: dict[str, dict[str, Any]] = {
+    "change": {"field": str, "value": object},
+    "open": {"model": str, "unit": "m"},
+    "preset": {"name": str},
+    "turn": {"right": 0.0, "up": 0.0},
+    "pan": {"right": 0.0, "down": 0.0},
+    "zoom": {"factor": 1.0, "right": 0.0, "down": 0.0},
+    "undo": {},
+    "redo": {},
+    "frame": {},
+    "probe": {"x": 0.5, "y": 0.5},
+    "select": {"panel": str},
+    "wait": {"seconds": -1.0},
+    "reload": {},
+    "bake": {"mode": "cone", "size": 256, "rays": 16},
+    "save": {"kind": str, "file": str},
+    "session": {"file": str},
+    "point": {"x": 0.5, "y": 0.5},
+    "press": {"button": 0},
+    "release": {"button": 0},
+    "wheel": {"steps": 1.0},
+}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One action of a script."""
+
+    do: str
+    values: dict[str, Any]
+
+
+@dataclass
+class Script:
+    """A script under way.
+
+    Attributes
+    ----------
+    steps : list of Step
+        Those that are still to be done, the next one last.
+    """
+
+    steps: list[Step]
+    _frames: int = 0
+    _waiting: float | None = None
+    _until: float = 0.0
+    done: list[Step] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, steps: list[Step]) -> Script:
+        """Waits for the model first, and for all that is under way at the end."""
+        settle = Step("wait", {"seconds": -1.0})
+        return cls([settle, *steps, settle][::-1])
+
+    def step(self, desk: Desk) -> bool:
+        """Do the next action, if it is time; whether all are done."""
+        hold_pointer(desk)
+        if self._waiting is not None:
+            if not self._rested(desk):
+                return False
+            self._waiting = None
+        self._frames += 1
+        if self._frames < FRAMES:
+            return False
+        self._frames = 0
+        if not self.steps:
+            return True
+        step = self.steps.pop()
+        self.done.append(step)
+        if step.do == "wait":
+            self._waiting = time.monotonic()
+            self._until = step.values["seconds"]
+        else:
+            perform(desk, step)
+        return False
+
+    def _rested(self, desk: Desk) -> bool:
+        assert self._waiting is not None
+        passed = time.monotonic() - self._waiting
+        if self._until >= 0:
+            return passed >= self._until
+        return passed > 0.5 and (not desk.more or passed > PATIENCE)
+
+
+def read_script(path: str | Path) -> Script:
+    """A script from a file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or an action in it is unknown, lacks a value or has one of the wrong type.
+    """
+    what = f"script {str(path)!r}"
+    table = read_toml(path, what)
+    actions = table.get("action")
+    if not isinstance(actions, list) or set(table) != {"action"}:
+        raise InputError(what, "not a list of [[action]]", 'write [[action]], and do = "turn" below')
+    return Script.of([read_step(one, f"{what}, action {i}") for i, one in enumerate(actions, 1)])
+
+
+def read_step(table: Any, where: str) -> Step:
+    """One action, checked."""
+    verb = table.get("do") if isinstance(table, dict) else None
+    if verb not in _WORDS:
+        close = get_close_matches(str(verb), _WORDS, n=1)
+        raise InputError(where, f"do = {verb!r}", f"did you mean {close[0]}?" if close else f"use {', '.join(_WORDS)}")
+    known, values = _WORDS[verb], {key: value for key, value in table.items() if key != "do"}
+    if unknown := sorted(set(values) - set(known)):
+        raise InputError(where, f"{verb} knows no {unknown[0]!r}", f"use {', '.join(known) or 'nothing'}")
+    found = {}
+    for key, default in known.items():
+        required = isinstance(default, type)
+        if key not in values and required:
+            raise InputError(where, f"{verb} without {key!r}", f"give it: {', '.join(known)}")
+        value = values.get(key, default)
+        kind = default if required else type(default)
+        if kind is float and isinstance(value, int):
+            value = float(value)
+        if kind is not object and not isinstance(value, kind):
+            raise InputError(where, f"{key} = {value!r}", f"give a {kind.__name__}")
+        found[key] = value
+    return Step(verb, found)
+
+
+def perform(desk: Desk, step: Step) -> None:
+    """Do one action."""
+    work, v = desk.work, step.values
+    verbs: dict[str, Callable[[], object]] = {
+        "change": lambda: work.do(Change(v["field"], v["value"])),
+        "open": lambda: work.open(Model(v["model"], v["unit"])),
+        "preset": lambda: work.do(ChoosePreset(v["name"])),
+        "turn": lambda: work.do(Turn(v["right"], v["up"])),
+        "pan": lambda: work.do(Pan(v["right"], v["down"])),
+        "zoom": lambda: work.do(Zoom(v["factor"], v["right"], v["down"])),
+        "undo": work.undo,
+        "redo": work.redo,
+        "frame": desk.frame,
+        "probe": lambda: setattr(desk, "pinned", (v["x"], v["y"])),
+        "select": lambda: _select(v["panel"]),
+        "reload": lambda: desk.stage.reload(work),
+        "bake": lambda: work.start_bake(v["mode"], v["size"], v["rays"]),
+        "save": lambda: _use_file(desk, v["kind"], v["file"]),
+        "session": lambda: work.open_session(v["file"]),
+        "point": lambda: setattr(desk, "pointer", (v["x"], v["y"])),
+        "press": lambda: _io().add_mouse_button_event(v["button"], True),
+        "release": lambda: _io().add_mouse_button_event(v["button"], False),
+        "wheel": lambda: _io().add_mouse_wheel_event(0.0, v["steps"]),
+    }
+    verbs[step.do]()
+
+
+def _use_file(desk: Desk, kind: str, path: str) -> None:
+    from translucent.preview.answers import use_file
+
+    use_file(desk, kind, path)
+
+
+def hold_pointer(desk: Desk) -> None:
+    """Keep the mouse where the script has put it, whatever the system says."""
+    if desk.pointer is not None:
+        size = _io().display_size
+        _io().add_mouse_pos_event(desk.pointer[0] * size.x, desk.pointer[1] * size.y)
+
+
+def _io() -> Any:
+    from imgui_bundle import imgui
+
+    return imgui.get_io()
+
+
+def _select(panel: str) -> None:
+    from imgui_bundle import hello_imgui
+
+    window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(panel)
+    if window is None:
+        raise InputError(f"panel {panel!r}", "there is none", "use Material, Method, Look, Files or Messages")
+    window.focus_window_at_next_frame = True

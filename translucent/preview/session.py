@@ -1,0 +1,104 @@
+"""Sessions and scripts as TOML: a document, or a list of actions, in text that can be read and edited."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from translucent.errors import InputError, RenderError
+from translucent.frame import write_atomically
+from translucent.preview.document import Document, Orbit, checked
+
+#: Of the format; a later one that this cannot read would raise it.
+VERSION = 1
+
+_SECTIONS = ("model", "material", "look", "display", "orbit")
+
+
+def to_table(document: Document) -> dict[str, Any]:
+    """The document in what TOML can hold."""
+    table: dict[str, Any] = {"version": VERSION}
+    for section in _SECTIONS:
+        value = getattr(document, section)
+        if value is not None:
+            fields = dataclasses.asdict(value)
+            table[section] = {key: list(v) if isinstance(v, tuple) else v for key, v in fields.items()}
+    return table
+
+
+def from_table(table: dict[str, Any], where: str) -> Document:
+    """The document that a table holds; what it does not mention is as at the start.
+
+    Raises
+    ------
+    InputError
+        If something in it is unknown, or out of its range.
+    """
+    if table.get("version") != VERSION:
+        raise InputError(where, f"version {table.get('version')!r}", f"use a session of version {VERSION}")
+    sections: dict[str, Any] = {}
+    for section, fields in table.items():
+        if section == "version":
+            continue
+        if section not in _SECTIONS or not isinstance(fields, dict):
+            raise InputError(where, f"an unknown [{section}]", f"use {', '.join(_SECTIONS)}")
+        default = Orbit() if section == "orbit" else getattr(Document(), section)
+        sections[section] = dataclasses.replace(default, **_fields(section, default, fields, where))
+    return Document(**sections)
+
+
+def _fields(section: str, default: Any, fields: dict[str, Any], where: str) -> dict[str, Any]:
+    found = {}
+    for key, value in fields.items():
+        if key not in default.__dataclass_fields__:
+            raise InputError(f"{where}, [{section}]", f"an unknown key {key!r}", "check the spelling")
+        try:
+            found[key] = checked(f"{section}.{key}", value, getattr(default, key))
+        except InputError as error:
+            raise InputError(where, str(error)) from None
+    return found
+
+
+def save_session(path: str | Path, document: Document) -> None:
+    """Write a document; the file is complete or not there.
+
+    Raises
+    ------
+    RenderError
+        If the file cannot be written, or the package that writes TOML is missing.
+    """
+    try:
+        import tomli_w
+    except ImportError:
+        what = f"session {str(path)!r}"
+        raise RenderError(what, "the package tomli-w is missing", "pip install 'translucent-shading[ui]'") from None
+    text = tomli_w.dumps(to_table(document))
+    write_atomically(Path(path), lambda file: _write_text(file, text))
+
+
+def _write_text(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8")
+
+
+def load_session(path: str | Path) -> Document:
+    """Read a document.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is no session.
+    """
+    what = f"session {str(path)!r}"
+    return from_table(read_toml(path, what), what)
+
+
+def read_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """The table in a file; `what` is what errors call it."""
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(what, f"cannot be read ({error.strerror})", "check the path") from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(what, f"no TOML: {error}", "correct the file") from None

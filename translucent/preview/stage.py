@@ -1,0 +1,289 @@
+"""What draws the viewport: a renderer in the window's context, steps that never take long, shaders that may change."""
+
+from __future__ import annotations
+
+import time
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from translucent.assets import shader_path
+from translucent.errors import TranslucentError
+from translucent.gpu.context import open_context
+from translucent.gpu.viewport import STRIDES, Probe, Shown, Viewport
+from translucent.preview.measuring import Truth
+from translucent.preview.scenes import method_of
+from translucent.preview.workspace import Workspace
+from translucent.render_plan import RenderPlan
+from translucent.renderer import Renderer
+from translucent.scene import Scene
+from translucent.thickness import Method
+
+#: Seconds that a step should take at most, and samples of a pixel when steps are quick or slow.
+BUDGET = 0.045
+SAMPLES, SLOW_SAMPLES = 16, 4
+
+#: By which a picture is coarser while it moves.
+FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+
+#: Seconds between looks at the shader files.
+WATCH = 0.5
+
+
+Factor = TypeVar("Factor", int, float)
+
+
+@dataclass
+class Timing:
+    """What the last step of a side took: seconds, by the clock and per pass on the GPU; and its share of the pixels."""
+
+    wall: float = 0.0
+    passes: dict[str, float] | None = None
+    share: float = 1.0
+
+    @property
+    def gpu(self) -> float:
+        """Sum over the passes."""
+        return sum((self.passes or {}).values())
+
+
+class Stage:
+    """Draws a workspace's scene into a texture.
+
+    Parameters
+    ----------
+    context : moderngl.Context, optional
+        Of the window; None opens one without a window.
+
+    Attributes
+    ----------
+    plans : list of RenderPlan or None
+        Of both sides; what ran and why.
+    timings : list of Timing
+    problem : str
+        Why the picture is not what it should be, or nothing.
+    shader_problem : str
+        The compiler's message, while the last good shaders go on.
+    drawing : float
+        Seconds that the last call of `draw` took.
+    """
+
+    def __init__(self, context: Any = None) -> None:
+        # Whoever owns the window draws into it next, wherever we have drawn.
+        self._window = None if context is None else context.detect_framebuffer()
+        self._own = open_context() if context is None else None
+        self._gl = context if self._own is None else self._own.gl
+        with self.current():
+            self.renderer = Renderer(context=self._gl)
+            self.viewport = Viewport(self.renderer.gpu)
+        self.plans: list[RenderPlan | None] = [None, None]
+        self.timings = [Timing(), Timing()]
+        self.problem = self.shader_problem = ""
+        self.drawing = 0.0
+        self._shown: tuple[object, ...] = ()
+        self._presented: tuple[object, ...] = ()
+        self._costs: dict[tuple[str, ...], float] = {}
+        self._strides = [4, 4]
+        self._truth: Truth | None = None
+        self._watched = time.monotonic()
+        self._newest = _newest_shader()
+
+    def current(self) -> AbstractContextManager[Any]:
+        """The context is current within: a window's always is, and our own is made so."""
+        return nullcontext(self._gl) if self._own is None else self._own.current()
+
+    def draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
+        """Draw a step, if there is one left; whether more are.
+
+        What goes wrong is told in `problem`, and the last picture stays.
+        """
+        started = time.perf_counter()
+        with self.current():
+            try:
+                more = self._draw(workspace, size)
+                self.problem = ""
+            except TranslucentError as error:
+                self.problem, more = str(error), False
+            finally:
+                if self._window is not None:
+                    self._window.use()
+        self.drawing = time.perf_counter() - started
+        return more
+
+    def _draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
+        scene, display = workspace.scene(), workspace.document.display
+        self.viewport.resize(size)
+        if scene is None:
+            return False
+        material = workspace.document.material
+        methods = [method_of(display.method, material), method_of(display.method_b, material)]
+        both = display.compare == "method"
+        wanted = (scene, methods[0], methods[1] if both else None, self.viewport.size, self.renderer)
+        fresh = wanted != self._shown
+        if not fresh:
+            self.watch(workspace)
+        else:
+            self.plans = [
+                self.renderer.plan(scene, methods[0]),
+                self.renderer.plan(scene, methods[1]) if both else None,
+            ]
+            self._shown = wanted
+            self.viewport.restart()
+            self._truth = None
+            self._strides = [self._factor(plan, STRIDES) for plan in self.plans]
+            if display.mode == "picture" and display.compare == "off":
+                return self._draw_at_once(scene, methods[0], workspace)
+        drawn = [self._step(side, scene, display.antialias) for side in ((1, 0) if both else (0,))]
+        self._present(workspace, scene, changed=any(drawn))
+        return any(drawn)
+
+    def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
+        """While things move: the picture itself and nothing beside it."""
+        look, begun = workspace.document.look, time.perf_counter()
+        factor = self._factor(self.plans[0], FACTORS)
+        framebuffer = self.viewport.at_once(factor)
+        plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone)
+        self._finish(0, plan, factor, begun)
+        self._presented = ()
+        return True
+
+    def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
+        """Draw the next sample of a side, if there is one left to draw."""
+        stride, plan = self._strides[side], self.plans[side]
+        samples = (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
+        if plan is None or self.viewport.steps(side) >= stride * stride * (1 + samples):
+            return False
+        begun = time.perf_counter()
+        self.viewport.step(side, scene, plan, stride, max(samples, 1))
+        self._finish(side, plan, stride, begun)
+        return True
+
+    def _finish(self, side: int, plan: RenderPlan, stride: float, begun: float) -> None:
+        self.renderer.gpu.context.gl.finish()
+        wall = time.perf_counter() - begun
+        seconds = wall * stride * stride
+        known = self._costs.get(_kind(plan))
+        # The first of its kind compiles shaders.
+        self._costs[_kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
+        self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
+
+    def _factor(self, plan: RenderPlan | None, factors: tuple[Factor, ...]) -> Factor:
+        """The least of the factors with which a picture is drawn quickly, as far as one can tell."""
+        known = None if plan is None else self._costs.get(_kind(plan))
+        if known is None:
+            return factors[0] if plan is None else factors[len(factors) // 2]
+        return next((factor for factor in factors if known / factor**2 <= BUDGET), factors[-1])
+
+    def _present(self, workspace: Workspace, scene: Scene, changed: bool) -> None:
+        display, look = workspace.document.display, workspace.document.look
+        if display.compare in ("reference", "error"):
+            truth = workspace.truth
+            if truth is not None and truth is not self._truth and truth.scene is scene:
+                self.viewport.put(truth.frame)
+                self._truth, changed = truth, True
+        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
+        if display.compare in ("reference", "error") and self._truth is None:
+            right = "same"
+        shown = Shown(
+            display.mode,
+            right,
+            display.split,
+            self.thickest(workspace),
+            self.worst(workspace),
+            look.exposure,
+            look.tone,
+        )
+        wanted = (shown, self._shown)
+        if changed or wanted != self._presented:
+            self.viewport.present(shown)
+            self._presented = wanted
+
+    def has_truth(self) -> bool:
+        """Whether the split shows the reference."""
+        return self._truth is not None
+
+    def thickest(self, workspace: Workspace) -> float:
+        """Metres of the last false color: the thickest that was measured, or a guess."""
+        measured = workspace.measured
+        if measured is not None and measured.seen.thickness.size:
+            return float(measured.seen.thickness.max()) or 1.0
+        return workspace.loaded.scene.diagonal or 1.0 if workspace.loaded else 1.0
+
+    def worst(self, workspace: Workspace) -> float:
+        """Metres of the largest error that has a color of its own."""
+        measured = workspace.measured
+        least = 1e-7 * self.thickest(workspace)
+        return max(measured.errors[0].p99, least) if measured is not None and measured.errors else 10 * least
+
+    def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
+        """What a pixel of a side holds, once it has been drawn for good."""
+        done = self._strides[side] ** 2 if side == 0 or self.plans[1] is not None else 1
+        if self.viewport.steps(side) < done:
+            return None
+        with self.current():
+            return self.viewport.probe(x, y, side)
+
+    def watch(self, workspace: Workspace) -> None:
+        """Take over shaders that have changed on disk, unless they do not compile."""
+        if time.monotonic() - self._watched < WATCH:
+            return
+        self._watched = time.monotonic()
+        if (newest := _newest_shader()) != self._newest:
+            self._newest = newest
+            self.reload(workspace)
+
+    def reload(self, workspace: Workspace) -> None:
+        """Compile the shaders anew; if that fails, go on with those there are, and tell why."""
+        scene = workspace.scene()
+        with self.current():
+            fresh = Renderer(context=self._gl)
+            viewport = None
+            try:
+                viewport = Viewport(fresh.gpu)
+                viewport.resize((64, 64))
+                for plan in self.plans if scene is not None else ():
+                    if scene is not None and plan is not None:
+                        viewport.step(0, scene, fresh.plan(scene, plan.method), 1)
+            except TranslucentError as error:
+                self.shader_problem = str(error)
+                if viewport is not None:
+                    viewport.release()
+                fresh.close()
+                return
+            viewport.release()
+            self._take_over(fresh)
+        workspace.tell("info", "shaders reloaded")
+
+    def _take_over(self, fresh: Renderer) -> None:
+        size, self.shader_problem = self.viewport.size, ""
+        self.viewport.release()
+        self.renderer.close()
+        self.renderer = fresh
+        self.viewport = Viewport(fresh.gpu)
+        self.viewport.resize(size)
+        self._shown = self._presented = ()
+
+    def close(self) -> None:
+        """Free everything."""
+        with self.current():
+            self.viewport.release()
+            self.renderer.close()
+        if self._own is not None:
+            self._own.gl.release()
+
+
+def _kind(plan: RenderPlan) -> tuple[str, ...]:
+    """Plans that take about the same time."""
+    return (str(plan.method), *(step.name for step in plan.passes))
+
+
+def _newest_shader() -> float:
+    folder = shader_path("README.md").parent
+    newest = 0.0
+    for path in Path(folder).rglob("*.[gvf]*"):
+        try:
+            newest = max(newest, path.stat().st_mtime)
+        except OSError:
+            continue  # it is being written
+    return newest

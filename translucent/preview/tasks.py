@@ -1,0 +1,145 @@
+"""Long work in threads of its own: with progress, and cancelled where nobody waits for it any more."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from queue import SimpleQueue
+from typing import Any
+
+from translucent.errors import TranslucentError
+
+
+class CancelledError(Exception):
+    """Raised within a task that nobody waits for."""
+
+
+@dataclass(eq=False)
+class Task:
+    """Work under way.
+
+    Attributes
+    ----------
+    name : str
+        What the user reads.
+    work : callable
+        Takes the task, which it tells how far it is by `report`.
+    then : callable
+        Takes the result, in the thread that polls.
+    share : float, optional
+        Done, 0 to 1, if that is known.
+    detail : str
+        What it is at.
+    """
+
+    name: str
+    work: Callable[[Task], Any]
+    then: Callable[[Any], None]
+    started: float = field(default_factory=time.monotonic)
+    share: float | None = None
+    detail: str = ""
+    result: Any = None
+    error: Exception | None = None
+    _cancelled: threading.Event = field(default_factory=threading.Event)
+    _finished: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether nobody waits for it."""
+        return self._cancelled.is_set()
+
+    @property
+    def finished(self) -> bool:
+        """Whether it has ended, in whichever way."""
+        return self._finished.is_set()
+
+    @property
+    def seconds(self) -> float:
+        """Since it was asked for."""
+        return time.monotonic() - self.started
+
+    def cancel(self) -> None:
+        """Nobody waits any more; the work ends at its next report."""
+        self._cancelled.set()
+
+    def report(self, share: float | None, detail: str = "") -> None:
+        """Tell how far the work is; raises `CancelledError` if nobody waits for it."""
+        if self.cancelled:
+            raise CancelledError
+        self.share, self.detail = share, detail
+
+    def run(self) -> None:
+        """Do the work, in a thread of a `Lane`."""
+        try:
+            if not self.cancelled:
+                self.result = self.work(self)
+        except CancelledError:
+            pass
+        except Exception as error:  # noqa: BLE001 - whatever it is, the window tells it and stays
+            self.error = error
+        finally:
+            self._finished.set()
+
+
+class Lane:
+    """A thread that does one task after the other; what is asked for takes the place of what was.
+
+    Parameters
+    ----------
+    name : str
+    at_end : callable, optional
+        Called in the thread when the lane ends.
+    """
+
+    def __init__(self, name: str, at_end: Callable[[], None] = lambda: None) -> None:
+        self.task: Task | None = None
+        self._at_end = at_end
+        self._waiting: SimpleQueue[Task | None] = SimpleQueue()
+        # A daemon: nobody who closes the window waits for a reference that nobody will see.
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def start(self, name: str, work: Callable[[Task], Any], then: Callable[[Any], None]) -> Task:
+        """Ask for work; what is under way is cancelled."""
+        if self.task is not None:
+            self.task.cancel()
+        self.task = Task(name, work, then)
+        self._waiting.put(self.task)
+        return self.task
+
+    def poll(self, tell: Callable[[str], None]) -> None:
+        """Hand over a result that is there, or tell what went wrong."""
+        task = self.task
+        if task is None or not task.finished:
+            return
+        self.task = None
+        if task.cancelled:
+            return
+        if task.error is None:
+            task.then(task.result)
+        else:
+            tell(problem(task.error))
+
+    def close(self, patience: float = 0.5) -> None:
+        """Cancel what is under way, and end the thread, unless that takes longer than `patience` seconds."""
+        if self.task is not None:
+            self.task.cancel()
+        self._waiting.put(None)
+        self._thread.join(patience)
+
+    def _run(self) -> None:
+        while (task := self._waiting.get()) is not None:
+            task.run()
+            del task  # or it, and its model, would stay until the next one
+        self._at_end()
+
+
+def problem(error: Exception) -> str:
+    """An error in words: those of the toolkit as they are, and a defect by its kind."""
+    if isinstance(error, TranslucentError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "the memory is full; close other programs, or use a smaller model or picture"
+    return f"unexpected {type(error).__name__}: {error or 'no details'}"

@@ -1,0 +1,295 @@
+"""What goes on behind the window: the history, the model that is loaded, and the work under way. No window, no GPU."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+from translucent.errors import InputError, TranslucentError
+from translucent.preview import orbiting
+from translucent.preview.actions import Action, Adopt, Open, Replace, View
+from translucent.preview.baking import Bake, bake_map
+from translucent.preview.document import Document, Model, Orbit
+from translucent.preview.exports import check_export
+from translucent.preview.history import History
+from translucent.preview.measuring import Measured, Measuring, Truth, truth_levels
+from translucent.preview.scenes import Loaded, load, medium_of, scene_of
+from translucent.preview.session import load_session, save_session
+from translucent.preview.tasks import Lane, Task
+from translucent.scene import Scene
+from translucent.thickness import Method
+
+#: Lines that the window keeps.
+MAX_MESSAGES = 50
+
+#: Models that are kept for undo.
+KEPT_MODELS = 2
+
+#: Files that were opened lately.
+MAX_RECENT = 8
+
+
+@dataclass(frozen=True)
+class Message:
+    """A line for the user."""
+
+    kind: Literal["info", "warning", "error"]
+    text: str
+    when: float = field(default_factory=time.monotonic)
+
+
+class Workspace:
+    """A document under way.
+
+    Attributes
+    ----------
+    history : History
+    loaded : Loaded, optional
+        The model on show: that of the document, or the one before while that is being read.
+    messages : deque of Message
+    recent : list of str
+    size : (width, height)
+        Of the viewport in pixels.
+    measured : Measured, optional
+        How the picture compares with the reference; None while that is not known.
+    truth : Truth, optional
+        The reference of the whole picture, if the split shows it.
+    bake : Bake, optional
+        The last map.
+    """
+
+    def __init__(self, document: Document | None = None) -> None:
+        self.history = History(document or Document())
+        self.loaded: Loaded | None = None
+        self.messages: deque[Message] = deque(maxlen=MAX_MESSAGES)
+        self.recent: list[str] = []
+        self.size = (1280, 720)
+        self.measured: Measured | None = None
+        self.truth: Truth | None = None
+        self.bake: Bake | None = None
+        self.show_bake = True
+        self._measuring = Measuring()
+        self.lanes = {
+            "load": Lane("load"),
+            "draw": Lane("draw", self._measuring.close),
+            "truth": Lane("truth"),
+            "bake": Lane("bake"),
+            "ray": Lane("ray"),
+        }
+        self._models: list[Loaded] = []
+        self._refused: Model | None = None
+        self._scene: tuple[Document, Loaded, Scene] | None = None
+        self.changed = time.monotonic()
+        self._want(self.document.model)
+
+    @property
+    def document(self) -> Document:
+        """The one on show."""
+        return self.history.present
+
+    def do(self, action: Action) -> None:
+        """Do an action to the document, or tell why not."""
+        if isinstance(action, Open):
+            return self.open(Model(action.path, action.unit))
+        try:
+            self._set(self.history.done(action))
+        except TranslucentError as error:
+            self.tell("error", str(error))
+        return None
+
+    def undo(self) -> None:
+        """A step back."""
+        self._set(self.history.undone())
+
+    def redo(self) -> None:
+        """A step forward again."""
+        self._set(self.history.redone())
+
+    def open(self, model: Model, then: Document | None = None) -> None:
+        """Read a model in the background, and show it, or the document `then` with it, once it is there."""
+
+        def show(loaded: Loaded) -> None:
+            self._keep(loaded)
+            self._set(self.history.done(Replace(then) if then is not None else Open(model.path, model.unit)))
+            if os.path.exists(model.path):
+                path = str(Path(model.path).resolve())
+                self.recent = [path, *(p for p in self.recent if p != path)][:MAX_RECENT]
+
+        self._load(model, show)
+
+    def open_session(self, path: str) -> None:
+        """Show the document of a file."""
+        try:
+            document = load_session(path)
+        except TranslucentError as error:
+            return self.tell("error", str(error))
+        return self.open(document.model, document)
+
+    def save_session(self, path: str) -> None:
+        """Write the document to a file."""
+        self.attempt(lambda: save_session(path, self.document), f"saved {path}")
+
+    def attempt(self, work: Callable[[], object], done: str) -> None:
+        """Do quick work on files, and tell how it went."""
+        try:
+            work()
+        except TranslucentError as error:
+            self.tell("error", str(error))
+        else:
+            self.tell("info", done)
+
+    def frame(self, number: int | None = None) -> None:
+        """See the whole model, or one of its objects, from the side where the camera is."""
+        if self.loaded is not None:
+            objects = self.loaded.scene.objects
+            chosen = [objects[number]] if number is not None and number < len(objects) else objects
+            self.do(View(orbiting.framed(self.document.orbit, chosen, self.size)))
+
+    def reframe(self) -> None:
+        """See the model as it was seen when it was opened."""
+        self._complete()
+
+    def update(self) -> None:
+        """Take over what the background has done, and ask it for what is missing."""
+        for lane in self.lanes.values():
+            lane.poll(lambda text: self.tell("error", text))
+        if self.loaded is None or self.document.model != self.loaded.model:
+            self._want(self.document.model)
+
+    def scene(self) -> Scene | None:
+        """What is to be seen; the same object for as long as nothing about it changes."""
+        document, loaded = self.document, self.loaded
+        if loaded is None or document.orbit is None:
+            return None
+        if self.bake is not None and self.show_bake:
+            return self.bake.seen_from(document.orbit)
+        if self._scene is not None:
+            known, model, scene = self._scene
+            same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))
+            if same and model is loaded and _lit_alike(known, document):
+                return scene
+        scene = scene_of(document, loaded)
+        self._scene = document, loaded, scene
+        return scene
+
+    @property
+    def busy(self) -> list[Task]:
+        """Work that the user may want to see, or to cancel."""
+        return [lane.task for lane in self.lanes.values() if lane.task is not None]
+
+    def measure(self, work: Callable[[Measuring, Task], Any], name: str, then: Callable[[Any], None]) -> None:
+        """Draw something in the background, with a renderer of its own."""
+        self.lanes["draw"].start(name, lambda task: work(self._measuring, task), then)
+
+    def draw_truth(
+        self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
+    ) -> None:
+        """Draw the reference of the whole picture in the background; `truth` is the finest that is there."""
+
+        def deliver(truth: Truth) -> None:
+            self.truth = truth
+
+        work = partial(truth_levels, scene=scene, method=method, size=size, deliver=deliver, levels=levels)
+        self.lanes["truth"].start("float64 reference", work, lambda _: None)
+
+    def start_bake(self, mode: str, size: int, rays: int) -> None:
+        """Bake a map of the first body, and show it."""
+        if self.loaded is None:
+            return
+        body = (self.loaded.scene.bodies or tuple(self.loaded.scene.objects))[0]
+        medium = medium_of(self.document.material)
+
+        def show(bake: Bake) -> None:
+            self.bake, self.show_bake = bake, True
+
+        self.lanes["bake"].start(f"baking {mode}", lambda task: bake_map(task, body, medium, mode, size, rays), show)
+
+    def export(self, path: str, work: Callable[[Measuring, Task], None]) -> None:
+        """Draw a file in the background."""
+        try:
+            check_export(path)
+        except TranslucentError as error:
+            return self.tell("error", str(error))
+        return self.measure(work, f"writing {Path(path).name}", lambda _: self.tell("info", f"wrote {path}"))
+
+    def tell(self, kind: Literal["info", "warning", "error"], text: str) -> None:
+        """A line for the user, unless it is what the last one said."""
+        if not self.messages or self.messages[-1].text != text or time.monotonic() - self.messages[-1].when > 1.0:
+            self.messages.append(Message(kind, text))
+
+    def close(self) -> None:
+        """End all work."""
+        for lane in self.lanes.values():
+            lane.close()
+
+    def _set(self, history: History) -> None:
+        if history.present != self.history.present:
+            self.changed = time.monotonic()
+        self.history = history
+        if self.document.model != (self.loaded.model if self.loaded else None):
+            self._want(self.document.model)
+        else:
+            self._complete()
+
+    def _want(self, model: Model) -> None:
+        """Have the document's model loaded."""
+        for loaded in self._models:
+            if loaded.model == model:
+                self._keep(loaded)
+                return self._complete()
+        if self.lanes["load"].task is None and model != self._refused:
+            self._load(model, self._take)
+        return None
+
+    def _take(self, loaded: Loaded) -> None:
+        self._keep(loaded)
+        if self.document.model == loaded.model:
+            self._complete()
+
+    def _load(self, model: Model, then: Callable[[Loaded], None]) -> None:
+        def work(task: Task) -> Loaded:
+            task.report(None, f"reading {Path(model.path).name}")
+            try:
+                return load(model)
+            except InputError:
+                self._refused = model
+                raise
+
+        self.lanes["load"].start(f"opening {Path(model.path).name}", work, then)
+
+    def _keep(self, loaded: Loaded) -> None:
+        self._models = [loaded, *(one for one in self._models if one.model != loaded.model)][:KEPT_MODELS]
+        if self.loaded is not loaded:
+            self.loaded, self.bake, self.changed = loaded, None, time.monotonic()
+
+    def _complete(self) -> None:
+        """Give the document what only the model can tell: its own material, and where the camera is."""
+        if self.loaded is None:
+            return
+        present = self.document
+        if present.material.source == "file" and present.material != self.loaded.material:
+            self.history = self.history.done(Adopt(self.loaded.material))
+        if present.orbit is None:
+            self.history = self.history.done(View(_first_orbit(self.loaded, self.size)))
+
+
+def _first_orbit(loaded: Loaded, size: tuple[int, int]) -> Orbit:
+    """From where a file's own camera sees it, or framed."""
+    from translucent.gltf.load import GltfScene
+
+    if isinstance(loaded.scene, GltfScene):
+        return orbiting.orbit_of(loaded.scene.camera, loaded.scene.bounds.mean(axis=0))
+    return orbiting.framed(None, loaded.scene.objects, size)
+
+
+def _lit_alike(first: Document, second: Document) -> bool:
+    """Whether the looks differ in nothing but how the picture is developed."""
+    developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
+    return developed == second.look
