@@ -1,7 +1,8 @@
 """Frames per second of the previewer while a mesh of 81920 triangles is orbited, and what the frames are spent on.
 
-``python tools/preview_speed.py [SECONDS] [--adaptive]``, on a display (``xvfb-run -a`` where there is none). The viewport has
-1280 x 720 pixels, all of them drawn in every frame (or as few as the machine asks for, adaptive); around it are the panels as they are at the start.
+``python tools/preview_speed.py [SECONDS] [--adaptive]``, on a display (``xvfb-run -a`` where there is none). The
+viewport has 1280 x 720 pixels, all of them drawn in every frame, or, adaptive, as many as there is time for; around it
+are the panels as they are at the start.
 """
 
 from __future__ import annotations
