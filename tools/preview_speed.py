@@ -1,7 +1,8 @@
 """Frames per second of the previewer while a mesh of 81920 triangles is orbited, and what the frames are spent on.
 
-``python tools/preview_speed.py [SECONDS]``, on a display (``xvfb-run -a`` where there is none). The viewport has
-1280 x 720 pixels, all of them drawn in every frame; around it are the panels as they are at the start.
+``python tools/preview_speed.py [SECONDS] [--adaptive]``, on a display (``xvfb-run -a`` where there is none). The
+viewport has 1280 x 720 pixels, all of them drawn in every frame, or, adaptive, as many as there is time for; around it
+are the panels as they are at the start.
 """
 
 from __future__ import annotations
@@ -44,12 +45,13 @@ class Orbit(Script):
 
 def main() -> int:
     """Measure and print."""
-    stage.FACTORS = (1.0,)  # no coarser picture while it moves
+    if "--adaptive" not in sys.argv:
+        stage.FACTORS = (1.0,)  # no coarser picture while it moves
     ball = trimesh.creation.icosphere(subdivisions=6, radius=0.05)
     ball.vertices *= 1.0 + 0.15 * np.sin(40.0 * ball.vertices)
     orbit = Orbit([])
-    if len(sys.argv) > 1:
-        orbit.seconds = float(sys.argv[1])
+    if seconds := [float(text) for text in sys.argv[1:] if not text.startswith("--")]:
+        orbit.seconds = seconds[0]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "ball.ply"
         ball.export(path)

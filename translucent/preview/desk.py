@@ -83,7 +83,8 @@ class Desk:
         if scene is not None and not self._asked and time.monotonic() - self._still_since > STILL:
             self._asked = True
             self._measure(scene)
-        return more or not self._asked or bool(self.work.busy)
+        unmeasured = scene is not None and not self._asked
+        return more or unmeasured or bool(self.work.busy)
 
     def _measure(self, scene: Scene) -> None:
         document, size = self.work.document, self.stage.viewport.size
