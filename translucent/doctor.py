@@ -18,6 +18,10 @@ from translucent.gpu.renderer import SHADER_STORAGE
 #: Packages beside the core, and what each is for.
 OPTIONAL = {
     "OpenEXR": "writing .exr files (pip install openexr)",
+    "imgui-bundle": "the window of translucent preview (pip install imgui-bundle tomli-w)",
+    "xatlas": "baking meshes without texture coordinates (pip install xatlas)",
+    "matplotlib": "the page of translucent report (pip install matplotlib jinja2)",
+    "distributed": "baking on a Dask cluster (pip install distributed)",
     "lavavu-osmesa": "a software OpenGL where the system has none (pip install --no-deps lavavu-osmesa)",
 }
 CORE = ("numpy", "scipy", "trimesh", "moderngl", "glcontext", "pillow", "click", "pyrender", "embreex")

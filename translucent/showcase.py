@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -52,6 +53,33 @@ def showcase(
     """
     shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
     return Scene([shown], camera or framing([shown], size), lights, environment or LIGHT_TABLE)
+
+
+def named_environment(name: str, rotation: float = 0.0) -> Environment:
+    """light-table, studio, checkerboard, a color, or a file with a picture of all directions.
+
+    Parameters
+    ----------
+    name : str
+    rotation : float
+        Of the studio or the picture, in degrees.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    from translucent.environment_files import READERS
+
+    if name == "studio":
+        return Environment.studio(rotation)
+    if Path(name).suffix.lower() in READERS:
+        return Environment.image(name, rotation)
+    if name == "light-table":
+        return LIGHT_TABLE
+    if name in ("checkerboard", "checker"):
+        return Environment.checkerboard(tiles=12)
+    return Environment.constant(name)
 
 
 def framing(

@@ -120,9 +120,8 @@ def read_environment(name: str | None, background: str | None) -> Environment | 
 
 
 def _environment(text: str) -> Environment:
-    from translucent.environment import Environment
     from translucent.environment_files import READERS
-    from translucent.showcase import LIGHT_TABLE
+    from translucent.showcase import named_environment
 
     name, rotation = text, 0.0
     head, comma, tail = text.rpartition(",")
@@ -131,15 +130,7 @@ def _environment(text: str) -> Environment:
             name, rotation = head, float(tail)
         except ValueError:
             raise InputError(f"environment {text!r}", f"rotation {tail!r}", "give degrees, as in studio,90") from None
-    if name == "studio":
-        return Environment.studio(rotation)
-    if Path(name).suffix.lower() in READERS:
-        return Environment.image(name, rotation)
-    if name == "light-table":
-        return LIGHT_TABLE
-    if name in ("checkerboard", "checker"):
-        return Environment.checkerboard(tiles=12)
-    return Environment.constant(name)
+    return named_environment(name, rotation)
 
 
 def read_size(text: str) -> tuple[int, int]:

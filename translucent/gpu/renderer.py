@@ -123,10 +123,12 @@ class GpuRenderer:
         if self._closed:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
         if self._targets is None or self._targets.size != size:
-            if self._targets is not None:
-                self._targets.release()
-                self._targets = None
-            self._targets = Targets(self.context.gl, size)
+            old, self._targets = self._targets, None
+            targets = Targets(self.context.gl, size)
+            if old is not None:
+                targets.nothing().use()  # a released framebuffer must not be the bound one
+                old.release()
+            self._targets = targets
         scene = scene.with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
 

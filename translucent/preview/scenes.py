@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from translucent.environment import Environment
-from translucent.environment_files import READERS
 from translucent.errors import InputError
 from translucent.lights import DirectionalLight
 from translucent.materials.color_distance import color_at
@@ -19,7 +18,7 @@ from translucent.medium import Medium
 from translucent.preview.document import AUTO, Document, Look, Material, Model
 from translucent.preview.orbiting import camera_of
 from translucent.scene import Object, Scene
-from translucent.showcase import DEFAULT_COLOR, DEFAULT_REACH, LIGHT_TABLE
+from translucent.showcase import DEFAULT_COLOR, DEFAULT_REACH, named_environment
 from translucent.surface import Surface
 from translucent.thickness import Method, ThinLayer, method_from_name
 
@@ -160,25 +159,6 @@ def _environment(name: str, background: str, rotation: float, scene: Scene) -> E
 
 
 @lru_cache(maxsize=4)
-def named_environment(name: str) -> Environment:
-    """light-table, studio, checkerboard, a color, or a file with a picture of all directions.
-
-    Raises
-    ------
-    InputError
-        If it is none of these.
-    """
-    if name == "studio":
-        return Environment.studio()
-    if Path(name).suffix.lower() in READERS:
-        return Environment.image(name)
-    if name == "light-table":
-        return LIGHT_TABLE
-    if name == "checkerboard":
-        return Environment.checkerboard(tiles=12)
-    return Environment.constant(name)
-
-
 def method_of(name: str, material: Material) -> Method | None:
     """The method of a name; a thin layer is as thick as the material says."""
     if name == AUTO:
