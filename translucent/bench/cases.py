@@ -231,7 +231,7 @@ CASES: tuple[Case, ...] = (
         lambda size: _glass(Sphere().tessellate(128), Surface(roughness=0.4), size),
         "borders",
         quick=False,
-        compared=64,
+        compared=40,
     ),
     Case(
         "dispersion",

@@ -227,6 +227,7 @@ def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> Ca
         convex=len(diagnoses) == 1 and diagnoses[0].convex,
         closed=all(found.solid for found in diagnoses),
         absorption_only=not any(medium.emits or medium.scatters for medium in media)
+        and not any(body.has_interface for body in scene.bodies)
         and all(body.density is None for body in scene.bodies),
         triangles=sum(len(item.mesh.faces) for item in scene.objects),
         bodies=len(scene.bodies),
