@@ -10,6 +10,7 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from translucent.color import linear_to_srgb
+from translucent.errors import InputError
 
 if TYPE_CHECKING:
     from translucent.frame import Frame
@@ -29,24 +30,52 @@ STEPS = (1.0, 2.0, 5.0, 10.0)
 MARKS = 6
 
 
-def aov_pictures(frame: Frame) -> dict[str, Pixels]:
-    """Pictures (h, w, 3) by name; those with a legend are somewhat higher than the frame."""
+def aov_pictures(frame: Frame, truth: Frame | None = None) -> dict[str, Pixels]:
+    """Pictures (h, w, 3) by name; those with a legend are somewhat higher than the frame.
+
+    Raises
+    ------
+    InputError
+        If the truth has another size.
+    """
     transmittance = np.clip(np.asarray(frame.transmittance, dtype=np.float64), 0.0, 1.0)
-    return {
+    pictures = {
         "thickness": thickness_picture(frame),
         "transmittance": np.rint(linear_to_srgb(transmittance) * 255.0).astype(np.uint8),
         "validity": validity_picture(frame),
     }
+    if frame.normals is not None:
+        pictures["normals"] = normals_picture(frame.normals)
+    if truth is not None:
+        if truth.size != frame.size:
+            found = f"it has {truth.size[0]}x{truth.size[1]} pixels, and the frame {frame.size[0]}x{frame.size[1]}"
+            raise InputError("truth of a frame", found, "render both in one size")
+        off = np.abs(frame.thickness.astype(np.float64) - truth.thickness)
+        pictures["error"] = lengths_picture(off, frame.coverage | truth.coverage, frame.valid)
+    return pictures
+
+
+def normals_picture(normals: npt.NDArray[Any]) -> Pixels:
+    """The customary colors of normals: red, green and blue for x, y and z, from -1 to 1."""
+    pixels = np.rint((0.5 + 0.5 * np.asarray(normals, dtype=np.float64)) * 255.0).astype(np.uint8)
+    pixels[~normals.any(axis=-1)] = EMPTY
+    return pixels
 
 
 def thickness_picture(frame: Frame) -> Pixels:
     """Thickness in false colors from 0 to the largest, with a scale in a metric unit below it."""
-    seen = frame.coverage & frame.valid & np.isfinite(frame.thickness)
-    most = float(frame.thickness[seen].max(initial=0.0))
-    share = np.where(seen, frame.thickness, 0.0).astype(np.float64) / (most or 1.0)
+    return lengths_picture(frame.thickness, frame.coverage, frame.valid)
+
+
+def lengths_picture(lengths: npt.NDArray[Any], coverage: npt.NDArray[np.bool_], valid: npt.NDArray[np.bool_]) -> Pixels:
+    """Metres in false colors from 0 to the largest, with a scale in a metric unit below."""
+    seen = coverage & valid & np.isfinite(lengths)
+    most = float(lengths[seen].max(initial=0.0))
+    with np.errstate(under="ignore"):
+        share = np.where(seen, lengths, 0.0).astype(np.float64) / (most or 1.0)
     pixels = false_colors()[np.rint(share * 255).astype(np.intp)]
     pixels[~seen] = EMPTY
-    pixels[~frame.valid] = WRONG
+    pixels[~valid] = WRONG
     if not seen.any():
         return _with_legend(pixels, [(EMPTY, "no medium")])
     factor, unit = next((entry for entry in UNITS if most >= entry[0]), UNITS[-1])

@@ -24,8 +24,8 @@ ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage",
 #: More of them, that frames of ordered methods have.
 LAYER_ARRAYS = ("layers", "truncated")
 
-#: And what frames without a background have.
-MATTE_ARRAYS = ("alpha",)
+#: What frames without a background have, and those of bodies with borders.
+MATTE_ARRAYS = ("alpha", "normals")
 
 #: Of files that hold a frame.
 SUFFIXES = (".png", ".exr", ".npz")
@@ -62,6 +62,9 @@ class Frame:
     alpha : (h, w) float, optional
         Of a frame rendered without the environment behind: share of what is behind that it hides, the mean of the
         channels. The radiance is then that of the frame alone: an associated (premultiplied) color.
+    normals : (h, w, 3) float, optional
+        Unit normals, in world axes, of the borders where rays enter bodies; 0 where there is none. Only of frames whose
+        plan has borders.
     """
 
     radiance: npt.NDArray[Any]
@@ -76,6 +79,7 @@ class Frame:
     layers: npt.NDArray[np.int32] | None = None
     truncated: npt.NDArray[np.int32] | None = None
     alpha: npt.NDArray[Any] | None = None
+    normals: npt.NDArray[Any] | None = None
 
     def __repr__(self) -> str:
         covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())
@@ -155,11 +159,12 @@ class Frame:
         else:
             write_atomically(path, self._write_exr if path.suffix.lower() == ".exr" else self._write_npz)
 
-    def save_aovs(self, folder: str | Path) -> list[Path]:
+    def save_aovs(self, folder: str | Path, truth: Frame | None = None) -> list[Path]:
         """Write the quantities as pictures to look at, into a folder that is made if need be.
 
         ``thickness.png`` in false colors with a scale, ``transmittance.png`` (sRGB-encoded), and ``validity.png`` with
-        counts. For numbers, `save` an ``.exr`` or ``.npz``.
+        counts; ``normals.png`` of bodies with borders; and ``error.png``, by how much the thickness is off, where there
+        is a `truth` of the same size, such as the reference's. For numbers, `save` an ``.exr`` or ``.npz``.
 
         Returns
         -------
@@ -176,7 +181,7 @@ class Frame:
         folder = Path(folder)
         make_folder(folder)
         files = []
-        for name, pixels in aov_pictures(self).items():
+        for name, pixels in aov_pictures(self, truth).items():
             files.append(folder / f"{name}.png")
             write_atomically(files[-1], partial(write_png, pixels=pixels))
         return files
@@ -191,8 +196,12 @@ class Frame:
         import OpenEXR
 
         channels = {"RGB": np.ascontiguousarray(self.radiance, dtype=np.float32)}
+        if self.normals is not None:
+            for i, channel in enumerate("XYZ"):
+                channels[f"normals.{channel}"] = np.ascontiguousarray(self.normals[..., i], dtype=np.float32)
         if self.alpha is not None:
-            channels = {"RGBA": np.concatenate([self.radiance, self.alpha[..., None]], axis=-1).astype(np.float32)}
+            del channels["RGB"]
+            channels["RGBA"] = np.concatenate([self.radiance, self.alpha[..., None]], axis=-1).astype(np.float32)
         for name, layer in (("transmittance", self.transmittance), ("optical_depth", self.optical_depth)):
             for i, channel in enumerate("RGB"):
                 channels[f"{name}.{channel}"] = np.ascontiguousarray(layer[..., i], dtype=np.float32)

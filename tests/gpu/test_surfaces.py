@@ -167,3 +167,30 @@ def test_matched_borders_add_no_pass() -> None:
     assert tl.plan(scene).passes == tl.plan(shown(BALL, tl.Medium(absorption=1.0), SKY)).passes
     assert "surfaces" not in {step.name for step in tl.plan(scene).passes}
     assert "surfaces" in {step.name for step in tl.plan(shown(BALL, tl.Medium(ior=1.2), SKY)).passes}
+
+
+def test_normals_are_those_of_the_borders(renderer: tl.Renderer) -> None:
+    scene = shown(BALL, tl.Medium(ior=1.5), SKY)
+    frame = renderer.render(scene, SIZE)
+    assert frame.normals is not None
+    hit = frame.normals.any(axis=-1)
+    assert abs(int(hit.sum()) - int(frame.coverage.sum())) < 50
+    np.testing.assert_allclose(np.linalg.norm(frame.normals[hit], axis=-1), 1.0, atol=1e-5)
+    ray = rays(scene.camera)
+    assert (np.sum(frame.normals * ray, axis=-1)[hit] < 0).all()
+    # A ball around the origin: the normal is the place, up to the angle of a facet.
+    eye = scene.camera.eye
+    along = -ray @ eye - np.sqrt(np.maximum((ray @ eye) ** 2 - eye @ eye + 1, 0.0))
+    place = eye + along[..., None] * ray
+    inner = hit & (np.linalg.norm(np.cross(ray, eye), axis=-1) < 0.9)
+    np.testing.assert_allclose(frame.normals[inner], place[inner], atol=5e-3)
+    assert renderer.render(shown(BALL, tl.Medium(absorption=1.0), SKY), SIZE).normals is None
+
+
+def test_pictures_of_normals_and_error(renderer: tl.Renderer, tmp_path: Any) -> None:
+    scene = shown(BALL, tl.Medium(absorption=1.0, ior=1.5), SKY)
+    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE, refraction=False)
+    names = {path.name for path in frame.save_aovs(tmp_path, truth)}
+    assert names == {"thickness.png", "transmittance.png", "validity.png", "normals.png", "error.png"}
+    with pytest.raises(tl.InputError, match="truth of a frame; it has 8x8 pixels, and the frame 160x120"):
+        frame.save_aovs(tmp_path, tl.reference.render(scene, (8, 8), refraction=False))

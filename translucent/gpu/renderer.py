@@ -18,6 +18,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
+from translucent.gpu.shaders import CONSTANTS
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.render_plan import Capabilities, RenderPlan
@@ -178,6 +179,7 @@ class GpuRenderer:
             provenance=dict(self.provenance),
             layers=layers,
             truncated=truncated,
+            normals=_read_normals(job.targets.entered()) if job.has_surfaces else None,
         )
 
     def close(self) -> None:
@@ -218,3 +220,10 @@ def _read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components:
     array = np.empty(shape, dtype=np.float32)
     framebuffer.read_into(array, components=components, attachment=attachment, alignment=1, dtype="f4")
     return array
+
+
+def _read_normals(borders: moderngl.Framebuffer) -> npt.NDArray[np.float32]:
+    """(h, w, 3): of the borders that the interfaces pass has found, 0 where there is none."""
+    found = _read_floats(borders, 0, 4)[::-1]
+    there = found[..., 3:] < float(CONSTANTS["NOTHING"])
+    return np.ascontiguousarray(np.where(there, found[..., :3], np.float32(0.0)))
