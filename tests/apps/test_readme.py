@@ -36,9 +36,12 @@ def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
 
 COMMANDS = [line.removeprefix("$ translucent ") for line in README.splitlines() if line.startswith("$ translucent ")]
 
+#: Needs a display: its tests are in tests/preview.
+WINDOWED = "preview"
+
 
 @pytest.mark.usefixtures("one_scene")
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [command for command in COMMANDS if command.split()[0] != WINDOWED])
 def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
     import trimesh
 
@@ -59,7 +62,9 @@ def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     trimesh.creation.icosphere(subdivisions=1).export("model.glb")
     trimesh.creation.icosphere(subdivisions=1).export("model.stl")
-    for command in cli.commands.values():
+    for name, command in cli.commands.items():
         assert command.epilog is not None
+        if name == WINDOWED:
+            continue
         example = command.epilog.removeprefix("Example: translucent ")
         assert main(shlex.split(example)) == 0, example
