@@ -114,8 +114,8 @@ def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  #
     assert "color = [" in session.read_text()
     window = np.asarray(Image.open(tmp_path / "window.png").convert("RGB"))
     assert window.shape == (480, 640, 3)
-    # Panels are dark, the model's backdrop is bright: both are there. The viewport is a third of this small window; how much
-    # of it is bright depends on how far the picture has got on a busy machine (0.14 when it is finished).
+    # Panels are dark, the model's backdrop is bright: both are there. The viewport is a third of this small window, and
+    # how much of it is bright depends on how far the picture has got on a busy machine (0.14 when it is finished).
     assert (window.max(axis=2) > 200).mean() > 0.03
     assert (window.max(axis=2) < 60).mean() > 0.2
     with Image.open(picture) as saved:
