@@ -40,7 +40,7 @@ from translucent.thickness import (
 FALLBACK_SHEET = 0.01
 
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasteriser
-#: (`translucent report`). Peeling: for each pass, of which one finds two layers.
+#: (`translucent report`). Peeling: for each pass, of which each finds two layers.
 COSTS = {
     "opaque": 2.8,
     "signed_depth": 1.1,
@@ -48,8 +48,8 @@ COSTS = {
     "thin_layer": 1.7,
     "back_face_depth": 1.7,
     "depth_peeling": 2.4,
-    "fragment_lists": 3.4,
-    "k_buffer": 8.5,
+    "fragment_lists": 2.4,
+    "k_buffer": 4.2,
     "step": 0.1,  # of marching
     "resolve": 0.8,
     "interfaces": 4.0,
@@ -212,9 +212,9 @@ def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilit
 
 def _cheapest_ordered(scene: Scene, capabilities: Capabilities) -> OrderedMethod:
     """Of the methods that find all intervals, the one that is expected to be fastest."""
-    candidates: list[OrderedMethod] = [DepthPeeling()]
-    if capabilities.shader_storage:
-        candidates.append(FragmentLists())
+    # Of two that cost the same the lists come first: peeling waits for a count before it goes on.
+    candidates: list[OrderedMethod] = [FragmentLists()] if capabilities.shader_storage else []
+    candidates.append(DepthPeeling())
     return min(candidates, key=lambda method: _ordered_pass(scene, method, "").cost)
 
 
@@ -233,11 +233,12 @@ def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
         reason = f"{why}; one draw, of which each pixel keeps the {method.k} nearest surfaces"
         return PassSpec("k_buffer", reason, solids, 1, cost=COSTS["k_buffer"])
     bodies = [scene.objects[i] for i in solids]
-    layers = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
-    layers = min(layers, method.max_layers)
+    expected = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
+    layers = min(expected, method.max_layers)
     both_ends = method.order == "both-ends"
-    reason = f"{why}; {'two layers' if both_ends else 'a layer'} with each draw, until one finds no more"
-    draws = 1 + (-(-layers // 2) if both_ends else layers)
+    reason = f"{why}; {'two layers' if both_ends else 'a layer'} with each draw, until all are found"
+    # Where some layers are left out, one more draw counts the faces of the last that is not.
+    draws = (-(-layers // 2) if both_ends else layers) + (expected > layers)
     return PassSpec("depth_peeling", reason, solids, draws, cost=draws * COSTS["depth_peeling"])
 
 

@@ -4,9 +4,11 @@
 
 #include <View>
 #include "intervals/resolve.glsl"
+#include "intervals/peel_faces.glsl"
 #include "intervals/peel_state.glsl"
 
 uniform int passes;
+uniform int walked;  // of these; the rest only count
 uniform sampler2D pass_0;
 uniform sampler2D pass_1;
 uniform sampler2D pass_2;
@@ -33,22 +35,22 @@ void main() {
     Peel peel = read_peel(texel);
 #endif
     float metres_per_step = metres_of_a_step(ray_advance());
-    for (int i = 0; i + 1 < passes; ++i) {
-        if (found[i].r >= NOTHING) { break; }
+    for (int i = 0; i < walked; ++i) {
+        if (min(found[i].r, found[i].g) >= NOTHING) { break; }
         uint near = word_of_sortable(found[i].r);
         uint far = reversed_word(word_of_sortable(found[i].g));
-        float far_faces = floor(found[i + 1].a / PEEL_UNIT);
-        float near_faces = found[i + 1].a - PEEL_UNIT * far_faces;
+        float faces_left = peel.counted - peel.kept;
+        vec2 faces = is_end(found[i].rg, faces_left)
+            ? last_faces(found[i].rg, faces_left)
+            : counted_faces(found[min(i + 1, PEEL_BATCH - 1)].a);
 #if NEAR
-        cross_surface(peel.near, near, int(near_faces), false, metres_per_step);
-        peel.kept += near_faces;
+        cross_surface(peel.near, near, int(faces.x), false, metres_per_step);
+        peel.kept += faces.x;
 #endif
 #if FAR
-#if NEAR
-        if (far == near) { break; }  // the last crossing, found from both ends
-#endif
-        cross_surface(peel.far, far, int(far_faces), true, metres_per_step);
-        peel.kept += far_faces;
+        if (is_one_crossing(found[i].rg)) { break; }
+        cross_surface(peel.far, far, int(faces.y), true, metres_per_step);
+        peel.kept += faces.y;
 #endif
     }
 #if END

@@ -171,6 +171,16 @@ def test_coplanar_double_walls_count_twice(renderer: tl.Renderer, method: Any) -
     np.testing.assert_allclose(frame.thickness, 2 * single.thickness, rtol=1e-6)
 
 
+def test_faces_that_are_alike_in_the_middle_of_a_ray(renderer: tl.Renderer, method: Any) -> None:
+    """Two entries in one place between another entry and three exits in one: the last that peeling finds, and two."""
+    outer, inner = (Box(low=(-1, -1, -1), high=(1, 1, top)).tessellate() for top in (1.0, 0.5))
+    camera = tl.Camera.orthographic((0, 0, 5), (0, 0, 0), height=2.5)
+    scene = tl.Scene([tl.Object(mesh, AMBER) for mesh in (outer, inner, inner)], camera)
+    frame = assert_equal_to_reference(renderer, scene, SIZE, method)
+    assert frame.layers.max() == 6
+    assert frame.thickness.max() == pytest.approx(5.0, rel=1e-5)
+
+
 # Layers
 
 

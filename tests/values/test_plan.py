@@ -283,9 +283,9 @@ def test_a_plan_that_is_not_exact_says_where(objects: list[tl.Object], method: A
         ([body(FIRE), body(WINE)], None, 0, "emission among several media: what is in front dims what is behind; one "),
         ([body()], tl.FragmentLists(), 0, "asked for; one draw into a list for each pixel, sorted afterwards"),
         ([body()], tl.KBuffer(5), 0, "asked for; one draw, of which each pixel keeps the 5 nearest surfaces"),
-        ([body()], tl.DepthPeeling(), 0, "asked for; two layers with each draw, until one finds no more"),
+        ([body()], tl.DepthPeeling(), 0, "asked for; two layers with each draw, until all are found"),
         ([body()], tl.DepthPeeling(8), 0, "asked for; two layers with each draw"),
-        ([body()], tl.DepthPeeling(order="front-to-back"), 0, "asked for; a layer with each draw, until one finds no"),
+        ([body()], tl.DepthPeeling(order="front-to-back"), 0, "asked for; a layer with each draw, until all are found"),
         ([body()], tl.DepthPeeling(order="back-to-front"), 0, "asked for; a layer with each draw"),
     ],
 )

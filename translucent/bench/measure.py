@@ -197,6 +197,9 @@ class CaseRun:
                     self.seconds,
                     lambda name, error: failures.update({name: error}),
                 )
+                for entry in ready:
+                    if isinstance(entry.contender.method, DepthPeeling) and entry.row.method in found:
+                        entry.row = _peeled(entry)
         finally:
             for entry in ready:
                 if entry.drawn is not None:
@@ -281,8 +284,6 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
         found["invalid"] = float((~frame.valid).sum() / max(covered, 1))
     layers = None if frame.layers is None or frame.truncated is None else int((frame.layers - frame.truncated).max())
     passes = plan.geometry_passes if contender.technique in ("plan", "half", "unmarked") else 1
-    if isinstance(contender.method, DepthPeeling) and layers is not None:
-        passes = (-(-layers // 2) if contender.method.order == "both-ends" else layers) + 1
     return dataclasses.replace(
         row,
         parameters=parameters,
@@ -360,6 +361,17 @@ def _scale(truth: Frame, case: CaseRecord) -> float:
         return case.diagonal
     used = truth.coverage & truth.valid
     return float(np.sqrt(np.mean(truth.radiance[used] ** 2))) or 1.0
+
+
+def _peeled(entry: _Entry) -> Row:
+    """The row with the layers and passes of the timed frame: few pixels may need most of them."""
+    assert entry.drawn is not None
+    entry.drawn.draw()
+    frame = entry.drawn.read()
+    assert frame.layers is not None
+    assert frame.truncated is not None
+    layers = int((frame.layers - frame.truncated).max())
+    return dataclasses.replace(entry.row, layers=layers, passes=-(-layers // 2) + bool(frame.truncated.any()))
 
 
 def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception]) -> Row:

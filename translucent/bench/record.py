@@ -136,7 +136,8 @@ class Row:
     passes : int, optional
         Draws of the geometry.
     layers : int, optional
-        The most surfaces that the method found on a ray; only of methods that put them in order.
+        The most surfaces that the method found on a ray, of methods that put them in order; where it draws the geometry
+        again for each, in the timed frame.
     ms_per_layer : float, optional
         `wall` by these, for methods that draw the geometry again for each.
     bytes_per_pixel : int, optional

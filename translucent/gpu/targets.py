@@ -54,8 +54,8 @@ class Targets:
         return self._get("ordered", (4, 4, 4))
 
     def peeled(self, number: int) -> moderngl.Framebuffer:
-        """RGBA32F: what one pass of depth peeling finds."""
-        return self._get(f"peeled-{number}", (4,))
+        """RGBA32F: what one pass of depth peeling finds, with a depth buffer that all of them share."""
+        return self._get(f"peeled-{number}", (4,), with_depth=True, depth_of="peeled-0" if number else None)
 
     def peel_state(self, number: int) -> moderngl.Framebuffer:
         """Two walks along each ray while peeling goes on: five RGBA32F and two RGBA32UI."""
@@ -118,12 +118,22 @@ class Targets:
         return int(per_pixel + buffers // (self.size[0] * self.size[1]))
 
     def _get(
-        self, name: str, components: tuple[int, ...], *, with_depth: bool = False, windings: int = 0
+        self,
+        name: str,
+        components: tuple[int, ...],
+        *,
+        with_depth: bool = False,
+        depth_of: str | None = None,
+        windings: int = 0,
     ) -> moderngl.Framebuffer:
-        """The framebuffer of this name: float textures, or bytes where a count is negative, then RGBA32UI ones."""
+        """The framebuffer of this name: float textures, or bytes where a count is negative, then RGBA32UI ones.
+
+        With a depth buffer of its own, or that of the framebuffer `depth_of`.
+        """
         if name not in self._framebuffers:
             try:
-                self._framebuffers[name] = self._make(components, with_depth, windings)
+                depth = self._framebuffers[depth_of].depth_attachment if depth_of is not None else None
+                self._framebuffers[name] = self._make(components, with_depth, depth, windings)
             except moderngl.Error as error:
                 megabytes = sum(4 * abs(count) for count in components) * self.size[0] * self.size[1] / 1e6
                 raise RenderError(
@@ -133,14 +143,22 @@ class Targets:
                 ) from error
         return self._framebuffers[name]
 
-    def _make(self, components: tuple[int, ...], with_depth: bool, windings: int) -> moderngl.Framebuffer:
+    def _make(
+        self,
+        components: tuple[int, ...],
+        with_depth: bool,
+        depth: moderngl.Renderbuffer | moderngl.Texture | None,
+        windings: int,
+    ) -> moderngl.Framebuffer:
         attachments = [
             self._gl.texture(self.size, abs(count), dtype="f4" if count > 0 else "f1") for count in components
         ]
         attachments += [self._gl.texture(self.size, 4, dtype="u4") for _ in range(windings)]
         for texture in attachments:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return self._gl.framebuffer(attachments, self._gl.depth_renderbuffer(self.size) if with_depth else None)
+        if with_depth and depth is None:
+            depth = self._gl.depth_renderbuffer(self.size)
+        return self._gl.framebuffer(attachments, depth)
 
     def release(self) -> None:
         """Free all textures and framebuffers."""

@@ -18,10 +18,15 @@ _PREVIOUS, _OPAQUE = 0, 1
 
 
 class DepthPeelingPass:
-    """Peels from one end of the rays or from both; see ``shaders/intervals/peel.frag``."""
+    """Peels from one end of the rays or from both; see ``shaders/intervals/peel.frag``.
+
+    The first pass counts the crossings of each pixel, which tells when all are found: then a depth mask keeps the pixel
+    out of further passes.
+    """
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._peel = Variants(gl, "geometry/body.vert", "intervals/peel.frag", previous=_PREVIOUS, opaque_place=_OPAQUE)
+        self._mask = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_mask.frag", previous=_PREVIOUS)
         self._remaining = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_remaining.frag", found=0)
         self._counted = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_counted.frag", first=0)
         batch = {f"pass_{i}": i for i in range(PEEL_BATCH)}
@@ -35,20 +40,25 @@ class DepthPeelingPass:
         method = job.plan.method
         both = method.order == "both-ends"
         ends = {"NEAR": method.order != "back-to-front", "FAR": method.order != "front-to-back"}
-        # Every pass but the first also counts the faces of the one before.
-        most = 1 + (-(-method.max_layers // 2) if both else method.max_layers)
+        allowed = -(-method.max_layers // 2) if both else method.max_layers
+        most = 1
         batch: list[moderngl.Framebuffer] = []
         folds = 0
-        for number in range(most):
+        number = 0
+        while True:
             batch.append(job.targets.peeled(number % PEEL_BATCH))
-            self._find(job, spec, batch, ends, first=number == 0)
+            self._find(job, spec, batch, ends, number)
             if number == 0:
-                most = min(most, self._passes_needed(job, batch[0], both))
+                needed = self._passes_needed(job, batch[0], both)
+                # Where there are more layers than allowed, one more pass counts the faces of the last that is.
+                most = needed if needed <= allowed else allowed + 1
             # An opaque surface makes all alike that it hides: fewer passes may do than there are crossings.
             done = job.has_opaque and number > 0 and not self._found_any(job, batch[-1])
-            last = number + 1 == most or done
+            number += 1
+            last = number == most or done
             if last or len(batch) == PEEL_BATCH:
-                self._go_along(job, batch, ends, folds, last)
+                walked = len(batch) if last and number <= allowed else len(batch) - 1
+                self._go_along(job, batch, ends, folds, walked, last)
                 folds += 1
                 # The crossings that the last pass has found are walked along when the next has counted their faces.
                 batch = [batch[-1]]
@@ -56,26 +66,34 @@ class DepthPeelingPass:
                 return
 
     def _find(
-        self, job: FrameJob, spec: PassSpec, batch: list[moderngl.Framebuffer], ends: dict[str, bool], *, first: bool
+        self, job: FrameJob, spec: PassSpec, batch: list[moderngl.Framebuffer], ends: dict[str, bool], number: int
     ) -> None:
-        gl = job.gl
-        target = batch[-1]
-        nothing = float(CONSTANTS["NOTHING"])
+        """Draw what a pass finds; after the first, only where it is not known already."""
+        gl, target = job.gl, batch[-1]
         target.use()
-        target.clear(nothing, nothing, nothing, 0.0)
-        gl.enable_only(moderngl.BLEND)
+        if number == 0:
+            nothing = float(CONSTANTS["NOTHING"])
+            target.clear(nothing, nothing, nothing, 0.0)
+            gl.enable_only(moderngl.BLEND)
+        else:
+            batch[-2].color_attachments[0].use(_PREVIOUS)
+            gl.enable_only(moderngl.DEPTH_TEST)
+            gl.depth_func = "1"
+            self._mask.draw_fullscreen(self._mask.program(FIRST=number == 1, **ends))
+            gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+            gl.depth_func = "<"
+            target.depth_mask = False
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MIN, moderngl.FUNC_ADD
-        if not first:
-            batch[-2].color_attachments[0].use(_PREVIOUS)
         job.bind_opaque(_OPAQUE)
-        switches = {"FIRST": first, "OPAQUE": job.has_opaque, **ends}
+        switches = {"FIRST": number == 0, "OPAQUE": job.has_opaque, **ends}
         job.draw(self._peel.program(WITH_NORMAL=0, WITH_POSITION=0, **switches), spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)
+        target.depth_mask = True
 
     def _passes_needed(self, job: FrameJob, first: moderngl.Framebuffer, both: bool) -> int:
-        """After how many passes no pixel can have any crossings left, by the count of the first pass."""
+        """After how many passes everything is known of every pixel, by the count of the first pass."""
         width, height = (-(-length // PEEL_TILE) for length in first.size)
         tiles = job.targets.peeled(1)
         tiles.scissor = 0, 0, width, height
@@ -85,7 +103,7 @@ class DepthPeelingPass:
         tiles.scissor = None
         found = np.frombuffer(tiles.read((0, 0, width, height), components=1, alignment=1, dtype="f4"), np.float32)
         layers = round(float(found.max()))
-        return 1 + (-(-layers // 2) if both else layers)
+        return max(1, -(-layers // 2) if both else layers)
 
     def _found_any(self, job: FrameJob, found: moderngl.Framebuffer) -> bool:
         """Whether a pass has found a crossing in any pixel."""
@@ -96,9 +114,15 @@ class DepthPeelingPass:
         return bool(self._any.samples)
 
     def _go_along(
-        self, job: FrameJob, batch: list[moderngl.Framebuffer], ends: dict[str, bool], folds: int, last: bool
+        self,
+        job: FrameJob,
+        batch: list[moderngl.Framebuffer],
+        ends: dict[str, bool],
+        folds: int,
+        walked: int,
+        last: bool,
     ) -> None:
-        """Walk along the crossings of a batch of passes, as far as the faces of each are counted."""
+        """Walk along the crossings of the first passes of a batch, `walked` of them."""
         (job.targets.ordered() if last else job.targets.peel_state(folds % 2)).use()
         # Samplers of passes that this batch is short of must not stay with what is drawn into.
         for unit in range(PEEL_BATCH):
@@ -119,4 +143,5 @@ class DepthPeelingPass:
         }
         program = self._fold.program(**switches)
         set_uniform(program, "passes", len(batch))
+        set_uniform(program, "walked", walked)
         self._fold.draw_fullscreen(program)
