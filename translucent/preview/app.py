@@ -23,6 +23,10 @@ TITLE = "translucent"
 #: sRGB of what is behind panels.
 BACKGROUND = (0.135, 0.14, 0.15, 1.0)
 
+#: Parts of the width of a window of this many pixels that panels take on its right and left. In wider ones they keep
+#: their widths, and the viewport gets the rest.
+NARROW, RIGHT, LEFT = 1280, 0.27, 0.25
+
 #: Frames per second of a window that has nothing to do.
 IDLE_FPS = 9.0
 
@@ -153,7 +157,7 @@ class _Window:
         params.callbacks.show_menus = self._guarded(self._menus)
         params.callbacks.show_status = self._guarded(self._status)
         params.callbacks.pre_new_frame = self._guarded(self._step)
-        params.docking_params = self._docking()
+        params.docking_params = self._docking(min(1.0, NARROW * scale / size[0]))
         return params
 
     def _guarded(self, callback: Callable[[], None]) -> Callable[[], None]:
@@ -173,7 +177,8 @@ class _Window:
         self.failure = self.failure or error
         hello_imgui.get_runner_params().app_shall_exit = True
 
-    def _docking(self) -> Any:
+    def _docking(self, share: float) -> Any:
+        """Panels on both sides, with this share of the part of the width that they have in a narrow window."""
         from imgui_bundle import hello_imgui, imgui
 
         from translucent.preview.panel_look import files_panel, look_panel
@@ -184,8 +189,9 @@ class _Window:
 
         docking = hello_imgui.DockingParams()
         docking.docking_splits = [
-            hello_imgui.DockingSplit("MainDockSpace", "Right", imgui.Dir.right, 0.27),
-            hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.34),
+            hello_imgui.DockingSplit("MainDockSpace", "Right", imgui.Dir.right, RIGHT * share),
+            # Of what the first has left.
+            hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, LEFT * share / (1.0 - RIGHT * share)),
             hello_imgui.DockingSplit("Right", "Below", imgui.Dir.down, 0.16),
         ]
         panels: list[tuple[str, str, Callable[[Any], None]]] = [
