@@ -36,7 +36,8 @@ struct Finish {
     bool is_sheet;
     bool scatters_much;   // show what is scattered more than once
     vec3 sheet_depth;     // optical depth straight through a sheet
-    vec3 diffuse_transmission;
+    vec3 painted_through; // share of light on the paint that passes to the other side, with its color,
+    float painted_share;  // and without
     vec3 stream_absorption;
     vec3 stream_scattering;
     float longest;        // metres across the body
@@ -51,7 +52,7 @@ Finish finish_of(int object) {
     vec4 c = texelFetch(surface_table, ivec2(2, object), 0);
     vec4 d = texelFetch(surface_table, ivec2(3, object), 0);
     vec4 e = texelFetch(surface_table, ivec2(4, object), 0);
-    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
+    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, e.w, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
 }
 
 // Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -129,9 +130,8 @@ vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3
 }
 
 vec3 paint(Finish finish, vec3 point, vec3 normal) {
-    vec3 passed = finish.diffuse_transmission;
-    float share = max(max(passed.r, passed.g), passed.b);
-    return (finish.color * (1.0 - share) * irradiance_on(point, normal) + passed * irradiance_on(point, -normal)) / PI;
+    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal);
+    return (front + finish.painted_through * irradiance_on(point, -normal)) / PI;
 }
 
 struct Crossing {

@@ -191,6 +191,18 @@ def test_one_border_leaves_out_the_draw_of_the_other(renderer: tl.Renderer) -> N
     assert averaged.alpha is not None
 
 
+def test_what_passes_paint_is_not_reflected_whatever_its_color(renderer: tl.Renderer) -> None:
+    """KHR_materials_diffuse_transmission mixes with the factor; the color tints what passes."""
+    color, tint = np.array([0.9, 0.6, 0.3]), np.array([0.5, 0.25, 0.1])
+    paint = tl.Surface(color=color, transmission=0.0, diffuse_transmission=0.7, diffuse_transmission_color=tint)
+    pane = tl.Object(Box((-4.0, -4.0, -0.2), (4.0, 4.0, 0.2)).tessellate(), tl.Medium(absorption=2.0), surface=paint)
+    front, behind = tl.DirectionalLight((0, 0, -1), (3, 3, 3)), tl.DirectionalLight((0, 0, 1), (2, 2, 2))
+    black = tl.Environment.constant((0.0, 0.0, 0.0))
+    scene = tl.Scene([pane], tl.Camera.look_at((1, 0, 3), (0, 0, 0), fov_y=10), [front, behind], black)
+    expected = (0.3 * color * 3 + 0.7 * tint * 2) / np.pi
+    np.testing.assert_allclose(renderer.render(scene, SIZE).radiance, np.tile(expected, (*SIZE[::-1], 1)), rtol=1e-5)
+
+
 def test_straight_quantities_do_not_bend(renderer: tl.Renderer) -> None:
     """Thickness, optical depth and transmittance stay those of the view ray."""
     straight = renderer.render(shown(BALL, tl.Medium(absorption=1.0), SKY), SIZE)
