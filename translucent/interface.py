@@ -6,10 +6,9 @@ boundary reflects is `optics.fresnel_dielectric`, the cosine inside `optics.refr
 
 References
 ----------
-Stokes 1862, "On the intensity of the light reflected from or transmitted through a pile of plates"; Wyman 2005, "An
-approximate image-space approach for interactive refraction"; Walter et al. 2007, "Microfacet models for refraction
-through rough surfaces"; Heitz 2014, "Understanding the masking-shadowing function in microfacet-based BRDFs"; Khronos
-Group 2024, KHR_materials_dispersion.
+Stokes 1862, "On the intensity of the light reflected from or transmitted through a pile of plates"; Walter et
+al. 2007, "Microfacet models for refraction through rough surfaces"; Heitz 2014, "Understanding the masking-shadowing
+function in microfacet-based BRDFs"; Khronos Group 2024, KHR_materials_dispersion.
 """
 
 from __future__ import annotations
@@ -139,44 +138,3 @@ def slab_reflectance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike) -
     """Share of light that a thin wall sends back: r + r (1 - r)^2 a^2 / (1 - r^2 a^2); as for `slab_transmittance`."""
     through = slab_transmittance(reflectance, optical_depth)
     return np.asarray(np.asarray(reflectance, np.float64) * (1.0 + optics.transmittance(optical_depth) * through))
-
-
-def refraction_angle_ratio(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
-    """Angle of refraction divided by the angle of incidence: 1 / n at normal incidence, 1 where n = 1.
-
-    Parameters
-    ----------
-    cos_incident : array_like
-        0..1.
-    ior : array_like
-        Relative index n. Beyond the critical angle of n < 1 the refracted ray counts as grazing.
-    """
-    c, n = np.asarray(cos_incident, dtype=np.float64), np.asarray(ior, dtype=np.float64)
-    sine = np.sqrt(np.maximum((1.0 - c) * (1.0 + c), 0.0))
-    inside = np.arctan2(np.minimum(sine / n, 1.0), optics.refracted_cosine(c, n))
-    return np.where(sine > 0.0, inside / np.where(sine > 0.0, np.arctan2(sine, c), 1.0), 1.0 / n)
-
-
-@np.errstate(under="ignore")
-def wyman_distance(
-    cos_incident: npt.ArrayLike, ior: npt.ArrayLike, view_distance: npt.ArrayLike, normal_distance: npt.ArrayLike
-) -> Array:
-    """Path inside a body along the refracted ray, guessed: (t/i) d_v + (1 - t/i) d_n (Wyman 2005, eq. 1).
-
-    Right where the ray goes on straight (n = 1), and tends to the path against the normal as n grows. Between them it
-    is right only for bodies whose far side happens to be so; a slab has d_n / cosine inside instead.
-
-    Parameters
-    ----------
-    cos_incident : array_like
-        0..1, at the front.
-    ior : array_like
-        Relative index, >= 1.
-    view_distance : array_like
-        d_v in metres, from the front to the back straight on.
-    normal_distance : array_like
-        d_n in metres, from the front to the back against the front's normal.
-    """
-    ratio = refraction_angle_ratio(cos_incident, ior)
-    view, normal = np.asarray(view_distance, dtype=np.float64), np.asarray(normal_distance, dtype=np.float64)
-    return np.asarray(ratio * view + (1.0 - ratio) * normal)

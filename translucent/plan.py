@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable
 
 from translucent.errors import InputError
-from translucent.plan_borders import border_passes, touching_borders
+from translucent.plan_borders import border_passes, check_borders, with_one_border
 from translucent.plan_limits import (
     MAX_SCATTER_LIGHTS,
     closed_sheet_limits,
@@ -20,9 +20,10 @@ from translucent.plan_limits import (
     unmodelled_effects,
     with_ambient_told,
 )
-from translucent.render_plan import Capabilities, PassSpec, RenderPlan
+from translucent.plan_order import media_differ, why_order_matters
+from translucent.render_plan import Borders, Capabilities, PassSpec, RenderPlan
 from translucent.scene import Object, Scene
-from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, require_clear_priorities, same_medium
+from translucent.slots import MAX_SLOTS, medium_slots, require_clear_priorities
 from translucent.thickness import (
     MAX_LIGHT_POINTS,
     BackFaceDepth,
@@ -60,7 +61,13 @@ COSTS = {
 _GUESSED_LAYERS = 8
 
 
-def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities | None = None) -> RenderPlan:
+def plan(
+    scene: Scene,
+    method: Method | None = None,
+    capabilities: Capabilities | None = None,
+    *,
+    borders: Borders = "both",
+) -> RenderPlan:
     """Choose the passes for a scene.
 
     Parameters
@@ -70,17 +77,21 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         How to find thickness; None picks the cheapest way that is exact.
     capabilities : Capabilities, optional
         Of the machine; default: all.
+    borders : {"both", "front"}
+        Where rays bend: at the border where they enter a body and at the one where they leave it, or only at the first,
+        which saves finding the second and is wrong for curved bodies.
 
     Raises
     ------
     InputError
-        If no available method can render the scene.
+        If no available method can render the scene, or the camera is inside a body that has only a front border.
     """
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
+    check_borders(borders)
     capabilities = capabilities or Capabilities()
     if scene.scatters_ambient:
-        return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities))
+        return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities, borders=borders))
     if not scene.bodies:
         raise InputError(
             f"rendering {_names(scene.objects)}",
@@ -91,12 +102,18 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
         require_clear_priorities(scene)
     if not capabilities.opengl:
         return _plan_traced(scene, method, capabilities)
+    chosen = _plan_drawn(scene, method, capabilities, borders)
+    return chosen if borders == "both" else with_one_border(scene, chosen)
+
+
+def _plan_drawn(scene: Scene, method: Method | None, capabilities: Capabilities, borders: Borders) -> RenderPlan:
+    """The plan of a renderer with OpenGL, with both borders of bodies."""
     if scene.varies:
         method = marching_method(scene, method, capabilities)
         return _plan_ordered(scene, method, capabilities, "the density varies from place to place")
     if isinstance(method, OrderedMethod):
         return _plan_ordered(scene, method, capabilities, "asked for")
-    if (why := _why_order_matters(scene, method)) is not None:
+    if (why := why_order_matters(scene, method, borders)) is not None:
         return _plan_for_order(scene, method, capabilities, why)
     if isinstance(method, BackFaceDepth):
         return _plan_back_face_depth(scene, method)
@@ -111,7 +128,11 @@ def plan(scene: Scene, method: Method | None = None, capabilities: Capabilities 
 
 
 def plan_over_backdrop(
-    scene: Scene, method: Method | None = None, capabilities: Capabilities | None = None
+    scene: Scene,
+    method: Method | None = None,
+    capabilities: Capabilities | None = None,
+    *,
+    borders: Borders = "both",
 ) -> RenderPlan:
     """The plan for a scene before a `Backdrop`, which somebody else has drawn.
 
@@ -126,37 +147,13 @@ def plan_over_backdrop(
             f"the scene has opaque objects of its own: {_names(scene.opaque)}",
             "leave them out, or to whoever draws the backdrop",
         )
-    chosen = plan(scene, method, capabilities)
+    chosen = plan(scene, method, capabilities, borders=borders)
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
     return dataclasses.replace(
         chosen,
         passes=(PassSpec("backdrop", reason, cost=COSTS["resolve"]), *chosen.passes),
         unmodelled=(*chosen.unmodelled, "shadows between the media and what is drawn elsewhere"),
     )
-
-
-def _why_order_matters(scene: Scene, method: Method | None) -> str | None:
-    """Why a sum over each ray, found by the method, does not tell the picture of this scene; None if it does."""
-    bodies = scene.bodies
-    if _media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
-        return "emission among several media: what is in front dims what is behind"
-    if method is None and (touching := touching_borders(scene)) is not None:
-        return touching
-    # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
-    if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
-        return None
-    solids = [body for body in bodies if body.sheet_thickness is None]
-    for j, later in enumerate(solids):
-        for earlier in solids[:j]:
-            if may_overlap(earlier, later):
-                return (
-                    f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
-                    "would count both"
-                )
-    for body in solids:
-        if not body.mesh.diagnosis.convex:
-            return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
-    return None
 
 
 def _scatters(scene: Scene) -> bool:
@@ -281,7 +278,7 @@ def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilitie
 
 def _plan_signed_depth(scene: Scene, method: SignedDepth) -> RenderPlan:
     solids, sheets = _solids(scene), _sheets(scene)
-    spectral = _media_differ(scene)
+    spectral = media_differ(scene)
     what = (
         "optical depth per channel, since media differ" if spectral else "thickness, since all bodies share one medium"
     )
@@ -321,7 +318,7 @@ def _signed_depth_cost(spectral: bool) -> float:
 
 
 def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
-    if _media_differ(scene):
+    if media_differ(scene):
         raise InputError("BackFaceDepth", "bodies with different media", "use SignedDepth, which tells them apart")
     if sheets := [scene.objects[i] for i in _sheets(scene)]:
         raise InputError("BackFaceDepth", f"{_names(sheets)} declared a sheet", "use SignedDepth or ThinLayer")
@@ -341,7 +338,7 @@ def _plan_thin_layer(scene: Scene, method: ThinLayer) -> RenderPlan:
     bodies = _indices(scene, lambda body: body.medium is not None)
     limits = closed_sheet_limits(scene, method)
     reason = f"every face of {_count(bodies, 'mesh', 'meshes')} is a sheet: their paths add up"
-    return _finished(scene, method, [_sheet_pass(bodies, reason)], limits, _media_differ(scene))
+    return _finished(scene, method, [_sheet_pass(bodies, reason)], limits, media_differ(scene))
 
 
 def _declared_sheets(sheets: tuple[int, ...]) -> PassSpec:
@@ -374,10 +371,6 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     limits = [*limits, *mesh_limits(scene, method)]
     unmodelled = unmodelled_effects(scene, scatters=scatters, borders=True)
     return RenderPlan(method, tuple(passes), spectral, tuple(limits), unmodelled)
-
-
-def _media_differ(scene: Scene) -> bool:
-    return any(not same_medium(scene.bodies[0], body) for body in scene.bodies[1:])
 
 
 def _solids(scene: Scene) -> tuple[int, ...]:

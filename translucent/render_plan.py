@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from translucent.thickness import Method, OrderedMethod
+
+#: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
+Borders: TypeAlias = Literal["both", "front"]
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,8 @@ class RenderPlan:
         Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
     unmodelled : tuple of str
         What the scene asks for and no pass renders.
+    borders : {"both", "front"}
+        Where rays bend, if anything in the scene bends them.
     """
 
     method: Method
@@ -79,6 +84,7 @@ class RenderPlan:
     spectral: bool = False
     limits: tuple[str, ...] = ()
     unmodelled: tuple[str, ...] = ()
+    borders: Borders = "both"
 
     @property
     def exact(self) -> bool:
@@ -105,6 +111,7 @@ class RenderPlan:
         return {
             "method": str(self.method),
             "exact": self.exact,
+            "borders": self.borders,
             "cost": round(self.cost, 2),
             "passes": [
                 {

@@ -21,7 +21,7 @@ from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
 from translucent.plan import plan, plan_over_backdrop
 from translucent.plan_limits import LIGHTS_LEFT_OUT
-from translucent.render_plan import RenderPlan
+from translucent.render_plan import Borders, RenderPlan
 from translucent.scene import Scene
 from translucent.thickness import Method
 from translucent.tone import tone_curve
@@ -63,7 +63,7 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool], RenderPlan]] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool, str], RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._engine: GpuRenderer | CpuRenderer = _engine(backend, context)
 
@@ -96,14 +96,16 @@ class Renderer:
             "translucent": VERSION,
         }
 
-    def plan(self, scene: Scene, method: Method | None = None, *, over_backdrop: bool = False) -> RenderPlan:
+    def plan(
+        self, scene: Scene, method: Method | None = None, *, over_backdrop: bool = False, borders: Borders = "both"
+    ) -> RenderPlan:
         """The plan that `render` would run here, without a backdrop or with one."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop)) not in plans:
+        if (key := (method, over_backdrop, borders)) not in plans:
             make = plan_over_backdrop if over_backdrop else plan
-            plans[key] = make(scene, method, self._engine.capabilities)
+            plans[key] = make(scene, method, self._engine.capabilities, borders=borders)
         return plans[key]
 
     def render(
@@ -115,6 +117,7 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None = None,
         *,
         transparent: bool = False,
+        borders: Borders = "both",
     ) -> Frame:
         """Render a scene.
 
@@ -134,6 +137,9 @@ class Renderer:
             Leave out the environment as far as it is seen behind everything, and give the frame an `alpha`; it still
             lights, and is mirrored. Costs a second rendering: alpha is one minus the difference between frames before
             white and before black (Smith & Blinn 1996).
+        borders : {"both", "front"}
+            Where rays bend that cross a body: where they enter and where they leave it, or only where they enter, as
+            viewers of glTF do. That is quicker, and wrong for curved bodies; absorption is that of the straight ray.
 
         Returns
         -------
@@ -145,7 +151,7 @@ class Renderer:
         ------
         InputError
             If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
-            scene has opaque objects besides it.
+            scene has opaque objects besides it; if rays start inside a body that has only a front border.
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
@@ -154,20 +160,20 @@ class Renderer:
         self._require_open()
         size = check_size(size)
         if transparent:
-            frame = self._render_transparent(scene, size, method, samples, backdrop)
+            frame = self._render_transparent(scene, size, self.plan(scene, method, borders=borders), samples, backdrop)
         elif backdrop is None:
-            frame = self._engine.render(scene, size, self.plan(scene, method), samples)
+            frame = self._engine.render(scene, size, self.plan(scene, method, borders=borders), samples)
         else:
             _check_backdrop(backdrop, size)
             frame = self._gpu("a backdrop").render(
-                scene, size, self.plan(scene, method, over_backdrop=True), samples, backdrop
+                scene, size, self.plan(scene, method, over_backdrop=True, borders=borders), samples, backdrop
             )
         frame.provenance.update(self.provenance)
         _warn(frame)
         return frame
 
     def _render_transparent(
-        self, scene: Scene, size: tuple[int, int], method: Method | None, samples: int, backdrop: object
+        self, scene: Scene, size: tuple[int, int], chosen: RenderPlan, samples: int, backdrop: object
     ) -> Frame:
         if backdrop is not None:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
@@ -177,7 +183,7 @@ class Renderer:
                     scene, environment=scene.environment.with_background(Environment.constant((level,) * 3))
                 ),
                 size,
-                self.plan(scene, method),
+                chosen,
                 samples,
             )
             for level in (0.0, 1.0)
@@ -192,6 +198,8 @@ class Renderer:
         method: Method | None = None,
         exposure: float = 0.0,
         tone: str = "none",
+        *,
+        borders: Borders = "both",
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -205,6 +213,8 @@ class Renderer:
             Stops brighter.
         tone : {"none", "neutral", "agx"}
             Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
+        borders : {"both", "front"}
+            As for `render`.
 
         Raises
         ------
@@ -216,7 +226,7 @@ class Renderer:
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)
-        chosen = self.plan(scene, method)
+        chosen = self.plan(scene, method, borders=borders)
         self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
         return chosen
 

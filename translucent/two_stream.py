@@ -83,10 +83,3 @@ def multiple_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: npt.
     k, s = np.asarray(absorption_depth, dtype=np.float64), np.asarray(scattering_depth, dtype=np.float64)
     once = s * optics.mean_transmittance(2.0 * (k + s))
     return np.maximum(two_stream_reflectance(k, s) - once, 0.0)
-
-
-@np.errstate(under="ignore")
-def multiple_transmittance(absorption_depth: npt.ArrayLike, scattering_depth: npt.ArrayLike) -> Array:
-    """`two_stream_transmittance` without the light that never turned around, exp(-(K + S) d)."""
-    k, s = np.asarray(absorption_depth, dtype=np.float64), np.asarray(scattering_depth, dtype=np.float64)
-    return np.maximum(two_stream_transmittance(k, s) - optics.transmittance(k + s), 0.0)

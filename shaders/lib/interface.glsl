@@ -1,7 +1,7 @@
 // What boundaries between media do with light. Pure: needs only <constants> and the library. Directions are unit vectors
 // of travel; a normal looks to the side that the light comes from; ior is that of the other side relative to this one.
 // Each function is the float32 twin of the same name in translucent/interface.py, where the sources are cited: Snell;
-// Stokes 1862; Walter et al. 2007; Heitz 2014; Wyman 2005; KHR_materials_dispersion. fresnel_dielectric is in optics.glsl.
+// Stokes 1862; Walter et al. 2007; Heitz 2014; KHR_materials_dispersion. fresnel_dielectric is in optics.glsl.
 
 #include <constants>
 #include "lib/optics.glsl"
@@ -53,16 +53,4 @@ vec3 slab_transmittance(float reflectance, vec3 optical_depth) {
 
 vec3 slab_reflectance(float reflectance, vec3 optical_depth) {
     return reflectance * (1.0 + transmittance(optical_depth) * slab_transmittance(reflectance, optical_depth));
-}
-
-// Angle of refraction divided by the angle of incidence; 1 / ior at normal incidence.
-float refraction_angle_ratio(float cos_incident, float ior) {
-    float sine = sqrt(max((1.0 - cos_incident) * (1.0 + cos_incident), 0.0));
-    if (sine == 0.0) { return 1.0 / ior; }
-    return atan(min(sine / ior, 1.0), refracted_cosine(cos_incident, ior)) / atan(sine, cos_incident);
-}
-
-// Path inside a body along the refracted ray, guessed from the path straight on and the path against the normal.
-float wyman_distance(float cos_incident, float ior, float view_distance, float normal_distance) {
-    return mix(normal_distance, view_distance, refraction_angle_ratio(cos_incident, ior));
 }

@@ -41,9 +41,3 @@ vec3 multiple_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
     vec3 once = scattering_depth * mean_transmittance(2.0 * (absorption_depth + scattering_depth));
     return max(two_stream_reflectance(absorption_depth, scattering_depth) - once, vec3(0.0));
 }
-
-// Without the light that never turned around: exp(-(K + S) d).
-vec3 multiple_transmittance(vec3 absorption_depth, vec3 scattering_depth) {
-    vec3 never = transmittance(absorption_depth + scattering_depth);
-    return max(two_stream_transmittance(absorption_depth, scattering_depth) - never, vec3(0.0));
-}

@@ -9,6 +9,7 @@
 uniform sampler2D reflectance_table;  // scale and bias of the reflectance at normal incidence
 uniform vec4 opaque_finish;           // metallic, roughness, ior, alpha below which there is a hole
 uniform vec4 opaque_passed;           // share of light on the paint that passes to the other side; w: seen from both
+uniform float opaque_passed_share;    // the same without its color: what paint does not reflect
 uniform vec3 opaque_emissive;
 
 struct OpaqueFinish {
@@ -56,8 +57,7 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) 
     Layer coat = layer_of(vec3((ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0))), table);
     Layer metal = layer_of(finish.base, table);
     float painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored.r);
-    float passed = max(max(opaque_passed.r, opaque_passed.g), opaque_passed.b);
-    vec3 paint = finish.base * (1.0 - passed);
+    vec3 paint = finish.base * (1.0 - opaque_passed_share);
 
     vec3 sum = mix(coat.mirrored, metal.mirrored, finish.metallic)
             * environment_light(reflected_direction(ray, normal), finish.roughness)

@@ -4,7 +4,9 @@
 // search along the bent ray replaces.
 
 uniform sampler2D entered;      // border towards the eye: normal, place
+#if !ONE_BORDER
 uniform sampler2D left;         // first border away from it beyond
+#endif
 
 const int EXIT_STEPS = 16;
 const int EXIT_HALVINGS = 6;
@@ -43,6 +45,7 @@ ivec2 stored(ivec2 texel) {
     return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
 }
 
+#if !ONE_BORDER
 // Place where the first interval of a pixel ends: on the far border, or on an opaque surface inside.
 float end_of_interval(ivec2 texel) {
     float last = texelFetch(left, texel, 0).w;
@@ -106,6 +109,7 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
     if (abs(path - inside) < margin && path > 0.0) { result.path = path; }
     return result;
 }
+#endif
 
 // The squares of a checkerboard, averaged over a box of this width in squares.
 float blurred_checkerboard_share(vec2 at, float tiles, float width) {

@@ -1,6 +1,6 @@
 // Light at the borders of bodies: what they reflect, what enters and bends, and what paint and many scattering events
 // give back. What the media absorb and emit on straight rays has been found; the first interval of a bent ray is as long
-// as it is bent. Row 0 of the output is the top row.
+// as it is bent. Row 0 of the output is the top row. ONE_BORDER: rays bend where they enter, and leave without bending.
 
 #include <constants>
 #include <View>
@@ -21,7 +21,9 @@ uniform sampler2D straight_optical_depth;
 uniform sampler2D straight_thickness;
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission
 uniform sampler2D surface_color;
+#if !ONE_BORDER
 uniform sampler2D left_finish;       // object of what is left
+#endif
 uniform sampler2D surface_table;     // a row for each object
 uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
 
@@ -34,7 +36,8 @@ struct Finish {
     bool is_sheet;
     bool scatters_much;   // show what is scattered more than once
     vec3 sheet_depth;     // optical depth straight through a sheet
-    vec3 diffuse_transmission;
+    vec3 painted_through; // share of light on the paint that passes to the other side, with its color,
+    float painted_share;  // and without
     vec3 stream_absorption;
     vec3 stream_scattering;
     float longest;        // metres across the body
@@ -49,7 +52,7 @@ Finish finish_of(int object) {
     vec4 c = texelFetch(surface_table, ivec2(2, object), 0);
     vec4 d = texelFetch(surface_table, ivec2(3, object), 0);
     vec4 e = texelFetch(surface_table, ivec2(4, object), 0);
-    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
+    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, e.w, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
 }
 
 // Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -127,9 +130,8 @@ vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3
 }
 
 vec3 paint(Finish finish, vec3 point, vec3 normal) {
-    vec3 passed = finish.diffuse_transmission;
-    float share = max(max(passed.r, passed.g), passed.b);
-    return (finish.color * (1.0 - share) * irradiance_on(point, normal) + passed * irradiance_on(point, -normal)) / PI;
+    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal);
+    return (front + finish.painted_through * irradiance_on(point, -normal)) / PI;
 }
 
 struct Crossing {
@@ -145,6 +147,17 @@ struct Straight {
     float first_interval;
 };
 
+#if ONE_BORDER
+// Light that bends where it enters and nowhere else. How far on the body ends changes nothing of its way, and what is
+// absorbed is what the straight ray's path absorbs. A microfacet turns it by (1 - 1 / ior) times its angle, a reflection
+// by twice that angle.
+Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
+    vec3 passed = transmittance(straight.optical_depth);
+    float blur = finish.roughness * sqrt(0.5 * abs(1.0 - 1.0 / ior));
+    vec3 light = passed * radiance_beyond(point, refracted_direction(ray, normal, ior), blur);
+    return Crossing(light, passed, straight.thickness);
+}
+#else
 // Light that crosses the first interval along a bent ray; the media there are taken to be mixed as along the straight one.
 Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
     vec3 inside = enters ? refracted_direction(ray, normal, ior) : ray;
@@ -169,9 +182,15 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     result.light *= result.passed;
     return result;
 }
+#endif
 
 Crossing crossed(Finish finish, vec3 point, vec3 normal, vec3 ray, bool enters, Straight straight) {
-    if (finish.is_sheet || straight.first_interval < 0.0) {
+#if ONE_BORDER
+    bool goes_straight = finish.is_sheet;
+#else
+    bool goes_straight = finish.is_sheet || straight.first_interval < 0.0;
+#endif
+    if (goes_straight) {
         vec3 passed = transmittance(straight.optical_depth);
         float blur = refraction_roughness(finish.roughness, finish.ior);
         return Crossing(passed * radiance_beyond(point, ray, blur), passed, straight.thickness);
@@ -196,15 +215,23 @@ void main() {
     vec3 depth = texelFetch(straight_optical_depth, here, 0).rgb;
     float thickness = texelFetch(straight_thickness, here, 0).r;
     vec4 front = texelFetch(entered, texel, 0);
-    vec4 back = texelFetch(left, texel, 0);
     out_transmittance = vec4(through, 1.0);
 
+#if ONE_BORDER
+    const bool starts_inside = false;
+#else
+    vec4 back = texelFetch(left, texel, 0);
     bool starts_inside = back.w < front.w;
+#endif
     if (front.w >= NOTHING && !starts_inside) {
         out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
         return;
     }
+#if ONE_BORDER
+    vec4 surface = texelFetch(surface_finish, texel, 0);
+#else
     vec4 surface = starts_inside ? texelFetch(left_finish, texel, 0) : texelFetch(surface_finish, texel, 0);
+#endif
     Finish finish = finish_of(int(surface.x + 0.5));
     finish.roughness = surface.y;
     finish.transmission = surface.z;
@@ -232,7 +259,11 @@ void main() {
 
     vec3 light = vec3(0.0);
     if (finish.transmission > 0.0) {
+#if ONE_BORDER
+        float first_interval = thickness;
+#else
         float first_interval = back.w < NOTHING ? (end_of_interval(texel) - place) * surface_ahead.y * advance : -1.0;
+#endif
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;
         if (finish.scatters_much) { light += scattered_out(finish, point, normal, crossing.thickness, crossing.passed); }

@@ -169,6 +169,7 @@ BAD_RENDER_OPTIONS = [
     (["--samples", "some"], "Invalid value for '--samples'"),
     (["--camera", "0"], "cube.ply is no glTF file and has no cameras; use --eye"),
     (["--camera", "first"], "Invalid value for '--camera'"),
+    (["--borders", "front", "--opaque-with", "pyrender"], "--borders front; --opaque-with, where rays bend at both"),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]
 
@@ -457,6 +458,19 @@ class TestRendering:
             assert arrays["radiance"][2, 4] == pytest.approx([1 / 16, 1 / 8, 1 / 4], rel=1e-5)
             assert arrays["thickness"][0, 0] == 0.0
             assert arrays["valid"].all()
+
+    def test_render_bends_rays_at_one_border_or_both(self, run: Run, tmp_path: Path) -> None:
+        glass = {"extensions": GLASS | {"KHR_materials_ior": {"ior": 1.5}}}
+        model, frames = write_scene(tmp_path / "scene.glb", glass), {}
+        for borders in ("both", "front"):
+            output = tmp_path / f"{borders}.npz"
+            result = run("render", model, "-o", output, "--size", "9x5", "--samples", "1", "--borders", borders)
+            assert (result.code, result.err) == (0, "")
+            assert ("leaves without bending" in result.out) == (borders == "front")
+            with np.load(output) as arrays:
+                frames[borders] = arrays["radiance"], arrays["thickness"]
+        assert (frames["both"][0] != frames["front"][0]).any()
+        assert (frames["both"][1] == frames["front"][1]).all()
 
     def test_render_as_json_prints_one_object(self, run: Run, cube: Path, tmp_path: Path) -> None:
         output = tmp_path / "cube.exr"

@@ -213,6 +213,33 @@ def test_methods_are_chosen_by_name_or_family() -> None:
     }
 
 
+def test_one_border_lies_between_two_and_straight_rays_in_passes_and_is_not_exact(studio: Studio) -> None:
+    case = next(case for case in CASES if case.name == "glass")
+    made = measured(studio, case, "SignedDepth", "one border", "straight rays", size=(64, 64))
+    rows = {row.method: row for row in made.rows}
+    two, one, none = (rows[name] for name in ("SignedDepth", "one border", "straight rays"))
+    assert [row.passes for row in (two, one, none)] == [3, 2, 1]
+    assert one.parameters == 'SignedDepth(anchored=True), borders="front"'
+    assert (two.exact, one.exact) == (True, False)
+    assert "rays leave curved bodies in wrong directions" in one.promise
+    # The root mean square of all of them is that of reflections inside, which none follows on.
+    assert one.radiance.median > 3 * two.radiance.median  # type: ignore[union-attr]
+    assert {"SignedDepth", "one border", "straight rays"} <= {picture.method for picture in made.pictures}
+
+
+def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
+    case = next(case for case in CASES if case.name == "thin wall")
+    made = measured(studio, case, "SignedDepth", "one border", "straight rays", size=(96, 96))
+    rows = {row.method: row for row in made.rows}
+    assert rows["one border"].refusal == "sheets have one border, at which nothing bends"
+    wall, none = rows["SignedDepth"].radiance, rows["straight rays"].radiance
+    assert wall is not None
+    assert none is not None
+    # Both faces mirror in closed form; what is left is where the sheet hides itself.
+    assert wall.median < 1e-3
+    assert none.median > 30 * wall.median
+
+
 def test_all_that_is_promised_is_measured() -> None:
     names = {one.name for one in CONTENDERS}
     assert len(names) == len(CONTENDERS)

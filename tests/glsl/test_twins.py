@@ -150,8 +150,6 @@ ARGUMENTS = {
     "ggx_visibility": _mixed(UNIT[::3], UNIT[::2], np.array([1e-4, 1e-2, 0.25, 1.0])),
     "slab_transmittance": _slab_arguments(),
     "slab_reflectance": _slab_arguments(),
-    "refraction_angle_ratio": _mixed(UNIT, np.array([1 / 1.5, 0.9, 1.0, 1.0001, 1.33, 1.5, 2.4])),
-    "wyman_distance": _mixed(UNIT, np.array([1.0, 1.33, 2.4]), np.array([0.0, 1e-3, 2.0]), np.array([0.0, 0.5])),
     "two_stream_absorption": [_triples(DEPTHS)],
     "two_stream_scattering": [_triples(DEPTHS), np.resize([-0.9, 0.0, 0.5, 0.99], len(DEPTHS)).astype(np.float32)],
     **dict.fromkeys(
@@ -161,7 +159,6 @@ ARGUMENTS = {
             "two_stream_reflectance",
             "two_stream_transmittance",
             "multiple_reflectance",
-            "multiple_transmittance",
         ),
         _layer_arguments(),
     ),
@@ -187,8 +184,6 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "srgb_to_linear": 64.0,  # pow multiplies the error of the logarithm by 2.4 log(x)
     "linear_to_srgb": 64.0,
     "henyey_greenstein": 64.0,  # a power of 1.5 of a small difference
-    "refraction_angle_ratio": 4096.0,  # what OpenGL promises of arcs
-    "wyman_distance": 4096.0,
     "equirectangular_uv": 4096.0,
     "tone_agx": 64.0,  # powers
 }
@@ -207,7 +202,6 @@ FLOOR = {
     "agx_sigmoid": 4e-7,
     "tone_agx": 1e-6,
     "multiple_reflectance": 5e-7,
-    "multiple_transmittance": 5e-7,
 }
 
 

@@ -120,6 +120,15 @@ def test_light_from_behind_passes_paint(renderer: tl.Renderer) -> None:
     np.testing.assert_allclose(found, np.array([1, 0.5, 0.2]) * 0.5 / np.pi * 3 * 0.8, rtol=1e-5)
 
 
+def test_what_passes_paint_is_not_reflected_whatever_its_color(renderer: tl.Renderer) -> None:
+    """KHR_materials_diffuse_transmission mixes with the factor; the color tints what passes."""
+    color, tint = np.array([0.9, 0.6, 0.3]), np.array([0.5, 0.25, 0.1])
+    surface = tl.Surface(color=color, diffuse_transmission=0.7, diffuse_transmission_color=tint, ior=1.0)
+    front, behind = tl.DirectionalLight((0, 0, -1), (3, 3, 3)), tl.DirectionalLight((0, 0, 1), (2, 2, 2))
+    found = picture(renderer, plate(surface), lights=[front, behind])[12, 16]
+    np.testing.assert_allclose(found, (0.3 * color * 3 + 0.7 * tint * 2) / np.pi, rtol=1e-5)
+
+
 # Textures
 
 

@@ -195,39 +195,3 @@ def test_limits_of_walls() -> None:
     # Near grazing incidence nothing cancels: T = (1 - r) / (1 + r).
     r = 1 - 1e-12
     assert interface.slab_transmittance(r, 0.0) == pytest.approx((1 - r) / (1 + r), rel=8 * EPS)
-
-
-# Wyman's distance
-
-
-@given(cosines, st.floats(1, 2.5))
-def test_ratio_of_angles(cosine: float, ior: float) -> None:
-    angle = math.acos(cosine)
-    if angle < 1e-4:
-        return
-    # acos is good to EPS / angle near 1, asin of a sine near 1 to EPS / cosine.
-    expected = math.asin(math.sin(angle) / ior) / angle
-    assert interface.refraction_angle_ratio(cosine, ior) == pytest.approx(
-        expected, abs=8 * EPS / min(angle, cosine) ** 2
-    )
-
-
-@pytest.mark.parametrize("ior", [0.7, 1.0, 1.33, 2.4])
-def test_ratio_straight_on_is_that_of_the_indices(ior: float) -> None:
-    assert interface.refraction_angle_ratio(1.0, ior) == 1 / ior
-    # Of small angles: 1/n (1 + i^2 (1/n^2 - 1) / 6).
-    near = interface.refraction_angle_ratio(math.cos(1e-4), ior)
-    assert near == pytest.approx(1 / ior, rel=4e-9)
-
-
-def test_ratio_beyond_the_critical_angle() -> None:
-    assert interface.refraction_angle_ratio(0.1, 0.5) == pytest.approx(0.5 * math.pi / math.acos(0.1), rel=4 * EPS)
-
-
-@given(cosines, st.floats(0, 10), st.floats(0, 10))
-def test_distance_of_straight_rays_and_of_dense_bodies(cosine: float, view: float, normal: float) -> None:
-    assert interface.wyman_distance(cosine, 1.0, view, normal) == pytest.approx(view, abs=64 * EPS)
-    dense = interface.wyman_distance(cosine, 1e9, view, normal)
-    assert dense == pytest.approx(normal, abs=1e-7)
-    between = float(interface.wyman_distance(cosine, 1.5, view, normal))
-    assert min(view, normal) - 64 * EPS <= between <= max(view, normal) + 64 * EPS

@@ -90,23 +90,18 @@ def test_extreme_layers(k: float, s: float) -> None:
 @given(depths, depths)
 def test_what_is_scattered_again(k: float, s: float) -> None:
     """The whole share is the part that turns around at most once, and this."""
-    back, on = shares(k, s)
+    back, _ = shares(k, s)
     once = s / (2 * (k + s)) * -math.expm1(-2 * (k + s)) if s > 0 else 0.0
     assert two_stream.multiple_reflectance(k, s) + once == pytest.approx(back, abs=8 * EPS)
-    assert two_stream.multiple_transmittance(k, s) + math.exp(-(k + s)) == pytest.approx(on, abs=16 * EPS)
     assert two_stream.multiple_reflectance(k, s) >= 0
-    assert two_stream.multiple_transmittance(k, s) >= 0
 
 
 @pytest.mark.parametrize("k", [0.0, 0.5])
 def test_thin_layers_scatter_again_with_higher_powers(k: float) -> None:
-    """Back by three turns, s^3; on by two, s^2 / 2 as the light that turns twice in a clear layer."""
+    """Back by three turns, s^3."""
     s = np.array([1e-2, 2e-2])
-    back, on = two_stream.multiple_reflectance(k, s), two_stream.multiple_transmittance(k, s)
+    back = two_stream.multiple_reflectance(k, s)
     assert back[1] / back[0] == pytest.approx(8.0, rel=0.05)
-    assert on[1] / on[0] == pytest.approx(4.0, rel=0.05)
-    if k == 0.0:
-        assert on[0] == pytest.approx(s[0] ** 2 / 2, rel=0.03)
 
 
 def test_coefficients_of_a_medium() -> None:

@@ -82,6 +82,13 @@ def _glass(mesh: Mesh, surface: Surface, size: Size) -> Scene:
     return dataclasses.replace(scene, objects=[Object(mesh, glass, surface=surface)])
 
 
+def _wall(size: Size) -> Scene:
+    """A wavy sheet of green glass in a studio."""
+    glass = Medium.from_color((0.6, 0.9, 0.75), distance=2e-3, ior=1.5)
+    wall = Object(_toolkit("leaf"), glass, sheet_thickness=2e-3)
+    return Scene([wall], framing([wall], size), environment=Environment.studio())
+
+
 def _toolkit(name: str) -> Mesh:
     return load_mesh(mesh_path(name))
 
@@ -241,6 +248,14 @@ CASES: tuple[Case, ...] = (
         "borders",
         quick=False,
         compared=128,
+    ),
+    Case(
+        "thin wall",
+        "Sheet of glass",
+        "a thin wall: both of its faces mirror, and rays that pass go straight on",
+        _wall,
+        "borders",
+        compared=120,
     ),
     Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),
 )

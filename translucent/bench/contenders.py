@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from translucent.bench.record import Kind
 from translucent.errors import InputError
+from translucent.render_plan import Borders
 from translucent.scene import Scene
 from translucent.thickness import (
     MAX_LAYERS,
@@ -62,6 +63,8 @@ class Contender:
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
+    borders : {"both", "front"}
+        Where rays bend, as `translucent.Renderer.render` has it.
     """
 
     name: str
@@ -73,6 +76,7 @@ class Contender:
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
+    borders: Borders = "both"
 
     @property
     def fitted(self) -> bool:
@@ -85,6 +89,8 @@ class Contender:
             return "the shortcuts are drawn without opaque objects"
         if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
             return "signed distances of a sheet mean nothing"
+        if self.borders == "front" and all(body.sheet_thickness is not None for body in scene.bodies):
+            return "sheets have one border, at which nothing bends"
         return None
 
 
@@ -155,6 +161,14 @@ CONTENDERS: tuple[Contender, ...] = (
         pictured=("absorption", "emission"),
     ),
     Contender("SignedDepth", "SignedDepth", SignedDepth(), effects=(*_ALL, "borders"), pictured=(*_ALL, "borders")),
+    Contender(
+        "one border",
+        "one border",
+        SignedDepth(),
+        effects=("borders",),
+        pictured=("borders",),
+        borders="front",
+    ),
     Contender(
         "straight rays",
         "straight rays",

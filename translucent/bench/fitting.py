@@ -67,7 +67,7 @@ def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | 
             raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
         return cpu.plan(scene)
     if contender.technique == "plan":
-        return studio.renderer.plan(scene, contender.method)
+        return studio.renderer.plan(scene, contender.method, borders=contender.borders)
     return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())
 
 

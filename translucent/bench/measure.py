@@ -260,7 +260,7 @@ def _parameters(contender: Contender) -> str:
         "half": "SignedDepth(anchored=True) into float16",
         "cpu": 'Renderer(backend="cpu")',
         "march": f"reference.march with {contender.method}",
-        "plan": str(contender.method),
+        "plan": str(contender.method) + ("" if contender.borders == "both" else f', borders="{contender.borders}"'),
     }[contender.technique]
 
 

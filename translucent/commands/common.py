@@ -49,6 +49,17 @@ def unit_option(command: F) -> F:
     )(command)
 
 
+def borders_option(command: F) -> F:
+    """Option for where rays bend."""
+    return click.option(
+        "--borders",
+        type=click.Choice(["both", "front"]),
+        default="both",
+        show_default=True,
+        help="Where rays bend: where they enter bodies and where they leave them, or only where they enter (quicker).",
+    )(command)
+
+
 def read_medium(color: str | None, distance: str | None, preset_name: str | None) -> Medium | None:
     """The medium that the options choose, if they do."""
     from translucent.medium import Medium

@@ -7,12 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, medium_options, read_medium, read_method, unit_option
+from translucent.commands.common import (
+    borders_option,
+    common_options,
+    medium_options,
+    read_medium,
+    read_method,
+    unit_option,
+)
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
     from translucent.mesh import Mesh
-    from translucent.render_plan import RenderPlan
+    from translucent.render_plan import Borders, RenderPlan
     from translucent.scene import Object, Scene
 
 
@@ -21,6 +28,7 @@ if TYPE_CHECKING:
 @medium_options
 @unit_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
+@borders_option
 @common_options
 def explain(
     model: str,
@@ -29,6 +37,7 @@ def explain(
     preset_name: str | None,
     unit: str,
     method_name: str | None,
+    borders: Borders,
     as_json: bool,
 ) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
@@ -40,7 +49,7 @@ def explain(
     medium = read_medium(color, distance, preset_name)
     scene = read_scene(model, unit, medium)
     method = read_method(method_name, None)
-    chosen = plan(scene, method) if scene.bodies else None
+    chosen = plan(scene, method, borders=borders) if scene.bodies else None
     if as_json:
         click.echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from translucent.commands.common import (
+    borders_option,
     common_options,
     look_options,
     medium_options,
@@ -22,6 +24,9 @@ from translucent.commands.common import (
 from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lines, read_scene, require_translucent
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
+
+if TYPE_CHECKING:
+    from translucent.render_plan import Borders
 
 
 @click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
@@ -46,6 +51,7 @@ from translucent.errors import InputError
     metavar="NAME",
     help="signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists or k-buffer. Default: by plan.",
 )
+@borders_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -76,6 +82,7 @@ def render(
     tone: str,
     roughness: float | None,
     method_name: str | None,
+    borders: Borders,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -97,6 +104,8 @@ def render(
     if transparent and (opaque_with is not None or output.suffix.lower() == ".mp4"):
         other = "--opaque-with, which draws what is behind" if opaque_with else "a film, which holds no alpha"
         raise InputError("--transparent", other, "leave out one of the two")
+    if borders == "front" and opaque_with is not None:
+        raise InputError("--borders front", "--opaque-with, where rays bend at both", "leave out one of the two")
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     pixels = read_size(size)
@@ -108,7 +117,9 @@ def render(
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)
     with tl.Renderer(backend) as renderer:
-        draw = partial(renderer.render, size=pixels, method=method, samples=samples, transparent=transparent)
+        draw = partial(
+            renderer.render, size=pixels, method=method, samples=samples, transparent=transparent, borders=borders
+        )
         if opaque_with is not None:
             from translucent.interop.pyrender import render_scene
 

@@ -140,6 +140,11 @@ class FrameJob:
         return any(step.name == "surfaces" for step in self.plan.passes)
 
     @property
+    def one_border(self) -> bool:
+        """Whether rays bend at the border where they enter a body, and not at the one where they leave it."""
+        return self.plan.borders == "front"
+
+    @property
     def finds_exits(self) -> bool:
         """Whether the intervals tell where each ray first leaves all bodies: borders need it where bodies touch."""
         return self.has_surfaces and isinstance(self.plan.method, FragmentLists | KBuffer | RayMarched)

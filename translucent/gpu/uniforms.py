@@ -363,5 +363,5 @@ def surface_table(scene: Scene, sheets: Mapping[int, float]) -> npt.NDArray[np.f
         row[1, 3] = np.linalg.norm(body.bounds[1] - body.bounds[0])
         row[2] = *passed, surface.roughness
         row[3] = *np.minimum(stream[0], limit), surface.transmission
-        row[4, :3] = np.minimum(stream[1], limit)
+        row[4] = *np.minimum(stream[1], limit), surface.diffuse_transmission
     return table

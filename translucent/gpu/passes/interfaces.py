@@ -1,4 +1,4 @@
-"""Borders of bodies: where each ray first enters one, and first leaves one beyond."""
+"""Borders of bodies: where each ray first enters one, and unless it leaves unbent, where it first leaves one beyond."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ class InterfacesPass:
         self._variants = Variants(gl, "geometry/border.vert", "shade/interface.frag", **_UNITS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Draw the bodies twice, with the depth test on; sheets have one border, seen from either side."""
+        """Draw the bodies for each border, with the depth test on; sheets have one, seen from either side."""
         nothing = float(CONSTANTS["NOTHING"])
         sheets = tuple(i for i in spec.objects if i in job.sheets)
         solids = tuple(i for i in spec.objects if i not in sheets)
-        for back, framebuffer in ((False, job.targets.entered()), (True, job.targets.left())):
+        for back in (False,) if job.one_border else (False, True):
+            framebuffer = job.targets.left() if back else job.targets.entered()
             framebuffer.use()
             framebuffer.clear(0.0, 0.0, 0.0, nothing, depth=1.0)
             job.gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)

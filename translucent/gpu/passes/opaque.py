@@ -62,6 +62,7 @@ class OpaquePass:
         finish = surface.metallic, surface.roughness, surface.ior, surface.alpha_cutoff
         set_uniform(program, "opaque_finish", finish)
         set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
+        set_uniform(program, "opaque_passed_share", surface.diffuse_transmission)
         set_uniform(program, "opaque_emissive", tuple(np.asarray(surface.emissive)))
 
 

@@ -49,7 +49,8 @@ class SurfacesPass:
         seen_map = environment.seen.kind == "image"
         seen_lights = seen_map and environment.seen is environment
         textures = [*job.targets.result().color_attachments[:4], *job.targets.entered().color_attachments]
-        textures += job.targets.left().color_attachments
+        if not job.one_border:
+            textures += job.targets.left().color_attachments
         for unit, texture in enumerate(textures):
             texture.use(unit)
         if job.has_opaque:
@@ -75,7 +76,11 @@ class SurfacesPass:
         if seen_map:
             job.resources.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
         program = self._variants.program(
-            OPAQUE=job.has_opaque, SEEN_MAP=seen_map, SEEN_LIGHTS=seen_lights, SINGLE_SCATTERING=job.scatters
+            ONE_BORDER=job.one_border,
+            OPAQUE=job.has_opaque,
+            SEEN_MAP=seen_map,
+            SEEN_LIGHTS=seen_lights,
+            SINGLE_SCATTERING=job.scatters,
         )
         self._variants.draw_fullscreen(program)
         finishes.release()

@@ -1,0 +1,38 @@
+"""When a sum over each ray does not tell the picture, so that the order of the surfaces on it has to be found."""
+
+from __future__ import annotations
+
+from translucent.plan_borders import touching_borders
+from translucent.render_plan import Borders
+from translucent.scene import Scene
+from translucent.slots import may_overlap, same_medium
+from translucent.thickness import BackFaceDepth, Method, ThinLayer
+
+
+def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> str | None:
+    """Why a sum over each ray, found by the method, does not tell the picture of this scene; None if it does."""
+    bodies = scene.bodies
+    if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
+        return "emission among several media: what is in front dims what is behind"
+    if method is None and borders == "both" and (touching := touching_borders(scene)) is not None:
+        return touching
+    # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
+    if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
+        return None
+    solids = [body for body in bodies if body.sheet_thickness is None]
+    for j, later in enumerate(solids):
+        for earlier in solids[:j]:
+            if may_overlap(earlier, later):
+                return (
+                    f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
+                    "would count both"
+                )
+    for body in solids:
+        if not body.mesh.diagnosis.convex:
+            return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
+    return None
+
+
+def media_differ(scene: Scene) -> bool:
+    """Whether not all bodies are filled with the same medium."""
+    return any(not same_medium(scene.bodies[0], body) for body in scene.bodies[1:])
