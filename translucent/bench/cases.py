@@ -255,6 +255,7 @@ CASES: tuple[Case, ...] = (
         "a thin wall: both of its faces mirror, and rays that pass go straight on",
         _wall,
         "borders",
+        quick=False,
         compared=120,
     ),
     Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),

@@ -43,7 +43,7 @@ class Effort:
 
 
 FULL = Effort(12.0, 2.5, 1.0)
-QUICK = Effort(1.5, 0.25, 0.6)
+QUICK = Effort(1.2, 0.25, 0.6)
 
 #: Told what is being measured, and how many steps of how many are done.
 Progress = Callable[[str, int, int], None]
