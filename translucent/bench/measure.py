@@ -271,7 +271,7 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
     parameters = row.parameters
     if entry.assumed:
         parameters = f"{entry.assumed:.4g} m, of least squared error"
-    promise, exact = _promise(contender, plan, entry.scene)
+    promise, exact = _promise(contender, plan, entry.scene, case.quantity)
     found: dict[str, Any] = {}
     scales: dict[Quantity, float | None] = {"thickness": case.diagonal, "transmittance": 1.0, "radiance": None}
     for quantity, scale in scales.items():
@@ -296,7 +296,7 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
     )
 
 
-def _promise(contender: Contender, plan: RenderPlan, scene: Scene) -> tuple[str, bool]:
+def _promise(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
     if contender.technique in ("constant", "ball"):
         return "none: the nearest face alone, with the best thickness that there is", False
     if contender.technique == "unmarked":
@@ -310,7 +310,11 @@ def _promise(contender: Contender, plan: RenderPlan, scene: Scene) -> tuple[str,
     if any(step.name == "light_views" for step in plan.passes):
         points = getattr(contender.method, "light_points", 0)
         return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
-    missing = [effect for effect in plan.unmodelled if not effect.startswith(("light scattered more", "refraction"))]
+    if contender.kind == "counter-example" and contender.ior == "matched":
+        return "none: borders are left out", False
+    # Thickness is that of straight rays.
+    beside = ("light scattered more", "refraction") if quantity == "thickness" else ("light scattered more",)
+    missing = [effect for effect in plan.unmodelled if not effect.startswith(beside)]
     limits = [*plan.limits, *missing]
     return "; ".join(limits) or "exact", not limits
 
