@@ -10,7 +10,8 @@ import pytest
 from translucent.bench.claims import check_claims
 from translucent.bench.comparison import compare_reports, machines_differ
 from translucent.bench.frontier import beats, mark_frontier
-from translucent.bench.record import CaseRecord, Errors, HardCase, Ratio, Report, Row, Timing
+from translucent.bench.record import CaseRecord, HardCase, Report
+from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.bench.timing import MOST, Sample, interleaved, ratio, timing
 
 from .test_record import PROVENANCE

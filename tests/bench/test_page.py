@@ -26,20 +26,8 @@ from translucent.bench.frontier import mark_frontier
 from translucent.bench.page import numbers
 from translucent.bench.page.build import build_page, write_page
 from translucent.bench.page.overview import overview_svg
-from translucent.bench.record import (
-    CaseRecord,
-    Claim,
-    Errors,
-    HardCase,
-    Picture,
-    Provenance,
-    Ratio,
-    Report,
-    Row,
-    ScalePoint,
-    Series,
-    Timing,
-)
+from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Provenance, Report, ScalePoint, Series
+from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.errors import InputError, RenderError
 
 PROVENANCE = Provenance(

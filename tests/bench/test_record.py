@@ -13,20 +13,8 @@ import pytest
 
 from translucent.bench.codec import Packed
 from translucent.bench.files import read_report, write_csv, write_report
-from translucent.bench.record import (
-    CaseRecord,
-    Claim,
-    Errors,
-    HardCase,
-    Picture,
-    Provenance,
-    Ratio,
-    Report,
-    Row,
-    ScalePoint,
-    Series,
-    Timing,
-)
+from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Provenance, Report, ScalePoint, Series
+from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.errors import InputError
 
 PROVENANCE = Provenance(

@@ -13,7 +13,8 @@ import pytest
 
 from translucent.assets import mesh_path
 from translucent.bench.models import effect_of, model_cases
-from translucent.bench.record import CaseRecord, Errors, Provenance, Ratio, Report, Row, Timing
+from translucent.bench.record import CaseRecord, Provenance, Report
+from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.cli import main
 from translucent.medium import Medium
 from translucent.mesh import load_mesh
@@ -225,7 +226,7 @@ def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, m
 
 @pytest.mark.usefixtures("nothing_else")
 def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from translucent.bench.measure import Truth
+    from translucent.bench.truth import Truth
 
     trace = Truth.of
 

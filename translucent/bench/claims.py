@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from translucent.bench.frontier import NOISES, error_of
-from translucent.bench.record import CaseRecord, Claim, HardCase, Row
+from translucent.bench.record import CaseRecord, Claim, HardCase
+from translucent.bench.row import Row
 
 #: Times the floor, within which signed depth stays.
 MOST_OF_FLOOR = 1.25

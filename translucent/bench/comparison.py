@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from translucent.bench.frontier import ERROR_FLOOR, ERROR_MARGIN
-from translucent.bench.record import CaseRecord, Report, Row
+from translucent.bench.record import CaseRecord, Report
+from translucent.bench.row import Row
 
 #: Runs on one machine differ by this share of a ratio to the floor though nothing has changed.
 TIME_SHARE = 0.15

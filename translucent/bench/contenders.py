@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from translucent.bench.record import Kind
+from translucent.bench.row import Kind
 from translucent.errors import InputError
 from translucent.render_plan import Borders
 from translucent.scene import Scene
@@ -48,7 +48,7 @@ class Contender:
     Attributes
     ----------
     name, family : str
-        As in `translucent.bench.record.Row`.
+        As in `translucent.bench.row.Row`.
     method : Method
         With its parameters. `ThinLayer` and shortcuts get the thickness with the least squared error of all, which
         nobody has who does not know the truth: no choice of theirs would do better.

@@ -8,7 +8,8 @@ import io
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from translucent.bench.record import CaseRecord, Report, Row
+from translucent.bench.record import CaseRecord, Report
+from translucent.bench.row import Row
 from translucent.errors import InputError
 from translucent.frame import write_atomically
 

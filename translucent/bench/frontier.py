@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from translucent.bench.record import Quantity, Row
+from translucent.bench.row import Quantity, Row
 
 #: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much.
 TIME_MARGIN = 1.05

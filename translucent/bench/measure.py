@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import io
-import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
-import numpy as np
-import numpy.typing as npt
-
-from translucent import reference
-from translucent.bench import record
 from translucent.bench.cases import Case
-from translucent.bench.codec import Packed
 from translucent.bench.contenders import Contender
 from translucent.bench.drawing import Drawing, Floor, Size, Studio
 from translucent.bench.fitting import drawing, fitted, plan_of, seen_by
 from translucent.bench.frontier import mark_frontier
-from translucent.bench.record import CaseRecord, Picture, Quantity, Row
+from translucent.bench.promise import promise_of
+from translucent.bench.record import CaseRecord
+from translucent.bench.row import Quantity, Row
 from translucent.bench.timing import Samples, interleaved, ratio, timing
+from translucent.bench.truth import Truth
 from translucent.errors import InputError, TranslucentError, TranslucentWarning
 from translucent.frame import Frame
 from translucent.gpu.targets import Targets
-from translucent.metrics import compare, interior
 from translucent.render_plan import RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Object, Scene
-from translucent.thickness import DepthPeeling, RayMarched
+from translucent.scene import Scene
+from translucent.thickness import DepthPeeling
 
 #: By which quantity the methods of a case are ranked.
 QUANTITY: dict[str, Quantity] = {
@@ -42,12 +35,6 @@ QUANTITY: dict[str, Quantity] = {
     "density": "radiance",
     "borders": "radiance",
 }
-
-#: Reflections that the reference follows where borders bend rays; what it leaves then is below the errors shown.
-BOUNCES = 12
-
-#: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
-INVISIBLE = 5e-8
 
 
 @dataclass
@@ -60,37 +47,6 @@ class _Entry:
     assumed: float = 0.0
     drawn: Drawing | None = None
     frame: Frame | None = None
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What all are held against.
-
-    Attributes
-    ----------
-    frame : Frame
-        Of the reference.
-    inside : (h, w) bool
-        Pixels away from silhouettes.
-    layers : int
-        The most surfaces on one ray.
-    seconds : float
-        That the frame took.
-    """
-
-    frame: Frame
-    inside: npt.NDArray[np.bool_]
-    layers: int
-    seconds: float
-
-    @classmethod
-    def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
-        """Trace the scene."""
-        begin = time.perf_counter()
-        frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES)
-        seconds = time.perf_counter() - begin
-        counts = reference.hit_counts(scene, size)
-        return cls(frame, interior(counts), int(counts.max()), seconds)
 
 
 @dataclass
@@ -133,11 +89,11 @@ class CaseRun:
         blank = _described(blank, scene, truth, small)
         if not blank.compared_pixels:
             return dataclasses.replace(blank, failure=_untrusted(scene))
-        pictures = [_picture("reference", truth.frame, None, blank)]
+        pictures = [truth.picture("reference", truth.frame, blank.quantity)]
         for contender in contenders:
             entry = self._compared(contender, scene, truth, small, blank)
             if entry.frame is not None and case.effect in contender.pictured:
-                pictures.append(_picture(contender.name, entry.frame, truth.frame, blank))
+                pictures.append(truth.picture(contender.name, entry.frame, blank.quantity))
             entry.frame = None
             self._entries.append(entry)
         rows = mark_frontier(self._timed(scene), blank.quantity)
@@ -236,8 +192,8 @@ def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> Ca
         bodies=len(scene.bodies),
         layers=truth.layers,
         compared_size=small,
-        diagonal=scene.diagonal,
-        compared_pixels=int((truth.inside & truth.frame.coverage & truth.frame.valid).sum()),
+        diagonal=truth.diagonal,
+        compared_pixels=int(truth.compared.sum()),
         reference_seconds=truth.seconds,
     )
 
@@ -271,11 +227,10 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
     parameters = row.parameters
     if entry.assumed:
         parameters = f"{entry.assumed:.4g} m, of least squared error"
-    promise, exact = _promise(contender, plan, entry.scene, case.quantity)
+    promise, exact = promise_of(contender, plan, entry.scene, case.quantity)
     found: dict[str, Any] = {}
-    scales: dict[Quantity, float | None] = {"thickness": case.diagonal, "transmittance": 1.0, "radiance": None}
-    for quantity, scale in scales.items():
-        errors = _errors(frame, truth, quantity, scale)
+    for quantity in get_args(Quantity):
+        errors = truth.errors(frame, quantity)
         found[quantity] = None if errors is None else errors[0]
         if errors is not None:
             found["invalid"], found["coverage_mismatch"] = errors[1:]
@@ -294,77 +249,6 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
         bytes_per_pixel=drawn.bytes_per_pixel,
         **found,
     )
-
-
-def _promise(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
-    if contender.technique in ("constant", "ball"):
-        return "none: the nearest face alone, with the best thickness that there is", False
-    if contender.technique == "unmarked":
-        return "exact for convex bodies; says nothing where a body is not", False
-    if contender.technique == "half":
-        return "none: 11 bits for sums of signed distances", False
-    if contender.technique == "march":
-        return f"sums over {getattr(contender.method, 'steps', 0)} steps in each interval", False
-    if isinstance(contender.method, RayMarched) and any(map(_shines, scene.bodies)):
-        return f"sums over {contender.method.steps} steps in each interval", False
-    if any(step.name == "light_views" for step in plan.passes):
-        points = getattr(contender.method, "light_points", 0)
-        return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
-    if contender.kind == "counter-example" and contender.ior == "matched":
-        return "none: borders are left out", False
-    # Thickness is that of straight rays.
-    beside = ("light scattered more", "refraction") if quantity == "thickness" else ("light scattered more",)
-    missing = [effect for effect in plan.unmodelled if not effect.startswith(beside)]
-    limits = [*plan.limits, *missing]
-    return "; ".join(limits) or "exact", not limits
-
-
-def _shines(body: Object) -> bool:
-    """Whether steps through the body add something up."""
-    medium = body.medium
-    return medium is not None and (medium.emits or medium.scatters or body.density is not None)
-
-
-def _errors(
-    frame: Frame, truth: Truth, quantity: Quantity, scale: float | None
-) -> tuple[record.Errors, float, float] | None:
-    """Errors in units of the scale (default: the root mean square of the truth); and the shares of both masks."""
-    try:
-        found = compare(frame, truth.frame, quantity, mask=truth.inside)
-    except InputError:
-        return None
-    if scale is None:
-        used = truth.inside & truth.frame.coverage & truth.frame.valid
-        scale = float(np.sqrt(np.mean(getattr(truth.frame, quantity)[used] ** 2))) or 1.0
-    values = {name.name: float(getattr(found, name.name)) / scale for name in dataclasses.fields(record.Errors)}
-    return record.Errors(**values), found.invalid, found.coverage_mismatch
-
-
-def _picture(name: str, frame: Frame, truth: Frame | None, case: CaseRecord) -> Picture:
-    from PIL import Image
-
-    stream = io.BytesIO()
-    Image.fromarray(frame.to_srgb8()).save(stream, format="PNG", optimize=True)
-    png = base64.b64encode(stream.getvalue()).decode("ascii")
-    if truth is None:
-        return Picture(name, png)
-    result, right = (np.asarray(getattr(f, case.quantity), np.float64) for f in (frame, truth))
-    error = result - right
-    if error.ndim == 3:
-        worst = np.abs(error).argmax(axis=-1)[..., None]
-        error = np.take_along_axis(error, worst, axis=-1)[..., 0]
-    covered = frame.coverage | truth.coverage
-    error = error / _scale(truth, case)
-    error = np.where(np.abs(error) < INVISIBLE, 0.0, error)
-    error = np.where(covered & frame.valid & truth.valid, error, np.nan)
-    return Picture(name, png, Packed.of(error), Packed.of(covered & ~frame.valid))
-
-
-def _scale(truth: Frame, case: CaseRecord) -> float:
-    if case.quantity == "thickness":
-        return case.diagonal
-    used = truth.coverage & truth.valid
-    return float(np.sqrt(np.mean(truth.radiance[used] ** 2))) or 1.0
 
 
 def _peeled(entry: _Entry) -> Row:

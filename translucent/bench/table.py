@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from translucent.bench.record import CaseRecord, Report, Row
+from translucent.bench.record import CaseRecord, Report
+from translucent.bench.row import Row
 
 _HEAD = (
     f"{'method':<36}{'ms':>8}{'p95':>8}{'÷ floor':>9}{'±':>6}{'frame':>7}{'passes':>7}{'layers':>7}{'ms/layer':>9}"

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bench.record import Ratio, Timing
+from translucent.bench.row import Ratio, Timing
 
 #: Rounds that even the slowest takes part in, and that the fastest needs no more than.
 FEWEST, MOST = 3, 60

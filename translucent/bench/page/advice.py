@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from translucent.bench.frontier import ERROR_FLOOR, TIME_MARGIN, error_of
-from translucent.bench.record import CaseRecord, Quantity, Row
+from translucent.bench.record import CaseRecord
+from translucent.bench.row import Quantity, Row
 
 #: RMS error up to which a method is good enough for a picture: in light, one step of an 8-bit display; in thickness,
 #: a tenth of a millimeter on a body of a meter.

@@ -14,7 +14,8 @@ from translucent.bench.page.figure import FONT_SIZE, drawing, new_figure, shorte
 from translucent.bench.page.labels import place_labels
 from translucent.bench.page.numbers import error_text, power_text, ratio_text
 from translucent.bench.page.theme import placeholder, style_of
-from translucent.bench.record import CaseRecord, Quantity, Row
+from translucent.bench.record import CaseRecord
+from translucent.bench.row import Quantity, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,0 +1,102 @@
+"""What all contenders of a case are held against, and how far a frame is from it."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from translucent import reference
+from translucent.bench.codec import Packed
+from translucent.bench.drawing import Size
+from translucent.bench.record import Picture
+from translucent.bench.row import Errors, Quantity
+from translucent.errors import InputError
+from translucent.frame import Frame
+from translucent.metrics import compare, interior
+from translucent.scene import Scene
+
+#: Reflections that the reference follows where borders bend rays; what it leaves then is below the errors shown.
+BOUNCES = 12
+
+#: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
+INVISIBLE = 5e-8
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What all are held against.
+
+    Attributes
+    ----------
+    frame : Frame
+        Of the reference.
+    inside : (h, w) bool
+        Pixels away from silhouettes.
+    layers : int
+        The most surfaces on one ray.
+    diagonal : float
+        Of the scene's bounds, in metres.
+    seconds : float
+        That the frame took.
+    """
+
+    frame: Frame
+    inside: npt.NDArray[np.bool_]
+    layers: int
+    diagonal: float
+    seconds: float
+
+    @classmethod
+    def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
+        """Trace the scene."""
+        begin = time.perf_counter()
+        frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES)
+        seconds = time.perf_counter() - begin
+        counts = reference.hit_counts(scene, size)
+        return cls(frame, interior(counts), int(counts.max()), scene.diagonal, seconds)
+
+    @property
+    def compared(self) -> npt.NDArray[np.bool_]:
+        """(h, w) pixels that errors are taken over, as far as a method calls them valid."""
+        return self.inside & self.frame.coverage & self.frame.valid
+
+    def scale(self, quantity: Quantity) -> float:
+        """What errors in that quantity are shares of."""
+        if quantity == "radiance":
+            return float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2))) or 1.0
+        return self.diagonal if quantity == "thickness" else 1.0
+
+    def errors(self, frame: Frame, quantity: Quantity) -> tuple[Errors, float, float] | None:
+        """Errors of a frame; and the shares of the invalid and of the wrongly covered pixels. None: none to compare."""
+        try:
+            found = compare(frame, self.frame, quantity, mask=self.inside)
+        except InputError:
+            return None
+        scale = self.scale(quantity)
+        values = {field.name: float(getattr(found, field.name)) / scale for field in dataclasses.fields(Errors)}
+        return Errors(**values), found.invalid, found.coverage_mismatch
+
+    def picture(self, method: str, frame: Frame, quantity: Quantity) -> Picture:
+        """The picture of a frame with its errors; the reference has none."""
+        stream = io.BytesIO()
+        Image.fromarray(frame.to_srgb8()).save(stream, format="PNG", optimize=True)
+        png = base64.b64encode(stream.getvalue()).decode("ascii")
+        if frame is self.frame:
+            return Picture(method, png)
+        result, right = (np.asarray(getattr(f, quantity), np.float64) for f in (frame, self.frame))
+        error = result - right
+        if error.ndim == 3:
+            worst = np.abs(error).argmax(axis=-1)[..., None]
+            error = np.take_along_axis(error, worst, axis=-1)[..., 0]
+        error = error / self.scale(quantity)
+        error = np.where(np.abs(error) < INVISIBLE, 0.0, error)
+        covered = frame.coverage | self.frame.coverage
+        error = np.where(covered & frame.valid & self.frame.valid, error, np.nan)
+        return Picture(method, png, Packed.of(error), Packed.of(covered & ~frame.valid))
