@@ -41,7 +41,7 @@ from translucent.thickness import (
 FALLBACK_SHEET = 0.01
 
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasteriser
-#: (`translucent report`). Peeling: for each pass, of which each finds two layers.
+#: (`translucent report`). Peeling takes a pass for every two layers, and this much for each pass.
 COSTS = {
     "opaque": 2.8,
     "signed_depth": 1.1,

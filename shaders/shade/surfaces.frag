@@ -144,7 +144,7 @@ struct Crossing {
 struct Straight {
     float thickness;
     vec3 optical_depth;
-    float first_interval;
+    float first_interval; // negative where it has no end
 };
 
 #if ONE_BORDER
@@ -185,12 +185,7 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
 #endif
 
 Crossing crossed(Finish finish, vec3 point, vec3 normal, vec3 ray, bool enters, Straight straight) {
-#if ONE_BORDER
-    bool goes_straight = finish.is_sheet;
-#else
-    bool goes_straight = finish.is_sheet || straight.first_interval < 0.0;
-#endif
-    if (goes_straight) {
+    if (finish.is_sheet || straight.first_interval < 0.0) {
         vec3 passed = transmittance(straight.optical_depth);
         float blur = refraction_roughness(finish.roughness, finish.ior);
         return Crossing(passed * radiance_beyond(point, ray, blur), passed, straight.thickness);
@@ -260,7 +255,7 @@ void main() {
     vec3 light = vec3(0.0);
     if (finish.transmission > 0.0) {
 #if ONE_BORDER
-        float first_interval = thickness;
+        const float first_interval = 0.0; // nothing asks how long it is
 #else
         float first_interval = back.w < NOTHING ? (end_of_interval(texel) - place) * surface_ahead.y * advance : -1.0;
 #endif

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -320,11 +321,18 @@ def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFix
 def test_ctrl_c_leaves_nothing(many: bool, tmp_path: Path) -> None:
     where = ["--out-dir", str(tmp_path)] if many else ["-o", str(tmp_path / "bear.exr")]
     command = [sys.executable, "-m", "translucent", "bake", "bear", *where, "--rays", "4096", "--size", "2048"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    timer = threading.Timer(4.0, process.send_signal, [signal.SIGINT])
-    timer.start()
-    _, error = process.communicate(timeout=60)
-    timer.cancel()
+    # A shell that runs tests in the background has its children ignore what Ctrl-C sends.
+    heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding
+    ) as process:
+        timer = threading.Timer(5.0, process.send_signal, [signal.SIGINT])
+        timer.start()
+        try:
+            _, error = process.communicate(timeout=60)
+        finally:
+            timer.cancel()
+            process.kill()
     assert process.returncode == 130, error
     assert error.strip().splitlines()[-1] == "error: interrupted"
     assert not list(tmp_path.iterdir())
