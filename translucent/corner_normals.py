@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.grouping import equal_rows
 from translucent.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
@@ -33,8 +34,7 @@ def corner_normals(mesh: Mesh) -> Array:
 
 def _welded(mesh: Mesh) -> npt.NDArray[np.int64]:
     """(m, 3): faces over vertices of which no two are in one place."""
-    _, number = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    return np.asarray(number.reshape(-1)[mesh.faces], dtype=np.int64)
+    return equal_rows(mesh.vertices).of[mesh.faces]
 
 
 def _smooth_groups(faces: npt.NDArray[np.int64], normals: Array) -> npt.NDArray[np.int64]:

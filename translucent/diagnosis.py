@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.grouping import equal_rows, position_ids, shared_edges, side_ends, used_vertices
 from translucent.repair import spread_winding
 from translucent.winding import inside_out_parts
 
@@ -117,14 +118,6 @@ class Diagnosis:
         return "; ".join([f"{kind}, {self.components} component{'s' if self.components != 1 else ''}", *self.problems])
 
 
-def position_ids(vertices: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-    """For each vertex, a number that all vertices at exactly the same position share: the first one's index."""
-    # Adding 0.0 makes -0.0 equal to 0.0, byte for byte.
-    keys = np.ascontiguousarray(vertices + 0.0).view(np.dtype((np.void, 24))).ravel()
-    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
-    return first[inverse].astype(np.int64)
-
-
 def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) -> Diagnosis:
     """Examine a mesh, as a cycle of oriented triangles.
 
@@ -175,10 +168,10 @@ class _Edges:
 
     def __init__(self, faces: npt.NDArray[np.int64]) -> None:
         self.faces = faces
-        start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
-        pairs = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
-        self.pairs, self.of_side, self.total = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-        self.of_side = self.of_side.ravel()
+        start, end = side_ends(faces)
+        shared = shared_edges(faces)
+        self.of_side, self.total = shared.of, shared.sizes
+        self.pairs = np.sort(np.stack([start, end], axis=1)[shared.first], axis=1)
         direction = np.where(start < end, 1.0, -1.0)
         #: Uses in ascending minus uses in descending direction: 0 for a balanced edge.
         self.net = np.rint(np.bincount(self.of_side, weights=direction, minlength=len(self.pairs))).astype(np.int64)
@@ -202,7 +195,8 @@ class _Edges:
         """Whether no edge bends inwards; with one closed component of genus 0 that means a convex body."""
         if not (self.total == 2).all() or orientation == 0:
             return False
-        if len(np.unique(self.faces)) - len(self.pairs) + len(self.faces) != 2:
+        used = used_vertices(self.faces)
+        if len(used) - len(self.pairs) + len(self.faces) != 2:
             return False
         order = np.argsort(self.of_side, kind="stable").reshape(-1, 2)
         one, other = order[:, 0], order[:, 1]
@@ -210,7 +204,7 @@ class _Edges:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * orientation
         opposite = vertices[self.faces[other // 3, (other + 2) % 3]]
         height = np.einsum("ij,ij->i", normals[one // 3], opposite - corners[one // 3, 0])
-        size = np.ptp(vertices[np.unique(self.faces)], axis=0).max()
+        size = np.ptp(vertices[used], axis=0).max()
         # Files keep float32, so flat patches and fine tessellations scatter by some 1e-7 of the size.
         return bool((height <= CONVEX_TOLERANCE * size * np.linalg.norm(normals[one // 3], axis=1)).all())
 
@@ -231,9 +225,8 @@ def _found(mask: npt.NDArray[np.bool_]) -> Finding:
 
 
 def _duplicates(faces: npt.NDArray[np.int64]) -> Finding:
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     repeated = np.ones(len(faces), dtype=bool)
-    repeated[first] = False
+    repeated[equal_rows(np.sort(faces, axis=1)).first] = False
     return _found(repeated & ~_collapsed(faces))
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.diagnosis import Diagnosis, diagnose
 from translucent.errors import InputError, TranslucentWarning
+from translucent.grouping import equal_rows, used_vertices
 from translucent.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
 from translucent.units import metres_per_unit
 from translucent.winding import winding_number
@@ -111,7 +112,7 @@ class Mesh:
     @cached_property
     def bounds(self) -> Array:
         """(2, 3): smallest and largest coordinates of the vertices that faces use."""
-        used = self.vertices[np.unique(self.faces)]
+        used = self.vertices[used_vertices(self.faces)]
         bounds = np.stack([used.min(axis=0), used.max(axis=0)])
         bounds.setflags(write=False)
         return bounds
@@ -185,10 +186,11 @@ class Mesh:
 
     def require_finite(self) -> None:
         """Raise `InputError` where coordinates are not finite, or the mesh is too large or small for float32."""
-        if bad := self.diagnosis.nonfinite_vertices:
+        bad = np.flatnonzero(~np.isfinite(self.vertices).all(axis=1))
+        if len(bad):
             raise InputError(
                 f"mesh {self.name!r}",
-                f"{bad.count} vertices are not finite (first: {bad.first[0]})",
+                f"{len(bad)} vertices are not finite (first: {bad[0]})",
                 "export the mesh again",
             )
         if (largest := float(np.abs(self.vertices).max())) > MAX_COORDINATE:
@@ -270,9 +272,11 @@ def mended(raw: Mesh) -> Mesh:
     if raw.uv is None:
         index, vertices, uv = same, positions, None
     else:
-        _, first, inverse = np.unique(np.column_stack([same, raw.uv]), axis=0, return_index=True, return_inverse=True)
-        index, vertices, uv = first[inverse.ravel()], positions, raw.uv
-    kept, renumbered = np.unique(index[split_faces], return_inverse=True)
+        groups = equal_rows(np.column_stack([same, raw.uv]))
+        index, vertices, uv = groups.first[groups.of], positions, raw.uv
+    kept = used_vertices(index[split_faces])
+    renumbered = np.zeros(len(index), dtype=np.int32)
+    renumbered[kept] = np.arange(len(kept))
     if (merged := len(raw.vertices) - len(kept)) > 0:
         repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
     if flipped:
@@ -287,7 +291,7 @@ def mended(raw: Mesh) -> Mesh:
         )
     return Mesh(
         vertices[kept],
-        renumbered.reshape(-1, 3).astype(np.int32),
+        renumbered[index[split_faces]],
         None if uv is None else uv[kept],
         name=raw.name,
         repairs=tuple(repairs),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.grouping import equal_rows, shared_edges, side_ends
 from translucent.winding import inside_out_parts
 
 Vertices = npt.NDArray[np.float64]
@@ -40,14 +41,15 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    points, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    places = equal_rows(vertices)
+    points = vertices[places.first]
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     count = len(points)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     groups, label = connected_components(graph, directed=False)
     representative = np.full(groups, len(vertices), dtype=np.int64)
-    np.minimum.at(representative, label, first)
-    return np.asarray(representative[label][inverse.ravel()])
+    np.minimum.at(representative, label, places.first)
+    return np.asarray(representative[label][places.of])
 
 
 def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
@@ -88,16 +90,10 @@ def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64
     from scipy.sparse.csgraph import connected_components
 
     count = len(faces)
-    start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
-    _, edge, uses = np.unique(
-        np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1),
-        axis=0,
-        return_inverse=True,
-        return_counts=True,
-    )
-    edge = edge.ravel()
-    order = np.argsort(edge, kind="stable")
-    pairs = order[(uses[edge] == 2)[order]].reshape(-1, 2)
+    start, _ = side_ends(faces)
+    edges = shared_edges(faces)
+    order = np.argsort(edges.of, kind="stable")
+    pairs = order[(edges.sizes[edges.of] == 2)[order]].reshape(-1, 2)
     one, other = pairs[:, 0] // 3, pairs[:, 1] // 3
     disagree = start[pairs[:, 0]] == start[pairs[:, 1]]
     rows = np.concatenate([one, one + count])

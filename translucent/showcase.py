@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from translucent.camera import Camera
 from translucent.environment import Environment
+from translucent.grouping import used_vertices
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.scene import Light, Object, Scene
@@ -87,7 +88,8 @@ def framing(
 ) -> Camera:
     """The camera of `Camera.framing` that sees these objects, all of each."""
     corners = [
-        item.mesh.vertices[np.unique(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3] for item in objects
+        item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+        for item in objects
     ]
     return Camera.framing(np.concatenate(corners), size, fov_y=fov_y, up=up)
 

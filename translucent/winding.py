@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.grouping import shared_edges, side_ends
+
 Array = npt.NDArray[np.float64]
 
 #: A closed part counts as inside out if its volume is below minus this share of its cubed size: less is rounding.
@@ -65,6 +67,8 @@ def inside_out_parts(
         triple = np.einsum("ij,ij->i", relative[:, 0], np.cross(relative[:, 1], relative[:, 2]))
         flat = -_FLAT * np.linalg.norm(high - low, axis=1) ** 3
         negative = np.bincount(part, weights=triple, minlength=count) / 6.0 < flat
+    if not negative.any():
+        return np.empty(0, dtype=np.int64)
     suspects = np.flatnonzero(negative & _balanced_parts(faces, part, count))
     return np.array([p for p in suspects if not _is_cavity(corners, part, low, high, int(p))], dtype=np.int64)
 
@@ -80,10 +84,9 @@ def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Ar
 
 def _balanced_parts(faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:
     """Whether every directed edge of a part has its opposite."""
-    start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
-    pairs = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
-    _, edge = np.unique(pairs, axis=0, return_inverse=True)
-    net = np.bincount(edge.ravel(), weights=np.where(start < end, 1.0, -1.0))
+    start, end = side_ends(faces)
+    edge = shared_edges(faces).of
+    net = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
     unbalanced = np.zeros(count, dtype=bool)
-    unbalanced[np.repeat(part, 3)[net[edge.ravel()] != 0]] = True
+    unbalanced[np.repeat(part, 3)[net[edge] != 0]] = True
     return ~unbalanced

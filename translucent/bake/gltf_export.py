@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from translucent.bake.glb_builder import INDICES, GlbBuilder
 from translucent.errors import InputError
+from translucent.grouping import equal_rows
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.mesh import Mesh
 
@@ -57,17 +58,14 @@ def mesh_file(mesh: Mesh) -> GltfFile:
 
 def _split_at_edges(mesh: Mesh) -> tuple[Indices, Indices, npt.NDArray[np.float32]]:
     """Vertices of the mesh to repeat where it has edges, faces of them, and a unit normal for each."""
-    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    places = np.zeros((int(place.max()) + 1, 3))
-    places[place.ravel()] = mesh.vertices
+    places = equal_rows(mesh.vertices)
     # Across a seam of the UVs the surface is as smooth as elsewhere.
-    smooth = Mesh(places, place.ravel()[mesh.faces].astype(np.int32)).vertex_normals[place.ravel()]
+    welded = Mesh(mesh.vertices[places.first], places.of[mesh.faces].astype(np.int32))
+    smooth = welded.vertex_normals[places.of]
     own, corner = mesh.face_normals[:, None], smooth[mesh.faces]
     sharp = np.einsum("fck,fck->fc", np.broadcast_to(own, corner.shape), corner) < np.cos(np.radians(CREASE))
     sharp &= own.any(axis=2)  # a face without area has no normal
     with np.errstate(under="ignore"):
         normals = np.where(sharp[..., None], own, corner).astype(np.float32).reshape(-1, 3)
-    # Equal in all bits where equal: -0 is 0.
-    keys = np.column_stack([mesh.faces.ravel().astype(np.float64), normals + np.float32(0)])
-    _, first, faces = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return mesh.faces.ravel()[first].astype(np.int64), faces.reshape(-1, 3), normals[first]
+    split = equal_rows(np.column_stack([mesh.faces.ravel(), normals]))
+    return mesh.faces.ravel()[split.first].astype(np.int64), split.of.reshape(-1, 3), normals[split.first]

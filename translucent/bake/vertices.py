@@ -17,8 +17,8 @@ from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import BakeReport, VertexThickness
 from translucent.bake.work import in_order
-from translucent.diagnosis import position_ids
 from translucent.errors import TranslucentWarning
+from translucent.grouping import position_ids
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.grouping import shared_edges
 from translucent.lights import DirectionalLight
 from translucent.reference.rays import Rays
 from translucent.reference.tracer import TracedObject
@@ -31,12 +32,10 @@ def outline_edges(traced: TracedObject, light: Light) -> Array:
         else:
             towards = np.asarray(light.position) - corners[:, 0]
         lit = np.einsum("ki,ki->k", normals, towards) > 0
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    pairs = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1)
-    _, first, edge = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    edges = shared_edges(faces)
     # Each lit face counts as 1 and each other one as -1: an edge between two faces alike has 2.
-    net = np.bincount(edge.ravel(), np.where(np.repeat(lit, 3), 1.0, -1.0))
-    chosen = first[np.abs(net) != 2]
+    net = np.bincount(edges.of, np.where(np.repeat(lit, 3), 1.0, -1.0))
+    chosen = edges.first[np.abs(net) != 2]
     return np.stack([corners.reshape(-1, 3)[chosen], np.roll(corners, -1, axis=1).reshape(-1, 3)[chosen]], axis=1)
 
 
