@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-import translucent as tl
 from translucent.aovs import EMPTY, false_colors
+from translucent.bake.thickness_map import ThicknessMap
 from translucent.color import srgb_to_linear
 from translucent.environment import Environment
 from translucent.medium import Medium
+from translucent.mesh import Mesh
 from translucent.preview.document import Orbit
+from translucent.preview.elsewhere import in_a_process
 from translucent.preview.numbers import length_text
 from translucent.preview.orbiting import camera_of
 from translucent.preview.tasks import Task
@@ -29,13 +32,14 @@ class Bake:
     Attributes
     ----------
     map : ThicknessMap
-        As `tl.bake_thickness` gives it.
     mode : str
+    scene : Scene
+        The model painted with it.
     """
 
-    map: Any
+    map: ThicknessMap
     mode: str
-    scene: Scene | None
+    scene: Scene
     _seen: tuple[Orbit, Scene] | None = None
 
     @property
@@ -49,10 +53,8 @@ class Bake:
         most = float(values.max(initial=0.0))
         return f"{most:.3g}" if self.mode == "local" else length_text(most, unit)
 
-    def seen_from(self, orbit: Orbit) -> Scene | None:
-        """The painted model; the same object while the camera stays. None without texture coordinates."""
-        if self.scene is None:
-            return None
+    def seen_from(self, orbit: Orbit) -> Scene:
+        """The painted model; the same object while the camera stays."""
         if self._seen is None or self._seen[0] != orbit:
             self._seen = orbit, dataclasses.replace(self.scene, camera=camera_of(orbit))
         return self._seen[1]
@@ -60,17 +62,25 @@ class Bake:
 
 def bake_map(task: Task, body: Object, medium: Medium, mode: str, size: int, rays: int) -> Bake:
     """Bake a map of a body."""
+    options: dict[str, Any] = {"mode": mode, "size": size, "rays": rays}
+    if mode == "transmittance":
+        options["medium"] = medium
+    # xatlas holds the interpreter's lock while it makes texture coordinates.
+    baked = in_a_process(task, _bake, body.mesh, options)
+    return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
+
+
+def _bake(report: Callable[[float | None, str], None], mesh: Mesh, options: dict[str, Any]) -> ThicknessMap:
+    from translucent.bake.bake import bake_thickness
 
     def progress(done: int, total: int, cast: int) -> None:
-        task.report(done / max(total, 1), f"{cast / 1e6:.1f} million rays")
+        report(done / max(total, 1), f"{cast / 1e6:.1f} million rays")
 
-    options: dict[str, Any] = {"medium": medium} if mode == "transmittance" else {}
-    baked = tl.bake_thickness(body.mesh, size=size, mode=mode, rays=rays, progress=progress, **options)  # type: ignore[attr-defined, unused-ignore]
-    mesh = getattr(baked, "mesh", None) or body.mesh
-    return Bake(baked, mode, painted(dataclasses.replace(body, mesh=mesh), baked) if mesh.uv is not None else None)
+    report(None, "starting")
+    return bake_thickness(mesh, progress=progress, **options)
 
 
-def painted(body: Object, baked: Any) -> Scene:
+def painted(body: Object, baked: ThicknessMap) -> Scene:
     """The body in the false colors of a map, unshaded but for a white surrounding."""
     values = np.where(baked.coverage, baked.values, 0.0)
     most = float(values.max(initial=0.0)) or 1.0
