@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import pytest
 from hypothesis import settings
 
 import translucent as tl
+from tests.command_line import Result, Run
+from translucent.cli import main
 
 ASSETS = Path(__file__).parents[2] / "shared" / "assets"
 
@@ -27,6 +30,18 @@ def floating_point_errors_raise() -> Iterator[None]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20240611)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Runs ``translucent`` in this process; a suite about one verb puts that before its arguments."""
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
+
+    def _run(*arguments: object) -> Result:
+        code = main([str(argument) for argument in arguments])
+        return Result(code, *capsys.readouterr())
+
+    return _run
 
 
 @pytest.fixture(scope="session")

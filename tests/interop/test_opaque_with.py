@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 import json
-import warnings
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
-import pytest
 import trimesh
 
-from translucent.cli import main
+from tests.command_line import Run
 from translucent.materials.gltf_file import read_gltf, write_gltf
-
-Run = Callable[..., tuple[int, str, str]]
 
 GLASS = {
     "KHR_materials_transmission": {"transmissionFactor": 1},
     "KHR_materials_volume": {"thicknessFactor": 1, "attenuationColor": [0.25, 0.5, 1], "attenuationDistance": 0.5},
 }
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-
-    def _run(*arguments: object) -> tuple[int, str, str]:
-        code = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return _run
 
 
 def write(path: Path, *materials: dict[str, Any]) -> Path:
