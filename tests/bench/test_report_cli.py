@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 
+from tests.bench.provenance import PROVENANCE
 from tests.command_line import Run
 from translucent.assets import mesh_path
 from translucent.bench.models import effect_of, model_cases
-from translucent.bench.record import CaseRecord, Provenance, Report
+from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.medium import Medium
 from translucent.mesh import load_mesh
@@ -23,12 +24,6 @@ from translucent.showcase import showcase
 @pytest.fixture
 def run(run: Run) -> Run:
     return partial(run, "report")
-
-
-PROVENANCE = Provenance(
-    "translucent report", "2025-01-02T03:04:05Z", "Linux", "a processor", 2, "egl", "llvmpipe", "4.5", True, {}, None,
-    None, 0, True,
-)  # fmt: skip
 
 
 def record(ratio: float = 1.1, rms: float = 3e-8, **more: Any) -> Report:
