@@ -65,15 +65,12 @@ class Checks:
         else:
             self._note(f"{what} gave {type(made).__name__}, no error", held=False)
 
-    def picture(
-        self, what: str, scene: Scene, size: Size = SIZE, method: Method | None = None, *, all_valid: bool = True
-    ) -> Frame:
+    def picture(self, what: str, scene: Scene) -> Frame:
         """Render, and note the error in thickness: its 99.9th percentile, as a share of the diagonal."""
-        frame, truth = self.render(scene, size, method), reference.render(scene, size, method)
-        inside = interior(reference.hit_counts(scene, size))
+        frame, truth = self.render(scene, SIZE), reference.render(scene, SIZE)
+        inside = interior(reference.hit_counts(scene, SIZE))
         self.error(what, compare(frame, truth, mask=inside).p999 / scene.diagonal)
-        if all_valid:
-            self.holds(f"{what}: no pixel marked", frame.valid[inside].all())
+        self.holds(f"{what}: no pixel marked", frame.valid[inside].all())
         return frame
 
     def compared(self, frame: Frame, truth: Frame, scene: Scene, quantity: Quantity = "thickness") -> Errors:
