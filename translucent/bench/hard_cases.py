@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -125,11 +124,10 @@ class Hard:
         return HardCase(self.id, self.title, self.promise, result, passed, worst, limit, unit)
 
 
-def measure_hard_cases(renderer: Renderer) -> Iterator[tuple[HardCase, float]]:
-    """All of them, in their order, each with the seconds that it took."""
+def measure_hard_cases(renderer: Renderer) -> Iterator[HardCase]:
+    """All of them, in their order."""
     from translucent.bench import hard_geometry, hard_values, hard_views
 
     cases = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
     for case in sorted(cases, key=lambda case: case.id):
-        begin = time.perf_counter()
-        yield case.measure(renderer), time.perf_counter() - begin
+        yield case.measure(renderer)
