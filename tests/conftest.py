@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import shutil
+import subprocess
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
 import translucent as tl
+from tests.command_line import Result, Run
+from translucent.cli import main
 
 ASSETS = Path(__file__).parents[2] / "shared" / "assets"
+
+VALIDATE = """
+const v = require(process.argv[1]), fs = require('fs'), path = require('path');
+const file = process.argv[2];
+const external = uri => Promise.resolve(new Uint8Array(fs.readFileSync(path.join(path.dirname(file), uri))));
+v.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction: external})
+  .then(r => console.log(JSON.stringify(r.issues)));
+"""
 
 settings.register_profile("project", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("project")
@@ -27,6 +42,18 @@ def floating_point_errors_raise() -> Iterator[None]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20240611)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Runs ``translucent`` in this process; a suite about one verb puts that before its arguments."""
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
+
+    def _run(*arguments: object) -> Result:
+        code = main([str(argument) for argument in arguments])
+        return Result(code, *capsys.readouterr())
+
+    return _run
 
 
 @pytest.fixture(scope="session")
@@ -47,3 +74,26 @@ def renderer() -> Iterator[tl.Renderer]:
         pytest.fail(f"these tests need OpenGL 3.3: {error}", pytrace=False)
     with made:
         yield made
+
+
+@pytest.fixture(scope="session")
+def validate() -> Callable[[Path], dict[str, Any]]:
+    """Issues that gltf-validator finds; the module is looked for from the working folder, and by NODE_PATH."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is absent, so gltf-validator cannot run")
+    where = subprocess.run(
+        [node, "-p", "require.resolve('gltf-validator')"], capture_output=True, text=True, check=False
+    )
+    if where.returncode:
+        pytest.skip("the node module gltf-validator is absent: npm install gltf-validator, and set NODE_PATH")
+
+    def _validate(path: Path) -> dict[str, Any]:
+        done = subprocess.run(
+            [node, "-e", VALIDATE, where.stdout.strip(), str(path)], capture_output=True, text=True, check=True
+        )
+        issues = json.loads(done.stdout)
+        assert isinstance(issues, dict)
+        return issues
+
+    return _validate

@@ -7,8 +7,7 @@ import json
 import math
 import re
 import sys
-import warnings
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,25 +16,16 @@ import pytest
 import trimesh
 
 import translucent as tl
+from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
 from translucent.batch import MOST_SHOWN, convert_table
-from translucent.cli import main
 from translucent.commands.extinction import TARGETS
 from translucent.commands.on_model import SIZE
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-
-    def _run(*arguments: object) -> tuple[int, str, str]:
-        code = main(["extinction", *(str(argument) for argument in arguments)])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return _run
+def run(run: Run) -> Run:
+    return partial(run, "extinction")
 
 
 @pytest.fixture
@@ -292,11 +282,7 @@ def test_a_black_channel_is_clamped_on_request(run: Run, plate: Path) -> None:
 def test_a_question_that_cannot_be_answered_is_one_line(
     run: Run, plate: Path, arguments: list[str], message: str
 ) -> None:
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert err.startswith("error: ")
-    assert message in err
+    assert message in one_error_line(run(*arguments))
 
 
 @pytest.mark.filterwarnings("ignore:.*open edges")
@@ -353,9 +339,5 @@ def test_bad_input_is_one_line_and_exit_code_2(run: Run, here: Path, arguments: 
     (here / "bad.json").write_text("[{")
     (here / "dict.json").write_text('{"name": 1}')
     before = sorted(here.iterdir())
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert err.startswith("error: ")
-    assert message in err
+    assert message in one_error_line(run(*arguments))
     assert sorted(here.iterdir()) == before

@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
 import warnings
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
 import translucent as tl
-from translucent.cli import cli, main
-from translucent.commands.material import material
+from tests.command_line import Run, one_error_line, strict_json
 from translucent.materials.gltf import read_materials
 from translucent.materials.gltf_file import GltfFile, read_gltf, write_gltf
 
-Run = Callable[..., tuple[int, str, str]]
 WINE = ("--color", "linear(0.2,0.02,0.05)", "--distance", "1cm")
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-    monkeypatch.setitem(cli.commands, "material", material)
-
-    def _run(*arguments: object) -> tuple[int, str, str]:
-        code = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return _run
 
 
 @pytest.fixture
@@ -61,20 +43,6 @@ def model(tmp_path: Path) -> Path:
             mesh["primitives"][0]["material"] = 0
     write_gltf(GltfFile(path, tree, file.chunks), path)
     return path
-
-
-def one_error_line(result: tuple[int, str, str], code: int = 2) -> str:
-    assert result[:2] == (code, "")
-    (line,) = result[2].splitlines()
-    assert line.startswith("error: ")
-    return line
-
-
-def strict_json(text: str) -> Any:
-    def refuse(word: str) -> None:
-        pytest.fail(f"{word} is no JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_show_tells_the_values_the_medium_and_the_warnings(run: Run, model: Path) -> None:

@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.cli import cli, main
-from translucent.commands.presets import presets as command
+from tests.command_line import Run, one_error_line, strict_json
 
 ESCAPE = "\x1b["
 
 
-@dataclass(frozen=True)
-class Result:
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Result]
-
-
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-    monkeypatch.setitem(cli.commands, "presets", command)
-
-    def _run(*arguments: str) -> Result:
-        code = main(["presets", *arguments])
-        captured = capsys.readouterr()
-        return Result(code, captured.out, captured.err)
-
-    return _run
+def run(run: Run) -> Run:
+    return partial(run, "presets")
 
 
 def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -48,17 +25,6 @@ def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-
-
-def strict_json(text: str) -> Any:
-    """One JSON object; NaN and infinities, which JSON does not have, fail."""
-
-    def refuse(word: str) -> None:
-        pytest.fail(f"{word} is no JSON")
-
-    value = json.loads(text, parse_constant=refuse)
-    assert isinstance(value, dict)
-    return value
 
 
 def rows(text: str) -> dict[str, str]:
@@ -204,10 +170,7 @@ def test_json_has_no_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None
     ],
 )
 def test_what_cannot_be_shown_is_one_line(run: Run, arguments: list[str], message: str) -> None:
-    result = run(*arguments)
-    assert (result.code, result.out) == (2, "")
-    assert len(result.err.splitlines()) == 1
-    assert result.err.startswith(message)
+    assert one_error_line(run(*arguments)).startswith(message)
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["show", "--help"]])

@@ -3,42 +3,20 @@
 from __future__ import annotations
 
 import json
-import warnings
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.cli import main
+from tests.command_line import Run, one_error_line
 from translucent.commands.common import TONE_NAMES, read_environment
 from translucent.showcase import LIGHT_TABLE
 from translucent.tone import TONES
 
-
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Result]
 SMALL = ("--size", "32x24", "--samples", "1")
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-
-    def _run(*arguments: object) -> Result:
-        code = main([str(argument) for argument in arguments])
-        return Result(code, *capsys.readouterr())
-
-    return _run
 
 
 @pytest.fixture
@@ -96,10 +74,7 @@ def test_wrong_options_are_one_line(
     run: Run, options: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    result = run("render", "bear", "-o", "a.png", *options)
-    assert (result.code, result.out) == (2, "")
-    assert message in result.err
-    assert result.err.count("\n") == 1
+    assert message in one_error_line(run("render", "bear", "-o", "a.png", *options))
     assert not list(tmp_path.iterdir())
 
 

@@ -1,10 +1,7 @@
-"""Maps made by hand, small models, and the Khronos validator."""
+"""Maps made by hand, and small models."""
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,37 +15,6 @@ from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 
 Json = dict[str, Any]
-
-SCRIPT = """
-const v = require(process.argv[1]), fs = require('fs'), path = require('path');
-const file = process.argv[2];
-const external = uri => Promise.resolve(new Uint8Array(fs.readFileSync(path.join(path.dirname(file), uri))));
-v.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction: external})
-  .then(r => console.log(JSON.stringify(r.issues)));
-"""
-
-
-@pytest.fixture(scope="session")
-def validate() -> Callable[[Path], Json]:
-    """Issues that gltf-validator finds; the module is looked for from the working folder, and by NODE_PATH."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("node is absent, so gltf-validator cannot run")
-    where = subprocess.run(
-        [node, "-p", "require.resolve('gltf-validator')"], capture_output=True, text=True, check=False
-    )
-    if where.returncode:
-        pytest.skip("the node module gltf-validator is absent: npm install gltf-validator, and set NODE_PATH")
-
-    def _validate(path: Path) -> Json:
-        done = subprocess.run(
-            [node, "-e", SCRIPT, where.stdout.strip(), str(path)], capture_output=True, text=True, check=True
-        )
-        issues = json.loads(done.stdout)
-        assert isinstance(issues, dict)
-        return issues
-
-    return _validate
 
 
 def report(**changes: Any) -> BakeReport:

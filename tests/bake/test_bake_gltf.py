@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import io
 import json
 import struct
@@ -115,6 +116,17 @@ def test_the_mesh_of_a_new_file_is_the_mesh(
     # Smooth across the seams of the UVs: on a sphere, normals are positions.
     normals = found["POSITION"] / np.linalg.norm(found["POSITION"], axis=1, keepdims=True)
     assert np.abs(found["NORMAL"] - normals).max() < 0.02
+
+
+@pytest.mark.parametrize(("shift", "wrap"), [(0.0, 33071), (0.5, 10497)], ids=["clamped", "repeated"])
+def test_a_map_repeats_where_the_uvs_go_beyond_it(
+    make_map: MapMaker, ramp: np.ndarray, tmp_path: Path, shift: float, wrap: int
+) -> None:
+    mesh = make_map(ramp).mesh
+    mesh = dataclasses.replace(mesh, uv=mesh.uv + (shift, 0.0))
+    make_map(ramp, mesh).save(tmp_path / "map.glb")
+    (sampler,) = read_gltf(tmp_path / "map.glb").tree["samplers"]
+    assert (sampler["wrapS"], sampler["wrapT"]) == (wrap, wrap)
 
 
 def test_edges_stay_edges(make_map: MapMaker, ramp: np.ndarray, tmp_path: Path) -> None:

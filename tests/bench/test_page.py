@@ -21,31 +21,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.bench.provenance import PROVENANCE
 from translucent.bench.codec import Packed
 from translucent.bench.frontier import mark_frontier
 from translucent.bench.page import numbers
 from translucent.bench.page.build import build_page, write_page
 from translucent.bench.page.overview import overview_svg
-from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Provenance, Report, ScalePoint, Series
+from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series
 from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.errors import InputError, RenderError
-
-PROVENANCE = Provenance(
-    command="translucent report -o out",
-    started="2025-01-02T03:04:05Z",
-    platform="Linux",
-    processor="a processor",
-    processors=2,
-    backend="egl",
-    renderer="llvmpipe",
-    driver="4.5 Mesa",
-    software=True,
-    versions={"numpy": "2.4"},
-    commit="0123abc",
-    dirty=True,
-    seed=7,
-    quick=False,
-)
 
 FAMILIES = ("SignedDepth", "BackFaceDepth", "constant thickness", "KBuffer", "FragmentLists", "something new")
 

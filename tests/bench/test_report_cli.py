@@ -4,48 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import warnings
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
+from tests.bench.provenance import PROVENANCE
+from tests.command_line import Run
 from translucent.assets import mesh_path
 from translucent.bench.models import effect_of, model_cases
-from translucent.bench.record import CaseRecord, Provenance, Report
+from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
-from translucent.cli import main
 from translucent.medium import Medium
 from translucent.mesh import load_mesh
 from translucent.showcase import showcase
 
 
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Result]
-
-
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-
-    def _run(*arguments: object) -> Result:
-        code = main(["report", *map(str, arguments)])
-        captured = capsys.readouterr()
-        return Result(code, captured.out, captured.err)
-
-    return _run
-
-
-PROVENANCE = Provenance(
-    "translucent report", "2025-01-02T03:04:05Z", "Linux", "a processor", 2, "egl", "llvmpipe", "4.5", True, {}, None,
-    None, 0, True,
-)  # fmt: skip
+def run(run: Run) -> Run:
+    return partial(run, "report")
 
 
 def record(ratio: float = 1.1, rms: float = 3e-8, **more: Any) -> Report:

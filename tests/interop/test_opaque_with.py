@@ -3,50 +3,20 @@
 from __future__ import annotations
 
 import json
-import warnings
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
-import pytest
-import trimesh
 
-from translucent.cli import main
-from translucent.materials.gltf_file import read_gltf, write_gltf
-
-Run = Callable[..., tuple[int, str, str]]
-
-GLASS = {
-    "KHR_materials_transmission": {"transmissionFactor": 1},
-    "KHR_materials_volume": {"thicknessFactor": 1, "attenuationColor": [0.25, 0.5, 1], "attenuationDistance": 0.5},
-}
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # the command line sets its own
-
-    def _run(*arguments: object) -> tuple[int, str, str]:
-        code = main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return _run
+from tests.boxes import GLASS, boxes
+from tests.command_line import Run
+from translucent.materials.gltf_file import write_gltf
 
 
 def write(path: Path, *materials: dict[str, Any]) -> Path:
     """A file with a box of 1 m for each material, the second behind the first, and a lamp in front."""
-    boxes = trimesh.Scene()
-    for i in range(len(materials)):
-        shift = trimesh.transformations.translation_matrix((0.3 * i, 0, -1.5 * i))
-        boxes.add_geometry(trimesh.creation.box((1, 1, 1)), f"Box {i}", f"Box {i}", transform=shift)
-    path.write_bytes(boxes.export(file_type="glb"))
-    file = read_gltf(path)
-    file.tree["materials"] = list(materials)
-    for i, mesh in enumerate(file.tree["meshes"]):
-        mesh["primitives"][0]["material"] = i
+    file = boxes(path, list(materials), extents=(1, 1, 1), step=(0.3, 0, -1.5))
     file.tree["extensionsUsed"] = ["KHR_lights_punctual"]
     file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 30.0}]}}
     file.tree["nodes"].append({"translation": [0, 2, 4], "extensions": {"KHR_lights_punctual": {"light": 0}}})

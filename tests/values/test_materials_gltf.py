@@ -15,6 +15,7 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
+from tests.values.gltf_json import gltf
 from translucent import optics
 from translucent.materials.color_distance import BLACKEST
 from translucent.materials.gltf import GltfMaterial, materials_of, read_materials
@@ -25,10 +26,6 @@ from translucent.materials.gltf_texture import TextureTransform
 COLOR = (0.1, 0.5, 0.9)
 
 Json = dict[str, Any]
-
-
-def gltf(*materials: Json, **more: Any) -> Json:
-    return {"asset": {"version": "2.0"}, "materials": list(materials), **more}
 
 
 def volume(transmission: float = 1.0, **fields: Any) -> Json:

@@ -1,54 +1,32 @@
-"""The planner, row by row: for each kind of scene the passes, their reasons, and what is refused. No GPU."""
+"""The planner, row by row: for each kind of scene the passes, their reasons, text and JSON. No GPU."""
 
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from typing import Any
 
 import pytest
-import trimesh
 
 import translucent as tl
+from tests.values.plan_scenes import (
+    DIAMOND,
+    EMBER,
+    FIRE,
+    GLASS,
+    MILK,
+    NO_STORAGE,
+    OPEN,
+    TORUS,
+    WINE,
+    body,
+    names,
+    scene,
+    sheet,
+)
 from translucent.plan import COSTS, plan, plan_over_backdrop
-from translucent.plan_borders import ONE_BORDER
-from translucent.render_plan import Capabilities, RenderPlan
-
-_BOX = trimesh.creation.box((1, 1, 1))
-BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")
-OPEN = tl.Mesh(_BOX.vertices, _BOX.faces[1:], name="open box")
-_TORUS = trimesh.creation.torus(1.0, 0.25, major_sections=12, minor_sections=8)
-TORUS = tl.Mesh(_TORUS.vertices, _TORUS.faces, name="torus")
-_APART = _BOX.vertices + (5, 0, 0)
-#: One part looks outwards, the other inwards, and neither is inside the other.
-INSIDE_OUT = tl.Mesh([*_BOX.vertices, *_APART], [*_BOX.faces, *_BOX.faces[:, ::-1] + 8], name="half flipped")
-DOUBLED = tl.Mesh(_BOX.vertices, [*_BOX.faces, *_BOX.faces[:, ::-1]], name="walls")
-CAMERA = tl.Camera.look_at((0, 0, 20), (0, 0, 0))
-
-GLASS, WINE = tl.Medium(absorption=1.0), tl.Medium(absorption=(1, 2, 3))
-FIRE, EMBER = tl.Medium(absorption=1.0, emission=(3, 1, 0)), tl.Medium(absorption=1.0, emission=(1, 1, 0))
-MILK, DIAMOND = tl.Medium(scattering=1.0), tl.Medium(absorption=1.0, ior=2.4)
-NO_STORAGE = Capabilities(shader_storage=False)
-ORDERED = [tl.DepthPeeling(), tl.FragmentLists(), tl.KBuffer()]
-
-
-def body(medium: tl.Medium | None = GLASS, mesh: tl.Mesh = BOX, x: float = 0.0, **options: Any) -> tl.Object:
-    return tl.Object(mesh, medium, trimesh.transformations.translation_matrix((x, 0, 0)), **options)
-
-
-def sheet(medium: tl.Medium = GLASS, mesh: tl.Mesh = BOX, x: float = 0.0) -> tl.Object:
-    return body(medium, mesh, x, sheet_thickness=1e-3)
-
-
-def scene(*objects: tl.Object, **options: Any) -> tl.Scene:
-    return tl.Scene(objects, CAMERA, **options)
-
-
-def names(found: RenderPlan) -> list[str]:
-    return [step.name for step in found.passes]
-
+from translucent.render_plan import Capabilities
 
 # The table of the planner: what a scene has, the passes it gets, how often geometry is drawn, and whether that is exact
 
@@ -136,177 +114,6 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
     assert plan(scene(body()), tl.BackFaceDepth()).exact
     assert not plan(scene(body(mesh=TORUS)), tl.BackFaceDepth()).exact
     assert not plan(scene(body(), body(x=3)), tl.BackFaceDepth()).exact
-
-
-@pytest.mark.parametrize(
-    ("objects", "effects"),
-    [
-        ([body()], []),
-        ([body(MILK)], ["in-scattered light: scattering only removes light"]),
-        ([body(DIAMOND)], ["refraction and reflection beyond the first interval"]),
-        ([body(), body(None)], ["shadows: light reaches opaque objects through everything"]),
-        ([body(MILK), body(DIAMOND), body(None)], ["in-scattered light", "refraction", "shadows"]),
-    ],
-)
-@pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.ThinLayer(), *ORDERED])
-def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effects: list[str], method: Any) -> None:
-    found = plan(scene(*objects), method)
-    assert len(found.unmodelled) == len(effects)
-    for told, effect in zip(found.unmodelled, effects, strict=True):
-        assert told.startswith(effect)
-    # Thickness and transmittance along straight rays are exact all the same.
-    assert found.exact == (method != tl.ThinLayer())
-
-
-# One border
-
-
-@pytest.mark.parametrize("method", [None, tl.SignedDepth(), *ORDERED])
-def test_one_border_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
-    asked = scene(body(DIAMOND), body(None, TORUS))
-    both, front = plan(asked, method), plan(asked, method, borders="front")
-    assert plan(asked, method, borders="both") == both
-    assert (both.borders, front.borders) == ("both", "front")
-    assert [step.name for step in both.passes] == [step.name for step in front.passes]
-    assert front.geometry_passes == both.geometry_passes - 1
-    assert front.cost < both.cost
-    assert front.unmodelled == (*both.unmodelled, ONE_BORDER)
-    assert 'not modelled: borders="front": bends once, where a ray enters; leaves without bending' in str(front)
-    assert front.summary()["borders"] == "front"
-
-
-@pytest.mark.parametrize(
-    ("objects", "method"), [([body()], None), ([sheet(DIAMOND)], None), ([body(DIAMOND)], tl.ThinLayer())]
-)
-def test_one_border_changes_nothing_where_nothing_bends(objects: list[tl.Object], method: Any) -> None:
-    assert plan(scene(*objects), method, borders="front") == plan(scene(*objects), method)
-
-
-def test_one_border_needs_no_order_where_bodies_touch() -> None:
-    touching = scene(body(DIAMOND), body(WINE, x=0.5))
-    assert plan(touching).ordered
-    assert not plan(touching, borders="front").ordered
-
-
-@pytest.mark.parametrize(
-    ("camera", "inside"),
-    [
-        (tl.Camera.look_at((0, 0, 0.2), (0, 0, -1)), True),
-        (tl.Camera.look_at((0, 0, 5), (0, 0, -1)), False),
-        (tl.Camera.look_at((0, 0, -5), (0, 0, -9)), False),
-        (tl.Camera.orthographic((0, 0, 0.2), (0, 0, -1), height=1), True),
-        (tl.Camera.orthographic((0, 0, 5), (0, 0, -1), height=1), False),
-    ],
-)
-def test_one_border_cannot_be_entered_from_inside(camera: tl.Camera, inside: bool) -> None:
-    asked = tl.Scene([body(DIAMOND)], camera)
-    if not inside:
-        assert plan(asked, borders="front").borders == "front"
-        return
-    message = r'^borders="front"; rays start inside .*; use borders="both", or move the camera outside$'
-    with pytest.raises(tl.InputError, match=message):
-        plan(asked, borders="front")
-    assert plan(asked).borders == "both"
-
-
-def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
-    ring = tl.Scene([body(DIAMOND, TORUS)], tl.Camera.look_at((0, 0, 0), (1, 0, 0)))
-    assert plan(ring, borders="front").borders == "front"
-
-
-def test_borders_that_are_not_known_are_refused() -> None:
-    with pytest.raises(tl.InputError, match=r"^borders 'back'; not known; use one of both, front$"):
-        plan(scene(body()), borders="back")  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("method", ["RayMarched", "signed-depth", tl.ThinLayer, 3])
-def test_what_is_no_method_is_refused(method: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"^method .*; not a thickness method; give for example tl.SignedDepth\(\)"):
-        plan(scene(body()), method)
-
-
-@pytest.mark.parametrize("mesh", [OPEN, INSIDE_OUT, DOUBLED])
-def test_a_sheet_needs_no_inside(mesh: tl.Mesh) -> None:
-    assert [limit for limit in plan(scene(sheet(mesh=mesh))).limits if "duplicated" not in limit] == []
-    assert plan(scene(body(mesh=mesh))).limits
-
-
-# Bodies that are not closed
-
-
-@pytest.mark.parametrize(
-    ("method", "passes"),
-    [
-        (None, ["signed_depth", "thin_layer_fallback", "signed_depth_fallback"]),
-        (tl.SignedDepth(), ["signed_depth", "thin_layer_fallback", "signed_depth_fallback"]),
-        (tl.BackFaceDepth(), ["back_face_depth", "thin_layer_fallback", "signed_depth_fallback"]),
-        (tl.DepthPeeling(), ["thin_layer_fallback", "signed_depth_fallback", "depth_peeling"]),
-        (tl.FragmentLists(), ["thin_layer_fallback", "signed_depth_fallback", "fragment_lists"]),
-        (tl.KBuffer(32), ["thin_layer_fallback", "signed_depth_fallback", "k_buffer"]),
-    ],
-)
-def test_an_open_body_is_marked_and_falls_back_to_a_sheet(method: Any, passes: list[str]) -> None:
-    found = plan(scene(body(), body(mesh=OPEN, x=3)), method)
-    assert names(found) == [*passes, "transmittance"]
-    steps = {step.name: step for step in found.passes}
-    assert steps["thin_layer_fallback"].objects == (1,)
-    assert steps["signed_depth_fallback"].objects == (0,)
-    for name, step in steps.items():
-        assert step.target == ("fallback" if name.endswith("fallback") else "accumulated")
-        assert step.objects == (0, 1) or step.target == "fallback" or name == "transmittance"
-    assert steps["thin_layer_fallback"].reason == (
-        "'open box' not closed: pixels that enter and leave unequally often get sheets of 1% of the diagonal, and are "
-        "marked invalid"
-    )
-    assert found.limits[0] == (
-        "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close it, or declare it a sheet "
-        "(sheet_thickness=..., --method thin-layer)"
-    )
-    assert not found.exact
-
-
-def test_sheets_are_drawn_in_the_fallback_too() -> None:
-    found = plan(scene(sheet(), body(mesh=OPEN), body(None)))
-    assert [(step.name, step.objects) for step in found.passes] == [
-        ("opaque", (2,)),
-        ("signed_depth", (1,)),
-        ("thin_layer", (0,)),
-        ("thin_layer_fallback", (1, 0)),
-        ("transmittance", ()),
-    ]
-
-
-def test_an_open_mesh_drawn_as_a_sheet_needs_no_fallback() -> None:
-    found = plan(scene(body(mesh=OPEN)), tl.ThinLayer())
-    assert (names(found), found.exact) == (["thin_layer", "transmittance"], True)
-
-
-# Limits: where a plan is not exact
-
-
-@pytest.mark.parametrize(
-    ("objects", "method", "limits"),
-    [
-        ([body()], tl.SignedDepth(anchored=False), ["distances count from the camera: float32 loses digits"]),
-        ([body(mesh=TORUS)], tl.BackFaceDepth(), ["'torus' not convex: pixels with more than one entry are marked in"]),
-        ([body(), body(x=3)], tl.BackFaceDepth(), ["several bodies: pixels that cross more than one are marked inval"]),
-        ([body(mesh=OPEN)], tl.BackFaceDepth(), ["'open box': 3 open edges", "'open box' not convex: pixels with"]),
-        ([body()], tl.ThinLayer(), ["'box' closed, but drawn as sheets: what is inside is left out"]),
-        ([sheet(), body(), body(mesh=TORUS), body(mesh=OPEN)], tl.ThinLayer(), ["'box', 'torus' closed, but drawn as"]),
-        ([body(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, which count twice or cancel"]),
-        ([sheet(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, which count twice or cancel"]),
-        ([body(mesh=INSIDE_OUT)], None, ["'half flipped': 1 closed parts inside out: their pixels are marked invalid"]),
-        ([body(mesh=INSIDE_OUT)], tl.FragmentLists(), ["'half flipped': 1 closed parts inside out: their pixels are"]),
-        ([body(mesh=INSIDE_OUT)], tl.ThinLayer(), ["'half flipped' closed, but drawn as sheets"]),
-        ([sheet(mesh=INSIDE_OUT), body()], None, []),
-    ],
-)
-def test_a_plan_that_is_not_exact_says_where(objects: list[tl.Object], method: Any, limits: list[str]) -> None:
-    found = plan(scene(*objects), method)
-    assert found.exact is not bool(limits)
-    assert len(found.limits) == len(limits)
-    for told, limit in zip(found.limits, limits, strict=True):
-        assert told.startswith(limit)
 
 
 # Reasons
@@ -398,81 +205,6 @@ def test_the_order_of_three_media_does_not_hide_a_difference() -> None:
     # What scatters or absorbs alike dims alike.
     assert not plan(scene(body(GLASS), body(MILK, x=3), body(DIAMOND, x=6))).spectral
     assert not plan(scene(body(GLASS), body(None), body(GLASS))).spectral
-
-
-# What nothing can render
-
-
-@pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.BackFaceDepth(), tl.ThinLayer(), *ORDERED])
-def test_a_scene_of_opaque_objects_is_refused(method: Any) -> None:
-    message = "rendering 'box', 'torus'; nothing there has a medium; give an object one: medium=tl.Medium(...)"
-    with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
-        plan(scene(body(None), body(None, TORUS)), method)
-
-
-@pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.BackFaceDepth(), tl.ThinLayer()])
-def test_sheets_of_several_media_that_emit_are_refused(method: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"^rendering 'box', 'torus'; emission among several media.*; give all sh"):
-        plan(scene(sheet(FIRE), sheet(WINE, TORUS)), method)
-    # Of one medium, what they emit adds up.
-    assert plan(scene(sheet(FIRE), sheet(FIRE, TORUS))).exact
-
-
-@pytest.mark.parametrize(
-    ("objects", "options", "method", "message"),
-    [
-        (
-            [body(FIRE), body(WINE)],
-            {},
-            tl.SignedDepth(),
-            "SignedDepth; emission among several media: what is in front dims what is behind; use FragmentLists, or "
-            "leave the choice to the planner",
-        ),
-        ([body(FIRE), body(WINE)], {}, tl.ThinLayer(), "ThinLayer; emission among several media"),
-        ([body(FIRE), body(EMBER)], {}, tl.BackFaceDepth(), "BackFaceDepth; emission among several media"),
-        (
-            [body(), body(mesh=TORUS, x=0.5)],
-            {"overlap": "union"},
-            tl.SignedDepth(),
-            "SignedDepth; overlap=\"union\": 'box' and 'torus' may overlap, and a sum would count both; use Frag",
-        ),
-        (
-            [body(mesh=TORUS)],
-            {"overlap": "priority"},
-            tl.SignedDepth(),
-            "SignedDepth; overlap=\"priority\": 'torus' may",
-        ),
-        (
-            [body(), body(WINE)],
-            {},
-            tl.BackFaceDepth(),
-            "BackFaceDepth; bodies with different media; use SignedDepth, which tells them apart",
-        ),
-        (
-            [body(), sheet(mesh=TORUS)],
-            {},
-            tl.BackFaceDepth(),
-            "BackFaceDepth; 'torus' declared a sheet; use SignedDepth or ThinLayer",
-        ),
-        *(
-            ([sheet()], {}, method, f"{type(method).__name__}; all bodies are declared sheets, which have no inside; u")
-            for method in ORDERED
-        ),
-    ],
-)
-def test_a_method_that_cannot_render_the_scene_is_refused(
-    objects: list[tl.Object], options: dict[str, Any], method: Any, message: str
-) -> None:
-    with pytest.raises(tl.InputError, match=f"^{re.escape(message)}"):
-        plan(scene(*objects, **options), method)
-
-
-@pytest.mark.parametrize("overlap", ["union", "priority"])
-def test_methods_that_count_no_place_twice_know_no_overlap_policy(overlap: Any) -> None:
-    # Sheets have no inside; and back-face depth marks pixels that enter twice.
-    found = plan(scene(body(), body(mesh=TORUS, x=0.5), overlap=overlap), tl.BackFaceDepth())
-    assert any("cross more than one are marked invalid" in limit for limit in found.limits)
-    assert names(plan(scene(body(), body(x=0.5), overlap=overlap), tl.ThinLayer())) == ["thin_layer", "transmittance"]
 
 
 # A picture drawn elsewhere, in place of opaque objects

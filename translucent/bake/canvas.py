@@ -16,6 +16,7 @@ from translucent.bake.strips import COUNTS, Strip
 from translucent.errors import InputError
 from translucent.frame import write_atomically
 from translucent.mesh import Mesh
+from translucent.version import VERSION
 
 #: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.
 EVERY, REST = 5.0, 20.0
@@ -130,9 +131,7 @@ class Checkpoint:
 
 def bake_key(settings: BakeSettings, *meshes: Mesh | None) -> str:
     """A hash of all that decides the result of a bake."""
-    from importlib.metadata import version
-
-    digest = hashlib.sha256(f"{version('translucent-shading')} {sorted(settings.summary().items())}".encode())
+    digest = hashlib.sha256(f"{VERSION} {sorted(settings.summary().items())}".encode())
     for mesh in meshes:
         for array in () if mesh is None else (mesh.vertices, mesh.faces, mesh.uv):
             digest.update(b"-" if array is None else array.tobytes())

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.bake.gltf_maps import wrapping
 from translucent.camera import Camera
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.renderer import CpuRenderer
@@ -30,8 +31,6 @@ from translucent.plan import plan
 from translucent.showcase import showcase
 
 Array = npt.NDArray[np.float64]
-
-_REPEAT, _CLAMP = 10497, 33071
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,10 +134,8 @@ def check_map(
 
 def look_up(mesh: Mesh, values: npt.ArrayLike, uv: Array) -> Array:
     """(n,): a map at uv (n, 2), v upwards, as textures are read: between texels linearly."""
-    assert mesh.uv is not None
-    wrap = _CLAMP if mesh.uv.min() >= 0 and mesh.uv.max() <= 1 else _REPEAT
     coordinates = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
-    return sample(np.asarray(values, dtype=np.float64), coordinates, {"wrapS": wrap, "wrapT": wrap})
+    return sample(np.asarray(values, dtype=np.float64), coordinates, wrapping(mesh))
 
 
 def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> Array:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from translucent.bake.check import MapCheck, check_map
+from translucent.bake.jobs import stays_gltf
 from translucent.bake.reading import load_thickness_map
 from translucent.errors import InputError
 from translucent.materials.gltf import GltfMaterial, materials_of
@@ -44,8 +45,7 @@ def check_output(job: Job, record: Record, results: Results) -> dict[str, MapChe
         (result,) = results.values()
         return {result.mesh.name: check_map(result.mesh, load_thickness_map(path), medium)}
     # A bake from another format into a .glb is in metres; a glTF file keeps its unit.
-    keeps_unit = Path(job["model"]).suffix.lower() in (".glb", ".gltf")
-    metres = metres_per_unit(job.get("unit", "m")) if keeps_unit else 1.0
+    metres = metres_per_unit(job.get("unit", "m")) if stays_gltf(job) else 1.0
     file = read_gltf(path)
     materials = materials_of(file)
     found = {}

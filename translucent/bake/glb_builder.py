@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.gltf.accessors import COMPONENTS
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.materials.gltf_pack import gather
 from translucent.materials.gltf_scene import primitives
@@ -24,7 +25,7 @@ _CHUNK = struct.Struct("<II")
 _BINARY_CHUNK = 0x004E4942
 _ALIGNMENT = 4  # bytes: of views, and of each element of a vertex attribute
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-_COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+_CODES = {dtype: code for code, dtype in COMPONENTS.items()}
 
 
 class GlbBuilder:
@@ -101,7 +102,7 @@ class GlbBuilder:
             fields["byteStride"] = raw.shape[1]
         entry: Json = {
             "bufferView": self.add_view(raw.tobytes(), **fields),
-            "componentType": _COMPONENTS[values.dtype.str[1:]],
+            "componentType": _CODES[f"<{values.dtype.str[1:]}"],
             "count": len(table),
             "type": _KINDS[table.shape[1]],
         }

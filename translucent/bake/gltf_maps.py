@@ -24,7 +24,7 @@ import numpy.typing as npt
 from translucent.bake.encoding import Encoding
 from translucent.bake.glb_builder import GlbBuilder
 from translucent.bake.gltf_targets import Place, Target
-from translucent.bake.record import Record, describe, unit_of, write_record
+from translucent.bake.record import Record, describe, shared, unit_of, write_record
 from translucent.bake.thickness_map import ThicknessMap
 from translucent.errors import InputError
 from translucent.materials.color_distance import color_at
@@ -32,6 +32,7 @@ from translucent.materials.gltf import EXCLUDED, TRANSMISSION, VOLUME
 from translucent.materials.gltf_file import GltfFile, Json, write_gltf
 from translucent.materials.gltf_texture import TEXTURE_TRANSFORM
 from translucent.medium import Medium
+from translucent.mesh import Mesh
 
 #: Largest level of an 8-bit channel.
 LEVELS = 255
@@ -90,12 +91,7 @@ def write_maps(
     if not any("material" in one for one in told):
         raise InputError(f"output {str(path)!r}", "the thickness is 0 everywhere", "give a model with an inside")
     write_gltf(builder.file(), path)
-    return write_record(path, {**(about or {}), **_common(told), "maps": told})
-
-
-def _common(told: list[Record]) -> Record:
-    """What all maps share, for the head of the record."""
-    return {key: told[0][key] for key in ("kind", "mode", "definition", "unit", "settings")}
+    return write_record(path, {**(about or {}), **shared(told), "maps": told})
 
 
 def _give(
@@ -155,13 +151,19 @@ def _add_texture(builder: GlbBuilder, result: ThicknessMap, encoding: Encoding) 
     view = builder.add_view(_png(encoding.encode(result.values)))
     name = f"{result.mesh.name} thickness"
     image = builder.add("images", {"name": name, "bufferView": view, "mimeType": "image/png"})
-    uv = result.mesh.uv
-    # Clamped, a map does not mix its left and right sides; UVs beyond 0..1 mean that it repeats.
-    wrap = _CLAMP if uv is not None and uv.min() >= 0 and uv.max() <= 1 else _REPEAT
-    wanted = {"magFilter": _LINEAR, "minFilter": _MIPMAPS, "wrapS": wrap, "wrapT": wrap}
+    wanted = {"magFilter": _LINEAR, "minFilter": _MIPMAPS, **wrapping(result.mesh)}
     samplers = builder.tree.setdefault("samplers", [])
     sampler = samplers.index(wanted) if wanted in samplers else builder.add("samplers", wanted)
     return builder.add("textures", {"name": name, "sampler": sampler, "source": image})
+
+
+def wrapping(mesh: Mesh) -> Json:
+    """How a sampler reads a map of this mesh.
+
+    Clamped, it does not mix the map's left and right sides; UVs beyond 0..1 mean that the map repeats.
+    """
+    wrap = _CLAMP if mesh.uv is not None and mesh.uv.min() >= 0 and mesh.uv.max() <= 1 else _REPEAT
+    return {"wrapS": wrap, "wrapT": wrap}
 
 
 def _png(levels: npt.NDArray[Any]) -> bytes:

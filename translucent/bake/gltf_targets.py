@@ -1,8 +1,8 @@
 """Which primitives of a glTF file get thickness, and their meshes as a baker takes them.
 
 Those whose material lets light in, but for open meshes that it makes thin walls: they have no inside. Where no material
-lets light in, all triangles, whose materials then will. Each is baked in the
-mesh's own space, as glTF states thickness, so nodes that share a mesh share the map, whatever their scale.
+lets light in, all triangles, whose materials then will. Each is baked in the mesh's own space, as glTF states
+thickness, so nodes that share a mesh share the map, whatever their scale.
 
 The UVs are those that the material reads its thickness texture at (KHR_texture_transform included, as long as it keeps
 them in 0..1), else TEXCOORD_0, else new ones as the next set.
@@ -20,7 +20,7 @@ import numpy.typing as npt
 from translucent.bake.glb_builder import INDICES, GlbBuilder
 from translucent.bake.unwrap import unwrap
 from translucent.errors import InputError
-from translucent.gltf.accessors import Accessors
+from translucent.gltf.accessors import COMPONENTS, Accessors
 from translucent.gltf.geometry import primitive_mesh
 from translucent.materials.color_distance import extinction_at
 from translucent.materials.gltf import GltfMaterial, materials_of
@@ -213,7 +213,7 @@ def _repeated(builder: GlbBuilder, accessors: Accessors, index: int, kept: npt.N
     """An accessor with the elements `kept` of another, of the same type."""
     entry = accessors.file.item("accessors", index)
     values = accessors.vectors(index, entry.get("type", ""))[kept]
-    dtype = np.dtype({5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}[entry["componentType"]])
+    dtype = np.dtype(COMPONENTS[entry["componentType"]])
     normalized = entry.get("normalized") is True
     if normalized:
         values = np.rint(values * np.iinfo(dtype).max)

@@ -13,7 +13,7 @@ import numpy as np
 from translucent.bake.encoding import Encoding
 from translucent.bake.glb_builder import GlbBuilder
 from translucent.bake.gltf_targets import Place
-from translucent.bake.record import Record, describe, unit_of, write_record
+from translucent.bake.record import Record, describe, shared, unit_of, write_record
 from translucent.bake.thickness_map import VertexThickness
 from translucent.gltf.accessors import Accessors
 from translucent.materials.gltf_file import GltfFile, write_gltf
@@ -64,5 +64,4 @@ def write_vertices(
             attributes[ATTRIBUTE] = builder.add_accessor((result.values[nearest] / per_unit).astype(np.float32))
         told.append({"place": list(place), "attribute": ATTRIBUTE, **describe(result, Encoding(per_unit, unit=unit))})
     write_gltf(builder.file(), path)
-    head = {key: told[0][key] for key in ("kind", "mode", "definition", "unit", "settings")}
-    return write_record(path, {**(about or {}), **head, "primitives": told})
+    return write_record(path, {**(about or {}), **shared(told), "primitives": told})

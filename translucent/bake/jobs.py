@@ -90,7 +90,7 @@ def _settings(job: Job, diagonal: float) -> Job:
     if job.get("medium") is not None:
         given["medium"] = Medium(absorption=job["medium"])
     # A glTF material may bring the medium that this mode needs.
-    late = given.get("mode") == "transmittance" and _is_gltf(job) and "medium" not in given
+    late = given.get("mode") == "transmittance" and stays_gltf(job) and "medium" not in given
     BakeSettings(**({**given, "medium": Medium(absorption=1.0)} if late else given))
     return given
 
@@ -105,7 +105,7 @@ def _share(key: str, text: str) -> float:
     return share
 
 
-def _is_gltf(job: Job) -> bool:
+def stays_gltf(job: Job) -> bool:
     """Whether the model stays a glTF file with all that it has."""
     return Path(job["output"]).suffix.lower() == ".glb" and Path(job["model"]).suffix.lower() in SUFFIXES
 
@@ -186,7 +186,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     check_job(job)
     output = Path(job["output"])
     about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
-    if _is_gltf(job):
+    if stays_gltf(job):
         from translucent.bake.gltf_bake import bake_gltf
 
         return bake_gltf(job, about, progress)

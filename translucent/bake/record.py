@@ -6,13 +6,13 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from translucent.frame import write_atomically
+from translucent.frame import write_text_atomically
+from translucent.version import VERSION
 
 if TYPE_CHECKING:
     from translucent.bake.encoding import Encoding
@@ -75,6 +75,11 @@ def describe(result: ThicknessMap | VertexThickness, encoding: Encoding) -> Reco
     return known
 
 
+def shared(parts: list[Record]) -> Record:
+    """What all parts of one bake have in common, for the head of their record."""
+    return {key: parts[0][key] for key in ("kind", "mode", "definition", "unit", "settings")}
+
+
 def _range(values: Any) -> Record | None:
     if not values.size:
         return None
@@ -86,7 +91,7 @@ def provenance() -> dict[str, str]:
     from translucent.cpu.embree import embree_versions
 
     return {
-        "translucent": version("translucent-shading"),
+        "translucent": VERSION,
         "numpy": np.__version__,
         **embree_versions(),
         "python": platform.python_version(),
@@ -101,12 +106,8 @@ def write_record(path: Path, record: Record) -> Record:
     """
     full = {"file": path.name, "sha256": file_hash(path), **record, "provenance": provenance()}
     text = json.dumps(full, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    write_atomically(sidecar_of(path), lambda temporary: _fill(temporary, text))
+    write_text_atomically(sidecar_of(path), text)
     return full
-
-
-def _fill(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def file_hash(path: Path) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
 from contextlib import closing
 
 import numpy as np
@@ -16,7 +15,7 @@ from translucent.bake.normals import corner_angles
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import BakeReport, VertexThickness
-from translucent.bake.work import in_order
+from translucent.bake.work import Progress, in_order
 from translucent.errors import TranslucentWarning
 from translucent.grouping import position_ids
 from translucent.medium import Medium
@@ -46,7 +45,7 @@ def bake_vertex_thickness(
     medium: Medium | None = None,
     tolerance: float | None = None,
     threads: int | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> VertexThickness:
     """Bake how thick a mesh is under each vertex.
 
@@ -96,7 +95,7 @@ def bake_vertex_thickness(
 
 
 def _measure_corners(
-    surface: Surface, settings: BakeSettings, threads: int, progress: Callable[[int, int, int], None] | None
+    surface: Surface, settings: BakeSettings, threads: int, progress: Progress | None
 ) -> list[Measured]:
     measure, count = Measure.of(surface, settings), 3 * len(surface.faces)
     parts: list[Measured] = []

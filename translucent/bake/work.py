@@ -16,7 +16,7 @@ from translucent.bake.strips import Strips
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-#: Told how many texels are done, of how many, and how many rays have been traced.
+#: Told how many texels or corners are done, of how many, and how many rays have been traced.
 Progress = Callable[[int, int, int], None]
 
 #: Pieces of work that wait for a thread, for each thread; their results wait for their turn.

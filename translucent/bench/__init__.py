@@ -1,4 +1,4 @@
-"""Speed against error, measured in one run: `measure_all` makes a `Report`, `write_outputs` its page and tables."""
+"""Speed against error, measured in one run: `measure_all` makes a `Report`, which ``output.write_outputs`` writes."""
 
 from __future__ import annotations
 

@@ -75,8 +75,9 @@ def _shown(make: Callable[[], Mesh], size: Size) -> Scene:
     return showcase(make(), size=size)
 
 
-def _glass(mesh: Mesh, surface: Surface, size: Size) -> Scene:
+def _glass(make: Callable[[], Mesh], surface: Surface, size: Size) -> Scene:
     """A body of green glass in a studio."""
+    mesh = make()
     scene = showcase(mesh, size=size, environment=Environment.studio())
     glass = Medium.from_color((0.8, 0.95, 0.9), 0.3 * mesh.diagonal, ior=1.5)
     return dataclasses.replace(scene, objects=[Object(mesh, glass, surface=surface)])
@@ -87,6 +88,10 @@ def _wall(size: Size) -> Scene:
     glass = Medium.from_color((0.6, 0.9, 0.75), distance=2e-3, ior=1.5)
     wall = Object(_toolkit("leaf"), glass, sheet_thickness=2e-3)
     return Scene([wall], framing([wall], size), environment=Environment.studio())
+
+
+def _ball() -> Mesh:
+    return Sphere().tessellate(128)
 
 
 def _toolkit(name: str) -> Mesh:
@@ -154,6 +159,9 @@ def _density(size: Size) -> Scene:
     return Scene([cloud], framing([cloud], size), environment=DUSK)
 
 
+#: Cases of borders, which take long: all but one are left out by ``--quick``.
+_BORDERED = partial(Case, effect="borders", quick=False)
+
 CASES: tuple[Case, ...] = (
     Case("sphere", "Sphere", "convex: two surfaces on every ray", partial(_shown, lambda: Sphere().tessellate(316))),
     Case("torus", "Torus", "concave: up to four", partial(_shown, lambda: lying_torus(316)), quick=False),
@@ -206,7 +214,7 @@ CASES: tuple[Case, ...] = (
         "deep scattering",
         "Milky sphere",
         "the same through a depth that hardly any light crosses",
-        lambda size: _scattering(Sphere().tessellate(128), 12.0, size),
+        lambda size: _scattering(_ball(), 12.0, size),
         "scattering",
         quick=False,
         brief=True,
@@ -214,48 +222,40 @@ CASES: tuple[Case, ...] = (
         compared=80,
         tolerance=3e-4,
     ),
-    Case(
+    _BORDERED(
         "glass",
         "Glass ball",
         "borders that mirror, and bend rays twice",
-        lambda size: _glass(Sphere().tessellate(128), Surface(), size),
-        "borders",
+        partial(_glass, _ball, Surface()),
+        quick=True,
         compared=160,
     ),
-    Case(
+    _BORDERED(
         "glass knot",
         "Glass knot",
         "the same where rays leave and enter again",
-        lambda size: _glass(_toolkit("knot"), Surface(), size),
-        "borders",
-        quick=False,
+        partial(_glass, partial(_toolkit, "knot"), Surface()),
         compared=96,
     ),
-    Case(
+    _BORDERED(
         "frosted",
         "Frosted glass ball",
         "rough borders, that blur what they mirror and what is behind",
-        lambda size: _glass(Sphere().tessellate(128), Surface(roughness=0.4), size),
-        "borders",
-        quick=False,
+        partial(_glass, _ball, Surface(roughness=0.4)),
         compared=40,
     ),
-    Case(
+    _BORDERED(
         "dispersion",
         "Ball of heavy flint",
         "each channel bends on its own",
-        lambda size: _glass(Sphere().tessellate(128), Surface(dispersion=1.0), size),
-        "borders",
-        quick=False,
+        partial(_glass, _ball, Surface(dispersion=1.0)),
         compared=128,
     ),
-    Case(
+    _BORDERED(
         "thin wall",
         "Sheet of glass",
         "a thin wall: both of its faces mirror, and rays that pass go straight on",
         _wall,
-        "borders",
-        quick=False,
         compared=120,
     ),
     Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),

@@ -85,10 +85,29 @@ class Studio:
         self._passes.clear()
 
 
+class _OnGpu:
+    """A frame of OpenGL, into targets that others draw into, too."""
+
+    def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
+        self._studio = studio
+        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
+
+    def read(self) -> Frame:
+        """What the last drawing left."""
+        return self._studio.renderer.gpu.read(self._job)
+
+    @property
+    def bytes_per_pixel(self) -> int | None:
+        """Of all targets and buffers that have been made in this size."""
+        return self._job.targets.bytes_per_pixel()
+
+    def release(self) -> None:
+        """Free the uniform buffers."""
+        self._job.release()
+
+
 class Floor:
     """The geometry into a depth buffer, and nothing else: what any rasterized method costs at least."""
-
-    bytes_per_pixel = 4
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets) -> None:
         plan = RenderPlan(SignedDepth(), ())
@@ -107,21 +126,16 @@ class Floor:
 
         return self._studio.timed(geometry, _nothing)
 
-    def read(self) -> Frame:
-        """A depth buffer is no frame."""
-        raise NotImplementedError
-
     def release(self) -> None:
         """Free the uniform buffers."""
         self._job.release()
 
 
-class Planned:
+class Planned(_OnGpu):
     """A plan of the public API, pass by pass as the renderer runs it."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
-        self._studio = studio
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
+        super().__init__(studio, scene, targets, plan)
         self._geometry = [spec for spec in plan.passes if spec.geometry_passes]
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
 
@@ -134,19 +148,6 @@ class Planned:
 
         return self._studio.timed(geometry, lambda: self._run(self._shading, None))
 
-    def read(self) -> Frame:
-        """What the last drawing left."""
-        return self._studio.renderer.gpu.read(self._job)
-
-    @property
-    def bytes_per_pixel(self) -> int | None:
-        """Of all targets and buffers that have been made in this size."""
-        return self._job.targets.bytes_per_pixel()
-
-    def release(self) -> None:
-        """Free the uniform buffers."""
-        self._job.release()
-
     def _run(self, specs: list[PassSpec], prefix: str | None) -> None:
         for spec in specs:
             step = self._studio.step(spec.name)
@@ -157,14 +158,12 @@ class Planned:
                     step.run(self._job, spec)
 
 
-class Short:
+class Short(_OnGpu):
     """A shortcut in place of the passes over geometry, and the shading of signed depth."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan, shortcut: Shortcut) -> None:
-        self._studio = studio
         shading = tuple(spec for spec in plan.passes if spec.name == "transmittance")
-        plan = RenderPlan(SignedDepth(), shading, plan.spectral)
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
+        super().__init__(studio, scene, targets, RenderPlan(SignedDepth(), shading, plan.spectral))
         self._shortcut = shortcut
 
     def draw(self) -> Sample:
@@ -183,19 +182,6 @@ class Short:
                 self._studio.step(spec.name).run(job, spec)
 
         return self._studio.timed(geometry, shading)
-
-    def read(self) -> Frame:
-        """What the last drawing left."""
-        return self._studio.renderer.gpu.read(self._job)
-
-    @property
-    def bytes_per_pixel(self) -> int | None:
-        """Of all targets and buffers that have been made in this size."""
-        return self._job.targets.bytes_per_pixel()
-
-    def release(self) -> None:
-        """Free the uniform buffers."""
-        self._job.release()
 
 
 class OnProcessor:

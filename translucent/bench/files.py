@@ -11,7 +11,7 @@ from typing import Any, get_args, get_type_hints
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
 from translucent.errors import InputError
-from translucent.frame import write_atomically
+from translucent.frame import write_text_atomically
 
 #: Fields of a row that are dataclasses, one column for each of their fields.
 _GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmittance", "radiance")
@@ -19,7 +19,7 @@ _GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmi
 
 def write_report(report: Report, path: Path) -> None:
     """Write ``report.json``: complete, or not at all."""
-    _write_text(path, report.to_json())
+    write_text_atomically(path, report.to_json())
 
 
 def read_report(path: Path) -> Report:
@@ -46,7 +46,7 @@ def write_csv(report: Report, path: Path) -> None:
     writer = csv.DictWriter(stream, _columns(), restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(lines)
-    _write_text(path, stream.getvalue())
+    write_text_atomically(path, stream.getvalue())
 
 
 def _columns() -> list[str]:
@@ -75,10 +75,3 @@ def _flat(case: CaseRecord, row: Row) -> dict[str, Any]:
         elif value is not None:
             line[name] = value
     return line
-
-
-def _write_text(path: Path, text: str) -> None:
-    def write(part: Path) -> None:
-        part.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -65,15 +64,12 @@ class Checks:
         else:
             self._note(f"{what} gave {type(made).__name__}, no error", held=False)
 
-    def picture(
-        self, what: str, scene: Scene, size: Size = SIZE, method: Method | None = None, *, all_valid: bool = True
-    ) -> Frame:
+    def picture(self, what: str, scene: Scene) -> Frame:
         """Render, and note the error in thickness: its 99.9th percentile, as a share of the diagonal."""
-        frame, truth = self.render(scene, size, method), reference.render(scene, size, method)
-        inside = interior(reference.hit_counts(scene, size))
+        frame, truth = self.render(scene, SIZE), reference.render(scene, SIZE)
+        inside = interior(reference.hit_counts(scene, SIZE))
         self.error(what, compare(frame, truth, mask=inside).p999 / scene.diagonal)
-        if all_valid:
-            self.holds(f"{what}: no pixel marked", frame.valid[inside].all())
+        self.holds(f"{what}: no pixel marked", frame.valid[inside].all())
         return frame
 
     def compared(self, frame: Frame, truth: Frame, scene: Scene, quantity: Quantity = "thickness") -> Errors:
@@ -128,11 +124,10 @@ class Hard:
         return HardCase(self.id, self.title, self.promise, result, passed, worst, limit, unit)
 
 
-def measure_hard_cases(renderer: Renderer) -> Iterator[tuple[HardCase, float]]:
-    """All of them, in their order, each with the seconds that it took."""
+def measure_hard_cases(renderer: Renderer) -> Iterator[HardCase]:
+    """All of them, in their order."""
     from translucent.bench import hard_geometry, hard_values, hard_views
 
     cases = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
     for case in sorted(cases, key=lambda case: case.id):
-        begin = time.perf_counter()
-        yield case.measure(renderer), time.perf_counter() - begin
+        yield case.measure(renderer)

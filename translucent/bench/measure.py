@@ -11,11 +11,12 @@ from typing import Any, get_args
 from translucent.bench.cases import Case
 from translucent.bench.contenders import Contender
 from translucent.bench.drawing import Drawing, Floor, Size, Studio
-from translucent.bench.fitting import drawing, fitted, plan_of, seen_by
+from translucent.bench.fitting import fitted
 from translucent.bench.frontier import mark_frontier
 from translucent.bench.promise import promise_of
 from translucent.bench.record import CaseRecord
 from translucent.bench.row import Quantity, Row
+from translucent.bench.staging import drawing, plan_of, seen_by
 from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.bench.truth import Truth
 from translucent.errors import InputError, TranslucentError, TranslucentWarning

@@ -151,7 +151,7 @@ def _measured(
         report = dataclasses.replace(report, scaling=series)
         studio.renderer.gpu.context.drain()
         yield report
-    for found, _ in measure_hard_cases(studio.renderer):
+    for found in measure_hard_cases(studio.renderer):
         done += 1
         progress(f"hard case {found.id}", done, parts)
         report = dataclasses.replace(report, hard_cases=(*report.hard_cases, found))

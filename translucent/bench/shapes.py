@@ -63,11 +63,11 @@ def nested_shells(shells: int = 6, segments: int = 96) -> Mesh:
     return joined([(p.vertices, p.faces if i % 2 == 0 else p.faces[:, ::-1]) for i, p in enumerate(parts)], "shells")
 
 
-def plates(layers: int, gap: float = 0.5) -> Mesh:
+def plates(layers: int) -> Mesh:
     """Square plates one behind the other, along z from 0 to -1: as many surfaces as asked for, an even number."""
     count = layers // 2
     pitch = 1.0 / count
-    plate = Box((-0.5, -0.5, -pitch * (1 - gap)), (0.5, 0.5, 0.0)).tessellate()
+    plate = Box((-0.5, -0.5, -0.5 * pitch), (0.5, 0.5, 0.0)).tessellate()
     return joined([(plate.vertices - (0, 0, i * pitch), plate.faces) for i in range(count)], "plates")
 
 

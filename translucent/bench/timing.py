@@ -95,7 +95,8 @@ def interleaved(
 
     What raises is left out of the other rounds, and `failed` hears of it.
     """
-    warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, seconds / 8, failed, len(drawings))}
+    warming = seconds / 8 / max(len(drawings), 1)
+    warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, warming, failed)}
     for _ in range(5):
         floor()
     found = {name: Samples() for name in warmed}
@@ -116,14 +117,12 @@ def interleaved(
     return found
 
 
-def _warm_up(
-    name: str, draw: Callable[[], Sample], seconds: float, failed: Callable[[str, Exception], None], count: int
-) -> bool:
-    """Draw for its share of the time, at least once: shaders compile, buffers grow, caches fill."""
+def _warm_up(name: str, draw: Callable[[], Sample], seconds: float, failed: Callable[[str, Exception], None]) -> bool:
+    """Draw for so long, at least once: shaders compile, buffers grow, caches fill."""
     begin = time.perf_counter()
     try:
         draw()
-        while time.perf_counter() - begin < seconds / count:
+        while time.perf_counter() - begin < seconds:
             draw()
     except Exception as error:  # noqa: BLE001 - as above
         failed(name, error)

@@ -61,14 +61,14 @@ def bake(
     if out_dir is not None:
         if check:
             raise InputError("--check", "it looks at one model", "give one MODEL and -o")
-        return _bake_many([(m, out_dir / f"{Path(m).stem}.{suffix}") for m in models], given, jobs, dask, as_json)
+        _bake_many([(m, out_dir / f"{Path(m).stem}.{suffix}") for m in models], given, jobs, dask, as_json)
+        return
     if len(models) > 1 or output is None:
         raise InputError(f"-o {output}", f"{len(models)} models", "give --out-dir instead, or one model")
     for option, value in (("--jobs", jobs), ("--dask", dask)):
         if value is not None:
             raise InputError(f"{option} {value}", "it is for many models", "add --out-dir, or leave it out")
     _bake_one(read_job(models[0], output, given), check, as_json)
-    return None
 
 
 def _bake_one(job: Job, check: bool, as_json: bool) -> None:

@@ -32,8 +32,8 @@ _SETTINGS = (
 )
 
 
-def _length(*names: str, help: str) -> Any:
-    return click.option(*names, metavar="D|%", help=f"{help} As 2cm, or as a share of the diagonal: 10%.")
+def _length(name: str, help: str) -> Any:
+    return click.option(name, metavar="D|%", help=f"{help} As 2cm, or as a share of the diagonal: 10%.")
 
 
 _OPTIONS = [
@@ -55,16 +55,16 @@ _OPTIONS = [
         show_default=True,
         help="Where a ray leaves and enters again: up to the first exit, or all that is inside.",
     ),
-    _length("--max-distance", help="No ray goes farther. Default: no limit."),
+    _length("--max-distance", "No ray goes farther. Default: no limit."),
     click.option("--ignore-back-faces", is_flag=True, help="Rays end only at faces that they leave through."),
     click.option("--supersample", default=1, show_default=True, metavar="N", help="N x N points per texel."),
     click.option("--padding", default=16, show_default=True, metavar="N", help="Texels around each chart of the UVs."),
     click.option("--seed", default=0, show_default=True, metavar="N", help="Of the directions."),
-    _length("--tolerance", help="More rays where the standard error is above it."),
+    _length("--tolerance", "More rays where the standard error is above it."),
     click.option("--tile", type=int, metavar="N", help="Bake this UDIM tile, such as 1001. Default: UVs repeat."),
     click.option("--high", metavar="MESH", help="Mesh with the details, for a map on a coarser MODEL."),
     click.option("--cage", metavar="MESH", help="Of --high: MODEL, moved outwards, where the search begins."),
-    _length("--high-distance", help="Of --high: how far its surface may be from that of MODEL."),
+    _length("--high-distance", "Of --high: how far its surface may be from that of MODEL."),
     unit_option,
     medium_options,
     click.option("--unwrap", is_flag=True, help="Make new UVs, even if MODEL has some."),

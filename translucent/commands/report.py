@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shlex
 import sys
@@ -134,8 +135,6 @@ def _command(given: dict[str, Any]) -> str:
 
 def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
     """What happened, in numbers that JSON can hold; ``report.json`` has all of it."""
-    import dataclasses
-
     return {
         "files": [str(path) for path in files],
         "complete": made.complete,

@@ -17,7 +17,8 @@ from translucent.mesh import MAX_INDEX
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+#: Types of NumPy by componentType.
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
@@ -85,9 +86,9 @@ class Accessors:
 
     def _dtype(self, where: str, entry: Json) -> np.dtype[Any]:
         code = entry.get("componentType")
-        if not isinstance(code, int) or code not in _COMPONENTS:
+        if not isinstance(code, int) or code not in COMPONENTS:
             raise refused(self.file, f"{where}: componentType {code!r} is none of glTF 2.0")
-        return np.dtype(_COMPONENTS[code])
+        return np.dtype(COMPONENTS[code])
 
     def _block(self, where: str, entry: Json, dtype: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
         """(count, width): what a buffer view holds from the entry's offset on."""

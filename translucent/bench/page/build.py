@@ -17,7 +17,7 @@ from translucent.bench.page.scaling import AXES, axis_groups, scaling_svg
 from translucent.bench.page.swatch import swatch
 from translucent.bench.page.theme import css_variables
 from translucent.bench.record import CaseRecord, Report
-from translucent.frame import write_atomically
+from translucent.frame import write_text_atomically
 
 #: Rows of a legend that stands beside its plot; longer ones stand below.
 MOST_BESIDE = 22
@@ -25,12 +25,7 @@ MOST_BESIDE = 22
 
 def write_page(report: Report, path: Path) -> None:
     """Write ``report.html``: complete, or not at all."""
-    text = build_page(report)
-
-    def write(part: Path) -> None:
-        part.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)
+    write_text_atomically(path, build_page(report))
 
 
 def build_page(report: Report) -> str:

@@ -25,7 +25,6 @@ _LONGEST = 40
 
 _FONT = "system-ui, 'Segoe UI', 'DejaVu Sans', 'Liberation Sans', sans-serif"
 
-
 #: Labels stay legible on lines.
 _HALO = "text { paint-order: stroke; stroke: var(--paper); stroke-width: 3px; stroke-linejoin: round; }"
 

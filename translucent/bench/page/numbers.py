@@ -65,7 +65,7 @@ def rounded_text(value: float) -> str:
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def power_text(value: float, _position: int = 0) -> str:
+def power_text(value: float) -> str:
     """A tick of a logarithmic axis: ``10⁻⁶``, and 0.1 to 1000 written out."""
     exponent = round(math.log10(value))
     return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(_SUPERSCRIPTS)

@@ -9,7 +9,7 @@ from translucent.bench.page.figure import require_packages, standalone
 from translucent.bench.page.pareto import pareto_svg, plotted
 from translucent.bench.record import CaseRecord, Report
 from translucent.errors import InputError
-from translucent.frame import write_atomically
+from translucent.frame import write_text_atomically
 
 #: Left out: the backend without OpenGL, which is off the scale, and methods for what this scene does not have.
 _LEFT_OUT = {"cpu backend", "RayMarched on the CPU", "RayMarched"}
@@ -23,12 +23,7 @@ def write_overview(report: Report, path: Path) -> None:
     InputError
         If the report has no scene with numbers.
     """
-    text = overview_svg(report)
-
-    def write(part: Path) -> None:
-        part.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)
+    write_text_atomically(path, overview_svg(report))
 
 
 def overview_svg(report: Report) -> str:

@@ -34,9 +34,9 @@ def axis_groups(scaling: Sequence[Series]) -> dict[str, list[Series]]:
 
 
 @drawing
-def scaling_svg(axis: str, group: Sequence[Series], size: tuple[float, float] = (620, 400)) -> str:
+def scaling_svg(axis: str, group: Sequence[Series]) -> str:
     """Milliseconds of each method along one axis, both logarithmic."""
-    figure, axes = new_figure(*size)
+    figure, axes = new_figure(620, 400)
     ends: list[tuple[str, str, float, float]] = []
     for series in group:
         x, y = np.array([(p.x, p.wall.median) for p in series.points if p.wall is not None]).T

@@ -1,0 +1,100 @@
+"""``translucent explain``: mesh, objects and plan, in words and as JSON, without OpenGL."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from tests.apps.models import write_scene
+from tests.boxes import GLASS
+from tests.command_line import Run, one_error_line, strict_json
+
+
+def test_an_unreadable_model_is_refused(run: Run, tmp_path: Path) -> None:
+    result = run("explain", tmp_path)
+    assert "no such file" in one_error_line(result)
+
+
+def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_path: Path) -> None:
+    model = write_scene(tmp_path / "rock.glb", {})
+    result = run("render", model, "-o", tmp_path / "out.png")
+    line = one_error_line(result)
+    assert "its 1 object is opaque: no material has KHR_materials_transmission; add --preset NAME, or --color C" in line
+    assert not (tmp_path / "out.png").exists()
+    result = run("explain", model)
+    assert (result.code, result.err) == (0, "")
+    assert "'Box 0', opaque: 12 faces, 1 x 1 x 2 m\n" in result.out
+    assert "plan: none, since no object is translucent; see with --preset NAME" in result.out
+    assert strict_json(run("explain", model, "--json").out)["plan"] is None
+    assert "plan: SignedDepth" in run("explain", model, "--preset", "merlot").out
+
+
+def test_explain_tells_the_mesh_and_the_plan(run: Run, cube: Path) -> None:
+    result = run("explain", cube)
+    assert (result.code, result.err) == (0, "")
+    for words in ("cube.ply: 8 vertices, 12 faces, 1 x 1 x 1 m", "mesh: closed, convex, 1 component", "signed_depth:"):
+        assert words in result.out
+
+
+def test_explain_as_json(run: Run, cube: Path) -> None:
+    result = run("explain", cube, "--unit", "cm", "--method", "back-face-depth", "--json")
+    told = strict_json(result.out)
+    assert (result.code, result.err) == (0, "")
+    assert told["mesh"]["volume"] == pytest.approx(1e-6, rel=1e-12)
+    assert told["plan"]["method"] == "BackFaceDepth()"
+    assert told["plan"]["exact"] is True
+    assert [step["name"] for step in told["plan"]["passes"]] == ["back_face_depth", "transmittance"]
+
+
+def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
+    wall = {"KHR_materials_transmission": {"transmissionFactor": 1}}
+    tint = {"baseColorFactor": [0.5, 0.5, 0.5, 1]}
+    model = write_scene(
+        tmp_path / "scene.glb", {"extensions": GLASS}, {"extensions": wall, "pbrMetallicRoughness": tint}
+    )
+    result = run("explain", model)
+    assert (result.code, result.err) == (0, "")
+    for words in (
+        "scene.glb: 2 objects, 2 of them translucent, 0 lights, 11 x 1 x 2 m",
+        "'Box 0', body: 12 faces, 1 x 1 x 2 m; closed, convex, 1 component",
+        "'Box 1', thin wall: 12 faces",
+        "medium: 'Box 0': extinction 2.773, 1.386, 0 1/m",
+        "medium: 'Box 1': thin, white light is #bcbcbc behind it",
+        "plan: SignedDepth",
+    ):
+        assert words in result.out
+    told = strict_json(run("explain", model, "--json").out)
+    assert [item["kind"] for item in told["objects"]] == ["body", "thin wall"]
+    assert told["objects"][0]["extinction"] == pytest.approx([4 * math.log(2), 2 * math.log(2), 0.0], rel=1e-14)
+    assert (told["lights"], told["left_out"]) == (0, [])
+    assert told["plan"]["passes"][-1]["name"] == "surfaces"
+
+
+def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:
+    model = write_scene(tmp_path / "scene.glb", {"extensions": GLASS, "alphaMode": "BLEND", "name": "Glass"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")  # pytest turns warnings into errors, which nothing else does
+        result = run("explain", model, "--json")
+    lost = "transparency by alphaMode BLEND ('Glass')"
+    assert result.err.splitlines() == [f"warning: scene 'scene.glb': left out: {lost}"]
+    assert strict_json(result.out)["left_out"] == [lost]
+
+
+def test_explain_needs_no_opengl(run: Run, cube: Path, no_opengl: None) -> None:
+    assert run("explain", cube).code == 0
+
+
+def test_a_repair_is_a_warning_line_and_no_part_of_the_json(run: Run, tmp_path: Path) -> None:
+    box = trimesh.creation.box((1, 1, 1))
+    path = tmp_path / "inverted.off"
+    trimesh.Trimesh(box.vertices, box.faces[:, ::-1], process=False).export(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")  # pytest turns warnings into errors, which nothing else does
+        result = run("explain", path, "--json")
+    assert result.code == 0
+    assert result.err.splitlines() == ["warning: mesh 'inverted.off': turned 1 closed part outwards"]
+    assert strict_json(result.out)["mesh"]["repairs"] == ["turned 1 closed part outwards"]

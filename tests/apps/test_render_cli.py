@@ -1,0 +1,300 @@
+"""``translucent render``: what it writes, what it refuses without harm to any file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from tests.apps.models import write_scene
+from tests.boxes import GLASS
+from tests.command_line import Run, one_error_line, strict_json
+
+GREEN = "linear(0.18,0.62,0.35)"
+
+
+@pytest.fixture
+def glass_box(tmp_path: Path) -> Path:
+    return write_scene(tmp_path / "scene.glb", {"extensions": GLASS})
+
+
+# Bad input
+
+
+BAD_RENDER_OPTIONS = [
+    (["--size", "0x0"], "frame size (0, 0); not two whole numbers above 0"),
+    (["--size", "-4x4"], "frame size (-4, 4); not two whole numbers above 0"),
+    (["--size", "abc"], "--size 'abc'; not WxH"),
+    (["--size", "64"], "--size '64'; not WxH"),
+    (["--size", "1.5x2"], "--size '1.5x2'; not WxH"),
+    (["--size", "1x2x3"], "--size '1x2x3'; not WxH"),
+    (["--color", "linear(0,0.5,0.5)", "--distance", "1cm"], "red = 0 is not in 0 < t <= 1"),
+    (["--color", "linear(1.1,0.5,0.5)", "--distance", "1cm"], "red = 1.1 is not in 0 < t <= 1"),
+    (["--color", "linear(nan,0.5,0.5)", "--distance", "1cm"], "a channel is not finite"),
+    (["--color", "reddish", "--distance", "1cm"], "color 'reddish'; neither a hex color"),
+    (["--color", GREEN, "--distance", "0"], "length '0'; not positive and finite"),
+    (["--color", GREEN, "--distance", "-1cm"], "length '-1cm'; not positive and finite"),
+    (["--color", GREEN, "--distance", "abc"], "length 'abc'; not a number with a unit"),
+    (["--color", GREEN, "--distance", "2 furlong"], "unit 'furlong'; not a known unit"),
+    (["--color", GREEN], "--color; --distance is missing; give both"),
+    (["--distance", "1cm"], "--distance; --color is missing; give both"),
+    (["--preset", "unobtainium"], "preset 'unobtainium'; not a known preset; use one of marble"),
+    (["--preset", "jade", "--color", GREEN], "--preset jade; --color or --distance is given, too"),
+    (["--method", "magic"], "method 'magic'; not a known method; use one of signed-depth"),
+    (["--backend", "vulkan"], "backend 'vulkan'; not a known backend; use one of egl, window, osmesa"),
+    (["--unit", "furlong"], "unit 'furlong'; not a known unit"),
+    (["--background", "reddish"], "color 'reddish'; neither a hex color"),
+    (["--eye", "1,2"], "--eye '1,2'; not three numbers"),
+    (["--eye", "a,b,c"], "--eye 'a,b,c'; not three numbers"),
+    (["--eye", "nan,0,0"], "camera eye, target or up; not three finite numbers"),
+    (["--eye", "0,0,0"], "eye and target are both at (0.0, 0.0, 0.0)"),
+    (["--eye", "0,5,0"], "is along the view; choose another up"),
+    (["--eye", "1e200,0,0"], "camera eye, target or up; a number beyond 1e+18"),
+    (["--up", "0,0,0"], "up (0.0, 0.0, 0.0) is along the view"),
+    (["--up", "up"], "--up 'up'; not three numbers"),
+    (["--fov", "1e-300"], "camera eye, target or up; a number beyond 1e+18"),
+    (["--target", "0,0,0"], "--target; --eye is missing"),
+    (["--fov", "0", "--eye", "0,0,5"], "camera fov_y 0.0; not between 0 and 180"),
+    (["--fov", "180"], "camera fov_y 180.0; not between 0 and 180"),
+    (["--fov", "nan"], "camera fov_y nan; not between 0 and 180"),
+    (["--fov", "wide"], "Invalid value for '--fov'"),
+    (["--samples", "0"], "samples 0; not a whole number in 1 to 4096"),
+    (["--samples", "some"], "Invalid value for '--samples'"),
+    (["--camera", "0"], "cube.ply is no glTF file and has no cameras; use --eye"),
+    (["--camera", "first"], "Invalid value for '--camera'"),
+    (["--borders", "front", "--opaque-with", "pyrender"], "--borders front; --opaque-with, where rays bend at both"),
+    (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
+]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), BAD_RENDER_OPTIONS, ids=lambda v: " ".join(v) if isinstance(v, list) else ""
+)
+def test_render_refuses_a_bad_option_and_writes_nothing(
+    run: Run, cube: Path, tmp_path: Path, options: list[str], message: str
+) -> None:
+    fresh, existing = tmp_path / "fresh.png", tmp_path / "existing.png"
+    existing.write_bytes(b"precious")
+    before = sorted(tmp_path.iterdir())
+    for output in (fresh, existing):
+        result = run("render", cube, "-o", output, "--size", "4x4", *options)
+        assert message in one_error_line(result)
+    assert existing.read_bytes() == b"precious"
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("placed", [("--eye", "0,0,9"), ("--target", "0,0,0"), ("--up", "0,1,0"), ("--fov", "30")])
+def test_a_camera_of_the_file_excludes_one_that_options_place(
+    run: Run, glass_box: Path, tmp_path: Path, placed: tuple[str, str]
+) -> None:
+    result = run("render", glass_box, "-o", tmp_path / "out.png", "--camera", "0", *placed)
+    assert f"--camera 0; {placed[0]} given, too; give one or the other" in one_error_line(result)
+
+
+@pytest.mark.parametrize("number", ["2", "-1"])
+def test_a_camera_that_is_not_there_is_refused_with_those_that_are(
+    run: Run, glass_box: Path, tmp_path: Path, number: str
+) -> None:
+    result = run("render", glass_box, "-o", tmp_path / "out.png", "--camera", number)
+    assert "it has 0 of node 'Front', 1 of node 'Side'; give one of these numbers" in one_error_line(result)
+
+
+@pytest.mark.parametrize(
+    ("output", "code", "message"),
+    [
+        ("picture.bmp", 2, "suffix '.bmp'; use .png, .exr or .npz"),
+        ("picture", 2, "suffix ''; use .png, .exr or .npz"),
+        ("missing/picture.png", 2, "; make the folder first"),
+        ("cube.ply/picture.png", 2, "; make the folder first"),
+        (f"{'long' * 100}/picture.png", 2, "; make the folder first"),
+    ],
+)
+def test_a_bad_output_is_refused_before_any_work(
+    run: Run, cube: Path, tmp_path: Path, no_opengl: None, output: str, code: int, message: str
+) -> None:
+    before = sorted(tmp_path.iterdir())
+    result = run("render", cube, "-o", tmp_path / output)
+    assert message in one_error_line(result, code)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+# Good runs
+
+
+@pytest.mark.usefixtures("renderer")
+class TestRendering:
+    """What needs OpenGL."""
+
+    # Straight on, from 10 m: the middle ray of a frame of odd size crosses the unit cube along its axis.
+    VIEW = ("--eye", "0,0,10", "--target", "0,0,0", "--fov", "20", "--size", "9x5", "--samples", "1")
+
+    def test_render_writes_the_exact_thickness_and_color(self, run: Run, cube: Path, tmp_path: Path) -> None:
+        output = tmp_path / "cube.npz"
+        medium = ("--color", "linear(0.25,0.5,1)", "--distance", "0.5m", "--background", "linear(1,0.5,0.25)")
+        result = run("render", cube, "-o", output, *self.VIEW, *medium)
+        assert (result.code, result.err) == (0, "")
+        assert f"{output}: 9x5, " in result.out
+        with np.load(output) as arrays:
+            assert arrays["thickness"].shape == (5, 9)
+            # A thickness of 1 m from distances of 0.5 m to either side of the center: a few float32 roundings.
+            assert arrays["thickness"][2, 4] == pytest.approx(1.0, rel=1e-6)
+            assert arrays["transmittance"][2, 4] == pytest.approx([1 / 16, 1 / 4, 1.0], rel=1e-5)
+            assert arrays["radiance"][2, 4] == pytest.approx([1 / 16, 1 / 8, 1 / 4], rel=1e-5)
+            assert arrays["thickness"][0, 0] == 0.0
+            assert arrays["valid"].all()
+
+    def test_render_bends_rays_at_one_border_or_both(self, run: Run, tmp_path: Path) -> None:
+        glass = {"extensions": GLASS | {"KHR_materials_ior": {"ior": 1.5}}}
+        model, frames = write_scene(tmp_path / "scene.glb", glass), {}
+        for borders in ("both", "front"):
+            output = tmp_path / f"{borders}.npz"
+            result = run("render", model, "-o", output, "--size", "9x5", "--samples", "1", "--borders", borders)
+            assert (result.code, result.err) == (0, "")
+            assert ("leaves without bending" in result.out) == (borders == "front")
+            with np.load(output) as arrays:
+                frames[borders] = arrays["radiance"], arrays["thickness"]
+        assert (frames["both"][0] != frames["front"][0]).any()
+        assert (frames["both"][1] == frames["front"][1]).all()
+
+    def test_render_as_json_prints_one_object(self, run: Run, cube: Path, tmp_path: Path) -> None:
+        output = tmp_path / "cube.exr"
+        result = run("render", cube, "-o", output, *self.VIEW, "--json")
+        told = strict_json(result.out)
+        assert (result.code, result.err) == (0, "")
+        assert (told["output"], told["size"]) == (str(output), [9, 5])
+        assert told["invalid_pixels"] == 0
+        assert told["thickness"]["max"] == pytest.approx(1.0, rel=0.1)
+        assert told["provenance"]["backend"] in {"egl", "osmesa"}
+        assert output.stat().st_size > 0
+
+    @pytest.mark.parametrize(
+        "options",
+        [
+            [],
+            ["--preset", "merlot"],
+            ["--method", "back-face-depth"],
+            ["--method", "thin_layer"],
+            ["--background", "checkerboard"],
+            ["--background", "teal"],
+            ["--samples", "3"],
+            ["--fov", "60"],
+            ["--up", "0,0,1"],
+            ["--backend", "cpu"],
+        ],
+        ids=" ".join,
+    )
+    def test_render_makes_a_picture_with(self, run: Run, cube: Path, tmp_path: Path, options: list[str]) -> None:
+        from PIL import Image
+
+        output = tmp_path / "cube.png"
+        result = run("render", cube, "-o", output, "--size", "16x12", *options)
+        assert (result.code, result.err) == (0, "")
+        with Image.open(output) as picture:
+            assert picture.size == (16, 12)
+            assert picture.mode == "RGB"
+            # The body in the middle is not the backdrop of a corner.
+            assert picture.getpixel((8, 6)) != picture.getpixel((0, 0))
+
+    @pytest.mark.parametrize(("camera", "metres"), [((), 2.0), (("--camera", "0"), 2.0), (("--camera", "1"), 1.0)])
+    def test_render_shows_a_scene_in_its_own_media_through_its_cameras(
+        self, run: Run, glass_box: Path, tmp_path: Path, camera: tuple[str, ...], metres: float
+    ) -> None:
+        output = tmp_path / "scene.npz"
+        result = run("render", glass_box, "-o", output, "--size", "9x5", "--samples", "1", *camera)
+        assert (result.code, result.err) == (0, "")
+        assert "medium: extinction 2.773, 1.386, 0 1/m" in result.out
+        with np.load(output) as arrays:
+            assert arrays["thickness"][2, 4] == pytest.approx(metres, rel=1e-6)
+            color = np.power([0.25, 0.5, 1.0], metres / 0.5)
+            assert arrays["transmittance"][2, 4] == pytest.approx(color, rel=1e-5)
+
+    def test_a_color_replaces_the_media_of_a_scene(self, run: Run, tmp_path: Path) -> None:
+        model, output = write_scene(tmp_path / "scene.glb", {"extensions": GLASS}), tmp_path / "scene.npz"
+        for material in ({"extensions": GLASS}, {}):  # translucent, or opaque and filled all the same
+            write_scene(model, material, cameras=False)
+            medium = ("--color", "linear(1,0.5,0.25)", "--distance", "1m")
+            result = run("render", model, "-o", output, *self.VIEW, *medium, "--unit", "cm")
+            assert (result.code, result.err) == (0, "")
+            assert "medium: extinction 0, 0.6931, 1.386 1/m" in result.out
+            with np.load(output) as arrays:
+                assert arrays["thickness"][2, 4] == pytest.approx(0.02, rel=1e-6)
+
+    def test_render_frames_all_objects_of_a_scene_without_cameras(self, run: Run, tmp_path: Path) -> None:
+        model = write_scene(tmp_path / "two.glb", {"extensions": GLASS}, {"extensions": GLASS}, cameras=False)
+        for options in ((), ("--fov", "60"), ("--camera", "0")):
+            result = run("render", model, "-o", tmp_path / "two.npz", "--size", "40x30", "--samples", "1", *options)
+            assert (result.code, result.err) == (0, "")
+            with np.load(tmp_path / "two.npz") as arrays:
+                covered = arrays["coverage"]
+            assert covered.any()
+            border = np.concatenate([covered[0], covered[-1], covered[:, 0], covered[:, -1]])
+            assert not border.any()
+
+    @pytest.mark.filterwarnings("ignore:scene 'AttenuationTest.glb'")
+    def test_the_attenuation_test_has_equal_columns_before_its_opaque_backdrop(
+        self, run: Run, assets: Path, tmp_path: Path
+    ) -> None:
+        away, half, output = 2000.0, 12.0, tmp_path / "rows.npz"
+        view = ("--eye", f"0,0,{away:g}", "--target", "0,0,0", "--fov", repr(2 * math.degrees(math.atan(half / away))))
+        model = assets / "gltf" / "AttenuationTest.glb"
+        assert run("render", model, "-o", output, "--size", "240x240", "--samples", "1", *view).code == 0
+        with np.load(output) as arrays:
+            transmittance, valid = arrays["transmittance"], arrays["valid"]
+        assert valid.all()
+        for x, metres in {-3.5: 0.25, -2.0: 0.5, 0.0: 1.0, 2.5: 1.5, 6.0: 2.0}.items():
+            column = [transmittance[int((half - y) * 10), int((half + x) * 10)] for y in (6, 3, 0, -3, -6)]
+            # Rays are off the axis by 9 / 2000 at most, and so the longest path by 2 m * 1e-5; or by float32.
+            np.testing.assert_allclose(column, [np.power([0.1, 0.5, 0.9], metres)] * 5, rtol=5e-5)
+
+    @pytest.mark.parametrize("eye", [("--eye", "9,0,0"), ()], ids=["given", "framed"])
+    def test_up_turns_the_picture(self, run: Run, tmp_path: Path, eye: tuple[str, ...]) -> None:
+        model = tmp_path / "slab.ply"
+        trimesh.creation.box((1, 1, 9)).export(model)
+        slender = []
+        for i, up in enumerate(("0,1,0", "0,0,1")):
+            output = tmp_path / f"{i}.npz"
+            run("render", model, "-o", output, "--size", "48x48", "--samples", "1", *eye, "--up", up)
+            with np.load(output) as arrays:
+                covered = arrays["coverage"]
+            slender.append(covered.any(axis=1).sum() / covered.any(axis=0).sum())
+        assert slender[1] > 2 * slender[0]
+
+    def test_render_replaces_an_existing_file(self, run: Run, cube: Path, tmp_path: Path) -> None:
+        output = tmp_path / "cube.png"
+        output.write_bytes(b"old")
+        assert run("render", cube, "-o", output, "--size", "4x4").code == 0
+        assert output.read_bytes().startswith(b"\x89PNG")
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.ply", "cube.png"]
+
+    def test_a_frame_that_opengl_cannot_hold_fails_at_run_time(self, run: Run, cube: Path, tmp_path: Path) -> None:
+        result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "1000000x1")
+        assert "1000000" in one_error_line(result, code=1)
+        assert not (tmp_path / "cube.png").exists()
+
+
+def test_a_backend_that_was_asked_for_is_not_replaced(run: Run, cube: Path, tmp_path: Path, no_opengl: None) -> None:
+    result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "4x4", "--backend", "egl")
+    assert "tried egl: no such library" in one_error_line(result, code=1)
+
+
+def test_a_body_too_large_for_its_medium_is_said_to_be_black(run: Run, tmp_path: Path) -> None:
+    """A model in millimetres taken for metres is the usual reason, and its picture shows nothing of it."""
+    trimesh.creation.icosphere(subdivisions=2).export(tmp_path / "ball.stl")
+    command = [
+        "render",
+        str(tmp_path / "ball.stl"),
+        "-o",
+        str(tmp_path / "a.png"),
+        "--size",
+        "160x160",
+        "--preset",
+        "jade",
+    ]
+    result = run(*command)
+    assert result.code == 0
+    assert result.err.startswith("warning: only 0.")
+    assert "check --unit, or take a longer --distance" in result.err
+    assert run(*command, "--unit", "cm").err == ""

@@ -1,0 +1,230 @@
+"""Mesh files: formats, units, what loading mends, and what is refused."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+import translucent as tl
+from tests.values.handmade import (
+    CLEAN,
+    CORNERS,
+    CUBE,
+    DOUBLED,
+    EPS,
+    ball,
+    changed,
+    cube,
+    facts,
+    inverted,
+    joined,
+    moebius,
+)
+from translucent.mesh import Mesh, load_mesh
+from translucent.repair import WELD_TOLERANCE, weld
+from translucent.solids import Sphere, Torus
+
+# Welding
+
+
+def test_welding_joins_what_is_within_the_tolerance_and_nothing_else() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [1 + 0.9e-6, 0, 0], [1 + 1.7e-6, 0, 0], [1.1, 0, 0]])
+    # The third to the fifth are a chain: neighbours of neighbours are joined.
+    assert weld(points, 1e-6).tolist() == [0, 1, 0, 1, 1, 5]
+
+
+@pytest.mark.parametrize(("gap", "solid"), [(0.0, True), (0.5, True), (3.0, False)])
+def test_loading_closes_cracks_of_rounding_and_leaves_wider_ones(tmp_path: Path, gap: float, solid: bool) -> None:
+    body = ball(1)
+    corners = body.vertices[body.faces] * 1.0
+    corners[0] += gap * WELD_TOLERANCE * body.diagonal / math.sqrt(3)
+    path = tmp_path / "cracked.obj"
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.reshape(-1, 3).tolist()]
+    path.write_text("\n".join([*lines, *[f"f {i} {i + 1} {i + 2}" for i in range(1, len(lines), 3)]]))
+    mesh = load_mesh(path)
+    assert mesh.diagnosis.solid is solid
+    assert len(mesh.vertices) == len(body.vertices) + (0 if solid else 3)
+    assert f"welded {len(lines) - len(mesh.vertices)} of {len(lines)} vertices" in mesh.repairs[0]
+
+
+# Loading
+
+
+def save(path: Path, mesh: Mesh) -> Path:
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "off", "glb"])
+def test_a_format_is_read_back_as_it_was_written(tmp_path: Path, suffix: str) -> None:
+    body = cube(low=0.25, size=0.5)  # float32 holds these
+    mesh = load_mesh(save(tmp_path / f"cube.{suffix}", body))
+    assert facts(mesh.diagnosis) == CLEAN
+    assert mesh.name == f"cube.{suffix}"
+    assert len(mesh.vertices) == 8
+    corners = {tuple(row) for row in mesh.vertices.tolist()}
+    assert corners == {tuple(row) for row in body.vertices.tolist()}
+    assert mesh.volume == pytest.approx(0.125, rel=8 * EPS)
+
+
+def test_an_ascii_stl_and_a_capital_suffix_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "CUBE.STL"
+    path.write_text(trimesh.Trimesh(CORNERS, CUBE, process=False).export(file_type="stl_ascii"))
+    assert facts(load_mesh(path).diagnosis) == CLEAN
+
+
+@pytest.mark.parametrize(("unit", "size"), [("m", 2.0), ("cm", 0.02), ("in", 0.0508), ("µm", 2e-6), ("km", 2000.0)])
+def test_coordinates_are_in_the_given_unit(tmp_path: Path, unit: str, size: float) -> None:
+    mesh = load_mesh(save(tmp_path / "cube.obj", cube(size=2.0)), unit=unit)
+    assert mesh.bounds == pytest.approx(np.array([[0] * 3, [size] * 3]), rel=1e-15)
+
+
+def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(tl.InputError, match="unit 'furlong'; not a known unit"):
+        load_mesh(save(tmp_path / "cube.obj", cube()), unit="furlong")
+
+
+def test_the_nodes_of_a_scene_become_one_mesh_in_their_places(tmp_path: Path) -> None:
+    scene, part = trimesh.Scene(), trimesh.Trimesh(CORNERS, CUBE, process=False)
+    for x in (0.0, 5.0):
+        scene.add_geometry(part, transform=trimesh.transformations.translation_matrix((x, 0, 0)))
+    scene.export(tmp_path / "two.glb")
+    mesh = load_mesh(tmp_path / "two.glb")
+    assert facts(mesh.diagnosis) == CLEAN | {"components": 2}
+    assert mesh.bounds.tolist() == [[0, 0, 0], [6, 1, 1]]
+
+
+def test_one_flipped_face_is_turned_back_with_a_warning(tmp_path: Path) -> None:
+    path = save(tmp_path / "cube.off", Mesh(CORNERS, changed(CUBE, flip=4)))
+    with pytest.warns(tl.TranslucentWarning, match=re.escape("'cube.off': turned 1 of 12 faces to agree with")):
+        mesh = load_mesh(path)
+    assert facts(mesh.diagnosis) == CLEAN
+    assert mesh.volume == 1.0
+
+
+def test_a_body_inside_out_is_turned_outwards_with_a_warning(tmp_path: Path) -> None:
+    path = save(tmp_path / "cube.off", inverted(cube()))
+    with pytest.warns(tl.TranslucentWarning, match=re.escape("mesh 'cube.off': turned 1 closed part outwards")):
+        mesh = load_mesh(path)
+    assert mesh.volume == 1.0
+    assert mesh.repairs == ("turned 1 closed part outwards",)
+
+
+def test_a_cavity_stays_a_cavity(tmp_path: Path) -> None:
+    hollow = joined(cube(), inverted(cube(low=0.25, size=0.5)))
+    assert load_mesh(save(tmp_path / "hollow.off", hollow)).volume == pytest.approx(0.875, rel=8 * EPS)
+
+
+@pytest.mark.parametrize("mesh", [moebius(), Mesh(CORNERS, DOUBLED), Mesh(CORNERS, CUBE[2:])])
+def test_what_cannot_be_mended_is_left_alone(tmp_path: Path, mesh: Mesh) -> None:
+    loaded = load_mesh(save(tmp_path / "mesh.off", mesh))
+    left = facts(mesh.diagnosis) | {"unreferenced_vertices": 0}
+    assert facts(loaded.diagnosis) == left
+
+
+@given(st.lists(st.booleans(), min_size=12, max_size=12))
+def test_any_flips_of_a_cube_are_repaired(tmp_path_factory: pytest.TempPathFactory, flips: list[bool]) -> None:
+    faces = np.where(np.array(flips)[:, None], CUBE[:, ::-1], CUBE)
+    path = save(tmp_path_factory.mktemp("flips") / "cube.off", Mesh(CORNERS, faces))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", tl.TranslucentWarning)
+        mesh = load_mesh(path)
+    assert facts(mesh.diagnosis) == CLEAN
+    assert mesh.volume == pytest.approx(1.0, rel=8 * EPS)
+
+
+SEAM = """
+v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1
+vt 0 0\nvt 1 0\nvt 0 1\nvt 0.5 0.5
+f 1/1 3/3 2/2\nf 1/1 2/2 4/3\nf 1/4 4/3 3/1\nf 2/1 3/2 4/3
+"""
+
+
+def test_a_uv_seam_survives_welding(tmp_path: Path) -> None:
+    path = tmp_path / "seam.obj"
+    path.write_text(SEAM)
+    mesh = load_mesh(path)
+    assert facts(mesh.diagnosis) == CLEAN
+    assert mesh.uv is not None
+    # By hand: corner, position and uv of every face corner, and 4 positions with 9 different pairs.
+    pairs = {(*p, *t) for p, t in zip(mesh.vertices.tolist(), mesh.uv.tolist(), strict=True)}
+    assert (len(mesh.vertices), len(pairs)) == (8, 8)
+    assert {pair[3:] for pair in pairs if pair[:3] == (0, 0, 0)} == {(0, 0), (0.5, 0.5)}
+    first = mesh.faces[0]
+    assert mesh.vertices[first].tolist() == [[0, 0, 0], [0, 1, 0], [1, 0, 0]]
+    assert mesh.uv[first].tolist() == [[0, 0], [0, 1], [1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("missing.obj", None, "no such file; check the path"),
+        ("mesh.xyzw", b"", "format '.xyzw' is not known; use obj, stl, ply, off or glb"),
+        ("mesh", b"", "format 'without suffix' is not known"),
+        ("empty.obj", b"", "it has no faces"),
+        ("empty.stl", b"", "it has no faces"),
+        ("empty.ply", b"", "it cannot be read"),
+        ("garbage.glb", b"\x00\xff" * 200, "it cannot be read"),
+        ("garbage.ply", b"\x00\xff" * 200, "it cannot be read"),
+        ("garbage.off", b"\x00\xff" * 200, "it cannot be read"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\n", "it has no faces; give a triangle mesh, not points or lines"),
+        ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "1 vertices are not finite (first: 0)"),
+        ("huge.obj", b"v 0 0 1e30\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "beyond 1e+18 m"),
+    ],
+)
+def test_such_a_file_is_refused(tmp_path: Path, name: str, content: bytes | None, message: str) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(tl.InputError, match=re.escape(message)) as caught:
+        load_mesh(path)
+    assert name in str(caught.value)
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(tl.InputError, match="no such file"):
+        load_mesh(tmp_path)
+
+
+def test_a_part_in_the_hole_of_a_ring_is_no_cavity_and_a_shell_in_a_ball_is(tmp_path: Path) -> None:
+    """The box around the ring holds both; whether a part is a cavity is for the winding number to say."""
+    ring, ball = Torus().tessellate(24), Sphere(radius=0.15).tessellate(12)
+    inverted = Mesh(ball.vertices, ball.faces[:, ::-1])
+    assert joined(ring, inverted).diagnosis.inside_out_parts == 1
+    assert "1 closed parts inside out" in joined(ring, inverted).diagnosis.problems
+    with pytest.warns(tl.TranslucentWarning, match="turned 1 closed part outwards"):
+        mended = load_mesh(save(tmp_path / "ring.ply", joined(ring, inverted)))
+    assert mended.volume == pytest.approx(ring.volume + ball.volume, rel=1e-6)
+    shell = joined(Sphere().tessellate(24), inverted)
+    assert shell.diagnosis.inside_out_parts == 0
+    assert load_mesh(save(tmp_path / "shell.ply", shell)).repairs == ()
+
+
+def test_a_stray_triangle_far_away_does_not_weld_the_model_into_one_point(tmp_path: Path) -> None:
+    ball, stray = Sphere().tessellate(48), Sphere(center=(1e6, 0.0, 0.0)).tessellate(4)
+    loaded = load_mesh(save(tmp_path / "stray.ply", joined(ball, stray)))
+    assert len(loaded.vertices) == len(ball.vertices) + len(stray.vertices)
+
+
+def test_many_parts_are_oriented_in_one_go(tmp_path: Path) -> None:
+    """Every part inside out, 1500 of them: no loop over all parts for each part."""
+    ball = Sphere(radius=0.3).tessellate(4)
+    parts = [Mesh(ball.vertices + (i % 40, i // 40, 0.0), ball.faces[:, ::-1]) for i in range(1500)]
+    with pytest.warns(tl.TranslucentWarning, match="turned 1500 closed parts outwards"):
+        assert load_mesh(save(tmp_path / "parts.ply", joined(*parts))).diagnosis.solid
+
+
+def test_text_in_latin_1_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "latin.obj"
+    path.write_bytes(
+        "# modèle\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n".encode("latin-1")
+    )
+    assert load_mesh(path).diagnosis.solid

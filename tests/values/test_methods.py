@@ -1,0 +1,62 @@
+"""Methods by name, and their parameters."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.thickness import MAX_K, MAX_LAYERS, METHODS, method_from_name
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_a_method_has_a_name(name: str) -> None:
+    for written in (name, name.upper(), name.replace("-", "_")):
+        assert method_from_name(written) == METHODS[name]()
+
+
+def test_a_misspelt_method_is_guessed() -> None:
+    for name in ("signed depth", "Fragment-List", "kbuffer"):
+        with pytest.raises(tl.InputError, match=r"not a known method; did you mean (signed-depth|fragment|k-buffer)"):
+            method_from_name(name)
+
+
+@pytest.mark.parametrize("name", ["magic", ""])
+def test_an_unknown_method_names_the_known_ones(name: str) -> None:
+    known = "signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists, k-buffer"
+    with pytest.raises(tl.InputError, match=f"^method '{name}'; not a known method; use one of {known}"):
+        method_from_name(name)
+
+
+def test_methods_of_equal_parameters_are_equal_and_hash_alike() -> None:
+    assert len({tl.DepthPeeling(), tl.DepthPeeling(64, "both-ends"), tl.KBuffer(8), tl.KBuffer()}) == 2
+    assert tl.DepthPeeling(8) != tl.DepthPeeling()
+    assert tl.DepthPeeling(order="front-to-back") != tl.DepthPeeling()
+
+
+@pytest.mark.parametrize("thickness", [0, -1.0, np.nan, np.inf])
+def test_a_sheet_has_a_positive_thickness(thickness: float) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(f"ThinLayer thickness {thickness}; not above 0")):
+        tl.ThinLayer(thickness)
+
+
+@pytest.mark.parametrize(
+    ("method", "what", "most"),
+    [(tl.DepthPeeling, "DepthPeeling max_layers", MAX_LAYERS), (tl.KBuffer, "KBuffer k", MAX_K)],
+)
+def test_layers_are_counted_in_whole_numbers(method: Any, what: str, most: int) -> None:
+    assert method(1) != method(most)
+    for wrong in (0, -1, most + 1, 2.0, np.nan, np.inf, "8", None, True, [8]):
+        message = f"{what} {wrong!r}; not a whole number in 1 to {most}; give for example 8"
+        with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
+            method(wrong)
+
+
+@pytest.mark.parametrize("order", ["sideways", "", "Both-Ends", None, 2, ["both-ends"]])
+def test_an_unknown_order_of_peeling_names_the_known_ones(order: Any) -> None:
+    message = f"DepthPeeling order {order!r}; not known; use one of both-ends, front-to-back, back-to-front"
+    with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
+        tl.DepthPeeling(order=order)

@@ -1,0 +1,70 @@
+"""Plans with one border: what they save, what they cost, and where they are refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import translucent as tl
+from tests.values.plan_scenes import DIAMOND, ORDERED, TORUS, WINE, body, scene, sheet
+from translucent.plan import plan
+from translucent.plan_borders import ONE_BORDER
+
+
+@pytest.mark.parametrize("method", [None, tl.SignedDepth(), *ORDERED])
+def test_one_border_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
+    asked = scene(body(DIAMOND), body(None, TORUS))
+    both, front = plan(asked, method), plan(asked, method, borders="front")
+    assert plan(asked, method, borders="both") == both
+    assert (both.borders, front.borders) == ("both", "front")
+    assert [step.name for step in both.passes] == [step.name for step in front.passes]
+    assert front.geometry_passes == both.geometry_passes - 1
+    assert front.cost < both.cost
+    assert front.unmodelled == (*both.unmodelled, ONE_BORDER)
+    assert 'not modelled: borders="front": bends once, where a ray enters; leaves without bending' in str(front)
+    assert front.summary()["borders"] == "front"
+
+
+@pytest.mark.parametrize(
+    ("objects", "method"), [([body()], None), ([sheet(DIAMOND)], None), ([body(DIAMOND)], tl.ThinLayer())]
+)
+def test_one_border_changes_nothing_where_nothing_bends(objects: list[tl.Object], method: Any) -> None:
+    assert plan(scene(*objects), method, borders="front") == plan(scene(*objects), method)
+
+
+def test_one_border_needs_no_order_where_bodies_touch() -> None:
+    touching = scene(body(DIAMOND), body(WINE, x=0.5))
+    assert plan(touching).ordered
+    assert not plan(touching, borders="front").ordered
+
+
+@pytest.mark.parametrize(
+    ("camera", "inside"),
+    [
+        (tl.Camera.look_at((0, 0, 0.2), (0, 0, -1)), True),
+        (tl.Camera.look_at((0, 0, 5), (0, 0, -1)), False),
+        (tl.Camera.look_at((0, 0, -5), (0, 0, -9)), False),
+        (tl.Camera.orthographic((0, 0, 0.2), (0, 0, -1), height=1), True),
+        (tl.Camera.orthographic((0, 0, 5), (0, 0, -1), height=1), False),
+    ],
+)
+def test_one_border_cannot_be_entered_from_inside(camera: tl.Camera, inside: bool) -> None:
+    asked = tl.Scene([body(DIAMOND)], camera)
+    if not inside:
+        assert plan(asked, borders="front").borders == "front"
+        return
+    message = r'^borders="front"; rays start inside .*; use borders="both", or move the camera outside$'
+    with pytest.raises(tl.InputError, match=message):
+        plan(asked, borders="front")
+    assert plan(asked).borders == "both"
+
+
+def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
+    ring = tl.Scene([body(DIAMOND, TORUS)], tl.Camera.look_at((0, 0, 0), (1, 0, 0)))
+    assert plan(ring, borders="front").borders == "front"
+
+
+def test_borders_that_are_not_known_are_refused() -> None:
+    with pytest.raises(tl.InputError, match=r"^borders 'back'; not known; use one of both, front$"):
+        plan(scene(body()), borders="back")  # type: ignore[arg-type]

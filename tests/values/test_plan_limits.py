@@ -1,0 +1,123 @@
+"""Where a plan is not exact, and says so: bodies that are not closed, and effects that are left out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import translucent as tl
+from tests.values.plan_scenes import BOX, DIAMOND, MILK, OPEN, ORDERED, TORUS, body, names, scene, sheet
+from translucent.plan import plan
+
+_APART = BOX.vertices + (5, 0, 0)
+#: One part looks outwards, the other inwards, and neither is inside the other.
+INSIDE_OUT = tl.Mesh([*BOX.vertices, *_APART], [*BOX.faces, *BOX.faces[:, ::-1] + 8], name="half flipped")
+DOUBLED = tl.Mesh(BOX.vertices, [*BOX.faces, *BOX.faces[:, ::-1]], name="walls")
+
+
+# What no pass renders
+
+
+@pytest.mark.parametrize(
+    ("objects", "effects"),
+    [
+        ([body()], []),
+        ([body(MILK)], ["in-scattered light: scattering only removes light"]),
+        ([body(DIAMOND)], ["refraction and reflection beyond the first interval"]),
+        ([body(), body(None)], ["shadows: light reaches opaque objects through everything"]),
+        ([body(MILK), body(DIAMOND), body(None)], ["in-scattered light", "refraction", "shadows"]),
+    ],
+)
+@pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.ThinLayer(), *ORDERED])
+def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effects: list[str], method: Any) -> None:
+    found = plan(scene(*objects), method)
+    assert len(found.unmodelled) == len(effects)
+    for told, effect in zip(found.unmodelled, effects, strict=True):
+        assert told.startswith(effect)
+    # Thickness and transmittance along straight rays are exact all the same.
+    assert found.exact == (method != tl.ThinLayer())
+
+
+# Bodies that are not closed
+
+
+@pytest.mark.parametrize("mesh", [OPEN, INSIDE_OUT, DOUBLED])
+def test_a_sheet_needs_no_inside(mesh: tl.Mesh) -> None:
+    assert [limit for limit in plan(scene(sheet(mesh=mesh))).limits if "duplicated" not in limit] == []
+    assert plan(scene(body(mesh=mesh))).limits
+
+
+@pytest.mark.parametrize(
+    ("method", "passes"),
+    [
+        (None, ["signed_depth", "thin_layer_fallback", "signed_depth_fallback"]),
+        (tl.SignedDepth(), ["signed_depth", "thin_layer_fallback", "signed_depth_fallback"]),
+        (tl.BackFaceDepth(), ["back_face_depth", "thin_layer_fallback", "signed_depth_fallback"]),
+        (tl.DepthPeeling(), ["thin_layer_fallback", "signed_depth_fallback", "depth_peeling"]),
+        (tl.FragmentLists(), ["thin_layer_fallback", "signed_depth_fallback", "fragment_lists"]),
+        (tl.KBuffer(32), ["thin_layer_fallback", "signed_depth_fallback", "k_buffer"]),
+    ],
+)
+def test_an_open_body_is_marked_and_falls_back_to_a_sheet(method: Any, passes: list[str]) -> None:
+    found = plan(scene(body(), body(mesh=OPEN, x=3)), method)
+    assert names(found) == [*passes, "transmittance"]
+    steps = {step.name: step for step in found.passes}
+    assert steps["thin_layer_fallback"].objects == (1,)
+    assert steps["signed_depth_fallback"].objects == (0,)
+    for name, step in steps.items():
+        assert step.target == ("fallback" if name.endswith("fallback") else "accumulated")
+        assert step.objects == (0, 1) or step.target == "fallback" or name == "transmittance"
+    assert steps["thin_layer_fallback"].reason == (
+        "'open box' not closed: pixels that enter and leave unequally often get sheets of 1% of the diagonal, and are "
+        "marked invalid"
+    )
+    assert found.limits[0] == (
+        "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close it, or declare it a sheet "
+        "(sheet_thickness=..., --method thin-layer)"
+    )
+    assert not found.exact
+
+
+def test_sheets_are_drawn_in_the_fallback_too() -> None:
+    found = plan(scene(sheet(), body(mesh=OPEN), body(None)))
+    assert [(step.name, step.objects) for step in found.passes] == [
+        ("opaque", (2,)),
+        ("signed_depth", (1,)),
+        ("thin_layer", (0,)),
+        ("thin_layer_fallback", (1, 0)),
+        ("transmittance", ()),
+    ]
+
+
+def test_an_open_mesh_drawn_as_a_sheet_needs_no_fallback() -> None:
+    found = plan(scene(body(mesh=OPEN)), tl.ThinLayer())
+    assert (names(found), found.exact) == (["thin_layer", "transmittance"], True)
+
+
+# Limits: where a plan is not exact
+
+
+@pytest.mark.parametrize(
+    ("objects", "method", "limits"),
+    [
+        ([body()], tl.SignedDepth(anchored=False), ["distances count from the camera: float32 loses digits"]),
+        ([body(mesh=TORUS)], tl.BackFaceDepth(), ["'torus' not convex: pixels with more than one entry are marked in"]),
+        ([body(), body(x=3)], tl.BackFaceDepth(), ["several bodies: pixels that cross more than one are marked inval"]),
+        ([body(mesh=OPEN)], tl.BackFaceDepth(), ["'open box': 3 open edges", "'open box' not convex: pixels with"]),
+        ([body()], tl.ThinLayer(), ["'box' closed, but drawn as sheets: what is inside is left out"]),
+        ([sheet(), body(), body(mesh=TORUS), body(mesh=OPEN)], tl.ThinLayer(), ["'box', 'torus' closed, but drawn as"]),
+        ([body(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, which count twice or cancel"]),
+        ([sheet(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, which count twice or cancel"]),
+        ([body(mesh=INSIDE_OUT)], None, ["'half flipped': 1 closed parts inside out: their pixels are marked invalid"]),
+        ([body(mesh=INSIDE_OUT)], tl.FragmentLists(), ["'half flipped': 1 closed parts inside out: their pixels are"]),
+        ([body(mesh=INSIDE_OUT)], tl.ThinLayer(), ["'half flipped' closed, but drawn as sheets"]),
+        ([sheet(mesh=INSIDE_OUT), body()], None, []),
+    ],
+)
+def test_a_plan_that_is_not_exact_says_where(objects: list[tl.Object], method: Any, limits: list[str]) -> None:
+    found = plan(scene(*objects), method)
+    assert found.exact is not bool(limits)
+    assert len(found.limits) == len(limits)
+    for told, limit in zip(found.limits, limits, strict=True):
+        assert told.startswith(limit)

@@ -1,0 +1,68 @@
+"""What is drawn of a contender: the scene as it sees it, its plan, and its frame, ready to be drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from translucent.bench.contenders import REFRACTED_IOR, Contender
+from translucent.bench.drawing import Drawing, OnProcessor, Planned, Short, Studio
+from translucent.errors import InputError
+from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFacePass, Shortcut, UnmarkedBackFacePass
+from translucent.gpu.targets import Targets
+from translucent.render_plan import RenderPlan
+from translucent.renderer import Renderer
+from translucent.scene import Object, Scene
+from translucent.thickness import BackFaceDepth, RayMarched, SignedDepth
+
+
+def seen_by(contender: Contender, scene: Scene) -> Scene:
+    """The scene with the index of refraction that the contender wants."""
+    if contender.ior is None:
+        return scene
+
+    def bent(body: Object) -> Object:
+        if body.medium is None:
+            return body
+        own = body.medium.ior if body.medium.ior > 1 else REFRACTED_IOR
+        ior = 1.0 if contender.ior == "matched" else own
+        surface = None if contender.ior == "matched" else body.surface
+        return dataclasses.replace(body, medium=dataclasses.replace(body.medium, ior=ior), surface=surface)
+
+    return dataclasses.replace(scene, objects=[bent(body) for body in scene.objects])
+
+
+def drawing(
+    studio: Studio,
+    contender: Contender,
+    scene: Scene,
+    plan: RenderPlan,
+    targets: Targets,
+    size: float,
+    cpu: Renderer | None,
+) -> Drawing:
+    """The contender's frame, ready to be drawn; `size` is the thickness that a shortcut assumes, in metres."""
+    if contender.technique in ("cpu", "march"):
+        assert cpu is not None, "there is a plan for it"
+        march = contender.method if isinstance(contender.method, RayMarched) else None
+        return OnProcessor(studio, cpu, scene, targets.size, march)
+    if contender.technique == "plan":
+        return Planned(studio, scene, targets, plan)
+    shortcut: Shortcut
+    if contender.technique == "half":
+        shortcut = HalfFloatPass(studio.gl)
+    elif contender.technique == "unmarked":
+        shortcut = UnmarkedBackFacePass(studio.gl)
+    else:
+        shortcut = NearestFacePass(studio.gl, sphere=contender.technique == "ball", size=size)
+    return Short(studio, scene, targets, plan, shortcut)
+
+
+def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | None = None) -> RenderPlan:
+    """What runs, or what lends a shortcut its shading; raises `InputError` where the planner refuses."""
+    if contender.technique in ("cpu", "march"):
+        if cpu is None:
+            raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
+        return cpu.plan(scene)
+    if contender.technique == "plan":
+        return studio.renderer.plan(scene, contender.method, borders=contender.borders)
+    return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())
