@@ -226,10 +226,28 @@ def test_a_bad_model_is_refused(
     assert not output.exists()
 
 
-def test_an_unreadable_model_is_refused(run: Run, tmp_path: Path) -> None:
-    result = run("explain", tmp_path)
+@pytest.mark.parametrize("name", ["folder", "folder.glb"])
+def test_a_folder_is_no_model(run: Run, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    result = run("explain", tmp_path / name)
     assert result.code == 2
-    assert "no such file" in one_error_line(result)
+    assert one_error_line(result).endswith(f"{name}'; it is a folder; give a file in it")
+
+
+@pytest.mark.parametrize(
+    ("output", "option"),
+    [("a.png", ("--aov", "taken/below")), ("taken", ("--turntable", "4")), ("taken/below", ("--turntable", "4"))],
+)
+def test_a_file_where_a_folder_has_to_be_is_found_before_any_work(
+    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_opengl: None, output: str, option: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("taken").write_text("kept")
+    result = run("render", cube, "-o", output, *option)
+    assert result.code == 2
+    assert one_error_line(result).endswith("'taken' is no folder; choose another one")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.ply", "taken"]
+    assert Path("taken").read_text() == "kept"
 
 
 @pytest.mark.parametrize("placed", [("--eye", "0,0,9"), ("--target", "0,0,0"), ("--up", "0,1,0"), ("--fov", "30")])
@@ -271,13 +289,15 @@ def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_pa
         ("picture.bmp", 2, "suffix '.bmp'; use .png, .exr or .npz"),
         ("picture", 2, "suffix ''; use .png, .exr or .npz"),
         ("missing/picture.png", 2, "; make the folder first"),
-        ("cube.ply/picture.png", 2, "; make the folder first"),
+        ("cube.ply/picture.png", 2, "cube.ply' is no folder; choose another one"),
+        ("folder.png", 2, "folder.png'; a folder of that name is there; choose another name"),
         (f"{'long' * 100}/picture.png", 2, "; make the folder first"),
     ],
 )
 def test_a_bad_output_is_refused_before_any_work(
     run: Run, cube: Path, tmp_path: Path, no_opengl: None, output: str, code: int, message: str
 ) -> None:
+    (tmp_path / "folder.png").mkdir()
     before = sorted(tmp_path.iterdir())
     result = run("render", cube, "-o", tmp_path / output)
     assert result.code == code
