@@ -52,7 +52,7 @@ class Frame:
     plan : RenderPlan
         What ran and why.
     seconds : dict of str to float
-        Time per pass, and ``total`` for the whole call.
+        Time per pass, over all samples, and ``total`` for the whole call.
     provenance : dict of str to str
         Backend, driver and versions.
     layers : (h, w) int32, optional
