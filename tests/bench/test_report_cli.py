@@ -283,7 +283,8 @@ def test_bad_input_is_found_before_measuring(run: Run, tmp_path: Path, arguments
     result = run("-o", tmp_path / "out", *arguments)
     assert result.code == 2
     assert message in result.err
-    assert result.err.count("error:") == 1
+    assert result.err.startswith("error: ")
+    assert result.err.count("\n") == 1
     assert not list((tmp_path / "out").iterdir())
 
 
