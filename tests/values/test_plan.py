@@ -6,7 +6,7 @@ import json
 import re
 import subprocess
 import sys
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 import trimesh
@@ -14,7 +14,7 @@ import trimesh
 import translucent as tl
 from translucent.plan import COSTS, plan, plan_over_backdrop
 from translucent.plan_borders import ONE_BORDER
-from translucent.render_plan import Capabilities, RenderPlan
+from translucent.render_plan import Borders, Capabilities, RenderPlan
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")
@@ -182,6 +182,27 @@ def test_one_border_changes_nothing_where_nothing_bends(objects: list[tl.Object]
     assert plan(scene(*objects), method, borders="front") == plan(scene(*objects), method)
 
 
+@pytest.mark.parametrize(
+    ("objects", "method"),
+    [([sheet(DIAMOND)], None), ([sheet(DIAMOND), body()], None), ([body(DIAMOND)], tl.ThinLayer())],
+)
+def test_sheets_have_one_border_and_bend_no_ray(objects: list[tl.Object], method: Any) -> None:
+    found = {step.name: step for step in plan(scene(*objects), method).passes}
+    assert found["interfaces"].reason.endswith("normal and place of the sheet that a ray meets first")
+    assert found["interfaces"].geometry_passes == 1
+    assert found["surfaces"].reason == "borders mirror the environment (ior above 1); rays go straight through sheets"
+    solid = {step.name: step for step in plan(scene(body(DIAMOND))).passes}
+    assert solid["interfaces"].geometry_passes == 2
+    assert 0 < found["interfaces"].cost < solid["interfaces"].cost
+
+
+def test_one_border_names_the_sheets_too() -> None:
+    asked = scene(sheet(DIAMOND, OPEN), body(DIAMOND))
+    for borders in get_args(Borders):
+        (step,) = (step for step in plan(asked, borders=borders).passes if step.name == "interfaces")
+        assert step.reason.startswith("'open box', 'box': ")
+
+
 def test_one_border_needs_no_order_where_bodies_touch() -> None:
     touching = scene(body(DIAMOND), body(WINE, x=0.5))
     assert plan(touching).ordered
@@ -217,6 +238,8 @@ def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
 def test_borders_that_are_not_known_are_refused() -> None:
     with pytest.raises(tl.InputError, match=r"^borders 'back'; not known; use one of both, front$"):
         plan(scene(body()), borders="back")  # type: ignore[arg-type]
+    with tl.Renderer("cpu") as renderer, pytest.raises(tl.InputError, match=r"^borders \['front'\]; not known"):
+        renderer.plan(scene(body()), borders=["front"])  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("method", ["RayMarched", "signed-depth", tl.ThinLayer, 3])
