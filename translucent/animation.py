@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError, RenderError
 from translucent.frame import make_folder, write_atomically, write_png
+from translucent.paths import require_folder, require_place
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -33,22 +34,23 @@ def check_animation(path: Path, fps: float) -> None:
     """
     if not 1.0 <= fps <= 100.0:
         raise InputError(f"{fps} pictures per second", "not in 1 to 100", "give for example 24")
+    asked = f"animation {str(path)!r}"
     if path.is_dir() or not path.suffix:
+        require_folder(path, asked)
         return
     if path.suffix.lower() not in WRITERS:
         raise InputError(
-            f"animation {str(path)!r}",
+            asked,
             f"suffix {path.suffix!r}",
             f"use {', '.join(WRITERS)}, or a folder",
         )
-    if not path.parent.is_dir():
-        raise InputError(f"animation {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
+    require_place(path, asked)
     if path.suffix.lower() == ".mp4":
         try:
             import imageio_ffmpeg  # noqa: F401
         except ImportError:
             raise RenderError(
-                f"animation {str(path)!r}", "the imageio-ffmpeg package is not installed", "pip install imageio-ffmpeg"
+                asked, "the imageio-ffmpeg package is not installed", "pip install imageio-ffmpeg"
             ) from None
 
 

@@ -14,6 +14,7 @@ from translucent.conversion import CLAMP, clamp_colors, summary
 from translucent.errors import InputError
 from translucent.frame import write_atomically
 from translucent.medium import Medium
+from translucent.paths import require_place
 from translucent.swatches import html_strip
 from translucent.tables import Row, check_cells, read_table
 from translucent.units import metres_per_unit
@@ -114,8 +115,7 @@ def check_batch_output(path: Path) -> None:
     """Raise before any work is done where a table could not be written to `path`."""
     if path.suffix.lower() not in (".json", ".csv"):
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .json or .csv")
-    if not path.parent.is_dir():
-        raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
+    require_place(path, f"output {str(path)!r}")
 
 
 def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from translucent.color import srgb_to_linear
 from translucent.environment_map import EnvironmentMap
 from translucent.errors import InputError, RenderError
+from translucent.paths import require_file
 from translucent.radiance_hdr import read_radiance
 
 Pixels = npt.NDArray[Any]
@@ -37,8 +38,7 @@ def read_environment_map(path: str | Path) -> EnvironmentMap:
     read = READERS.get(path.suffix.lower())
     if read is None:
         raise InputError(f"environment {str(path)!r}", f"suffix {path.suffix!r}", f"use one of {', '.join(READERS)}")
-    if not path.is_file():
-        raise InputError(f"environment {str(path)!r}", "no such file", "check the path")
+    require_file(path, f"environment {str(path)!r}")
     return EnvironmentMap(read(path))
 
 

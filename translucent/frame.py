@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from translucent.color import exposure_scale, linear_to_srgb
 from translucent.errors import InputError, RenderError
+from translucent.paths import require_folder, require_place
 from translucent.render_plan import RenderPlan
 from translucent.tone import tone_curve
 
@@ -51,7 +52,7 @@ class Frame:
     plan : RenderPlan
         What ran and why.
     seconds : dict of str to float
-        Time per pass, and ``total`` for the whole call.
+        Time per pass, over all samples, and ``total`` for the whole call.
     provenance : dict of str to str
         Backend, driver and versions.
     layers : (h, w) int32, optional
@@ -173,6 +174,8 @@ class Frame:
 
         Raises
         ------
+        InputError
+            If the folder is a file.
         RenderError
             If they cannot be written.
         """
@@ -253,9 +256,12 @@ def make_folder(folder: Path) -> None:
 
     Raises
     ------
+    InputError
+        If its name, or that of a folder above, is one of a file.
     RenderError
         If it cannot be made.
     """
+    require_folder(folder, f"folder {str(folder)!r}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -268,8 +274,7 @@ def check_output(path: Path) -> None:
     """Raise before any work is done where a frame could not be written to `path`."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
-    if not os.path.isdir(path.parent):  # False, too, for a name that no folder can have
-        raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
+    require_place(path, f"output {str(path)!r}")
     if path.suffix.lower() == ".exr":
         try:
             import OpenEXR  # noqa: F401

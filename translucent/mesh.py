@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,7 @@ import numpy.typing as npt
 from translucent.diagnosis import Diagnosis, diagnose
 from translucent.errors import InputError, TranslucentWarning
 from translucent.grouping import equal_rows, used_vertices
+from translucent.paths import require_file
 from translucent.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
 from translucent.units import metres_per_unit
 from translucent.winding import winding_number
@@ -236,8 +236,7 @@ def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
     import trimesh
 
     asked = f"mesh {str(path)!r}"
-    if not os.path.isfile(path):  # False, too, for a name that no file can have
-        raise InputError(asked, "no such file", "check the path")
+    require_file(path, asked)
     if path.suffix[1:].lower() not in trimesh.available_formats():
         raise InputError(
             asked, f"format {path.suffix or 'without suffix'!r} is not known", "use obj, stl, ply, off or glb"

@@ -357,7 +357,7 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
             "the media end"
         )
         passes = [PassSpec("opaque", reason, opaque, 1, cost=COSTS["opaque"]), *passes]
-    borders = border_passes(scene, COSTS["interfaces"], COSTS["surfaces"])
+    borders = border_passes(scene, method, COSTS["interfaces"], COSTS["surfaces"])
     media = [body.medium for body in scene.bodies if body.medium is not None]
     emits = any(medium.emits for medium in media)
     if emits and isinstance(method, OrderedMethod):

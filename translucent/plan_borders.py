@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import get_args
 
@@ -11,7 +12,7 @@ from translucent.errors import InputError
 from translucent.render_plan import Borders, PassSpec, RenderPlan
 from translucent.scene import Object, Scene
 from translucent.slots import may_overlap
-from translucent.thickness import ThinLayer
+from translucent.thickness import Method, ThinLayer
 
 #: What a plan says in which rays bend at the front border alone.
 ONE_BORDER = (
@@ -23,12 +24,24 @@ ONE_BORDER = (
 _FRONT_COST = {"interfaces": 0.4, "surfaces": 0.45}
 
 
-def border_passes(scene: Scene, draw_cost: float, shade_cost: float) -> tuple[PassSpec, ...]:
+def border_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: float) -> tuple[PassSpec, ...]:
     """The pass that finds borders, and the one that shades them; none where nothing happens at a border."""
     objects = tuple(i for i, body in enumerate(scene.objects) if body.has_interface)
     if not objects:
         return ()
-    names = ", ".join(repr(scene.objects[i].mesh.name) for i in objects)
+    names = _names(scene, objects)
+    if isinstance(method, ThinLayer) or all(scene.objects[i].sheet_thickness is not None for i in objects):
+        # What bends on entering a sheet bends back on leaving it: each has one border, that towards the eye.
+        return (
+            PassSpec(
+                "interfaces",
+                f"{names}: normal and place of the sheet that a ray meets first",
+                objects,
+                1,
+                cost=draw_cost * _FRONT_COST["interfaces"],
+            ),
+            PassSpec("surfaces", f"{_effects(scene, bends=False)}; rays go straight through sheets", cost=shade_cost),
+        )
     found = f"{names}: normal and place of the border where a ray enters, and of the one where it leaves"
     return (
         PassSpec("interfaces", found, objects, 2, cost=draw_cost),
@@ -50,8 +63,8 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
     InputError
         If rays start inside such a body: they have no front border.
     """
-    solids = [scene.objects[i] for step in plan.passes if step.name == "interfaces" for i in step.objects]
-    solids = [body for body in solids if body.sheet_thickness is None]
+    found = [i for step in plan.passes if step.name == "interfaces" for i in step.objects]
+    solids = [scene.objects[i] for i in found if scene.objects[i].sheet_thickness is None]
     if not solids or isinstance(plan.method, ThinLayer):
         return plan
     for body in solids:
@@ -61,9 +74,8 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
                 f"rays start inside {body.mesh.name!r}, and meet no border where they would enter it",
                 'use borders="both", or move the camera outside',
             )
-    names = ", ".join(repr(body.mesh.name) for body in solids)
     told = {
-        "interfaces": f"{names}: normal and place of the border where a ray enters",
+        "interfaces": f"{_names(scene, found)}: normal and place of the border where a ray enters",
         "surfaces": f"{_effects(scene)}; rays bend where they enter and go straight on",
     }
     passes = tuple(
@@ -105,16 +117,20 @@ def touching_borders(scene: Scene) -> str | None:
     return None
 
 
-def _effects(scene: Scene) -> str:
+def _names(scene: Scene, objects: Iterable[int]) -> str:
+    return ", ".join(repr(scene.objects[i].mesh.name) for i in objects)
+
+
+def _effects(scene: Scene, *, bends: bool = True) -> str:
     """What happens at the borders of this scene, in words."""
     bodies = [body for body in scene.bodies if body.has_interface]
     surfaces = [body.surface for body in bodies if body.surface is not None]
     effects = []
     if any(body.medium is not None and body.medium.ior > 1 for body in bodies):
-        effects.append("borders mirror the environment and bend rays (ior above 1)")
+        effects.append(f"borders mirror the environment{' and bend rays' if bends else ''} (ior above 1)")
     if any(surface.roughness > 0 for surface in surfaces):
         effects.append("rough ones blur both")
-    if any(surface.dispersion > 0 for surface in surfaces):
+    if bends and any(surface.dispersion > 0 for surface in surfaces):
         effects.append("dispersion bends each channel on its own")
     if any(surface.transmission < 1 for surface in surfaces):
         effects.append("paint reflects what does not enter")

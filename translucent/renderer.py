@@ -20,6 +20,7 @@ from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
 from translucent.plan import plan, plan_over_backdrop
+from translucent.plan_borders import check_borders
 from translucent.plan_limits import LIGHTS_LEFT_OUT
 from translucent.render_plan import Borders, RenderPlan
 from translucent.scene import Scene
@@ -102,6 +103,7 @@ class Renderer:
         """The plan that `render` would run here, without a backdrop or with one."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
+        check_borders(borders)
         plans = self._plans.setdefault(scene, {})
         if (key := (method, over_backdrop, borders)) not in plans:
             make = plan_over_backdrop if over_backdrop else plan

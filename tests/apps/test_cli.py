@@ -58,6 +58,7 @@ def test_a_bad_model_is_refused(
         (["render", "cube.ply"], "Missing option '-o'"),
         (["explain"], "Missing argument 'MODEL'"),
         (["explain", "a", "b"], "unexpected extra argument"),
+        (["explain", "beer"], "mesh 'beer'; no file and no mesh of the toolkit; give a path, or one of amber, "),
         (["explain", "x.obj", "--method", "magic"], "x.obj'; no such file"),
         (["extinction"], "Missing argument 'COLOR'"),
         (["extinction", "teal"], "Missing argument 'DISTANCE'"),

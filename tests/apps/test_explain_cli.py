@@ -14,9 +14,11 @@ from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
 
 
-def test_an_unreadable_model_is_refused(run: Run, tmp_path: Path) -> None:
-    result = run("explain", tmp_path)
-    assert "no such file" in one_error_line(result)
+@pytest.mark.parametrize("name", ["folder", "folder.glb"])
+def test_a_folder_is_no_model(run: Run, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    result = run("explain", tmp_path / name)
+    assert one_error_line(result).endswith(f"{name}'; it is a folder; give a file in it")
 
 
 def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,17 +109,34 @@ def test_a_camera_that_is_not_there_is_refused_with_those_that_are(
         ("picture.bmp", 2, "suffix '.bmp'; use .png, .exr or .npz"),
         ("picture", 2, "suffix ''; use .png, .exr or .npz"),
         ("missing/picture.png", 2, "; make the folder first"),
-        ("cube.ply/picture.png", 2, "; make the folder first"),
+        ("cube.ply/picture.png", 2, "cube.ply' is no folder; choose another one"),
+        ("folder.png", 2, "folder.png'; a folder of that name is there; choose another name"),
         (f"{'long' * 100}/picture.png", 2, "; make the folder first"),
     ],
 )
 def test_a_bad_output_is_refused_before_any_work(
     run: Run, cube: Path, tmp_path: Path, no_opengl: None, output: str, code: int, message: str
 ) -> None:
+    (tmp_path / "folder.png").mkdir()
     before = sorted(tmp_path.iterdir())
     result = run("render", cube, "-o", tmp_path / output)
     assert message in one_error_line(result, code)
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("output", "option"),
+    [("a.png", ("--aov", "taken/below")), ("taken", ("--turntable", "4")), ("taken/below", ("--turntable", "4"))],
+)
+def test_a_file_where_a_folder_has_to_be_is_found_before_any_work(
+    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_opengl: None, output: str, option: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("taken").write_text("kept")
+    result = run("render", cube, "-o", output, *option)
+    assert one_error_line(result).endswith("'taken' is no folder; choose another one")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.ply", "taken"]
+    assert Path("taken").read_text() == "kept"
 
 
 # Good runs

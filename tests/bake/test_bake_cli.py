@@ -94,6 +94,11 @@ def test_a_fine_mesh_is_baked_to_a_coarse_one(run: Run, ball: Path, tmp_path: Pa
     assert found[found > 0].min() > 2 * (1 - 0.005)
 
 
+def test_the_fine_mesh_may_be_one_of_the_toolkit(run: Run, tmp_path: Path) -> None:
+    result = run("sphere", "-o", tmp_path / "t.npy", *QUICK, "--mode", "normal", "--high", "sphere")
+    assert result.code == 0, result.err
+
+
 def test_vertices(run: Run, ball: Path, ball_glb: Path, tmp_path: Path) -> None:
     assert run(ball, "-o", tmp_path / "t.ply", "--vertices", "--mode", "normal", "--unit", "cm").code == 0
     data = trimesh.load(tmp_path / "t.ply", process=False).metadata["_ply_raw"]["vertex"]["data"]
@@ -155,9 +160,16 @@ def test_the_medium_of_the_material_is_that_of_the_mode(run: Run, ball_glb: Path
         (["bear", "-o", "{}/t.exr", "--max-distance", "x%"], "max_distance 'x%'; not a share", 2),
         (["bear", "-o", "{}/t.exr", "--tolerance", "0"], "--tolerance '0'", 2),
         (["bear", "-o", "{}/t.exr", "--mode", "thick"], "'thick' is not one of", 2),
-        (["bear", "-o", "{}/t.exr", "--mode", "transmittance"], "mode 'transmittance'; no medium", 2),
+        (["bear", "-o", "{}/t.exr", "--mode", "transmittance"], "mode 'transmittance'; no medium.* --color", 2),
+        (["bear", "-o", "{}/t.exr", "--cage", "bear"], "--cage bear; no --high; add --high MESH, or leave it out", 2),
+        (["bear", "-o", "{}/t.exr", "--high-distance", "1%"], "--high-distance 1%; no --high; add", 2),
         (["bear", "-o", "{}/t.exr", "--unit", "furlong"], "comes with the toolkit, in metres", 2),
         (["none.obj", "-o", "{}/t.exr"], "no such file", 2),
+        (
+            ["slab", "-o", "{}/t.exr"],
+            "mesh 'slab'; no file and no mesh of the toolkit; give .* amber, ",
+            2,
+        ),
         (["none.obj", "-o", "{}/t.exr", "--unit", "furlong"], "unit 'furlong'", 2),
         (["bear", "-o", "{}/t.exr", "--high", "none.obj"], "no such file", 2),
         (["bear", "-o", "{}/t.glb", "--mode", "local"], "mode 'local' has no unit", 2),

@@ -93,7 +93,7 @@ def test_they_are_saved_into_a_folder(tmp_path: Path) -> None:
             np.testing.assert_array_equal(np.asarray(picture), aov_pictures(made)[file.stem])
     assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {file.name for file in files}
     (tmp_path / "taken").write_text("")
-    with pytest.raises(tl.RenderError, match=r"folder .*taken'; it cannot be made"):
+    with pytest.raises(tl.InputError, match=r"folder .*taken'; '.*taken' is no folder; choose another one$"):
         made.save_aovs(tmp_path / "taken")
 
 

@@ -190,7 +190,7 @@ def test_such_a_file_is_refused(tmp_path: Path, name: str, content: bytes | None
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match="no such file"):
+    with pytest.raises(tl.InputError, match="it is a folder; give a file in it"):
         load_mesh(tmp_path)
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
 import translucent as tl
-from tests.values.plan_scenes import DIAMOND, ORDERED, TORUS, WINE, body, scene, sheet
+from tests.values.plan_scenes import DIAMOND, OPEN, ORDERED, TORUS, WINE, body, scene, sheet
 from translucent.plan import plan
 from translucent.plan_borders import ONE_BORDER
+from translucent.render_plan import Borders
 
 
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), *ORDERED])
@@ -68,3 +69,26 @@ def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
 def test_borders_that_are_not_known_are_refused() -> None:
     with pytest.raises(tl.InputError, match=r"^borders 'back'; not known; use one of both, front$"):
         plan(scene(body()), borders="back")  # type: ignore[arg-type]
+    with tl.Renderer("cpu") as renderer, pytest.raises(tl.InputError, match=r"^borders \['front'\]; not known"):
+        renderer.plan(scene(body()), borders=["front"])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("objects", "method"),
+    [([sheet(DIAMOND)], None), ([sheet(DIAMOND), body()], None), ([body(DIAMOND)], tl.ThinLayer())],
+)
+def test_sheets_have_one_border_and_bend_no_ray(objects: list[tl.Object], method: Any) -> None:
+    found = {step.name: step for step in plan(scene(*objects), method).passes}
+    assert found["interfaces"].reason.endswith("normal and place of the sheet that a ray meets first")
+    assert found["interfaces"].geometry_passes == 1
+    assert found["surfaces"].reason == "borders mirror the environment (ior above 1); rays go straight through sheets"
+    solid = {step.name: step for step in plan(scene(body(DIAMOND))).passes}
+    assert solid["interfaces"].geometry_passes == 2
+    assert 0 < found["interfaces"].cost < solid["interfaces"].cost
+
+
+def test_one_border_names_the_sheets_too() -> None:
+    asked = scene(sheet(DIAMOND, OPEN), body(DIAMOND))
+    for borders in get_args(Borders):
+        (step,) = (step for step in plan(asked, borders=borders).passes if step.name == "interfaces")
+        assert step.reason.startswith("'open box', 'box': ")

@@ -36,6 +36,7 @@ from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
+from translucent.paths import require_file
 from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
@@ -130,8 +131,7 @@ def content_hash(job: Job) -> str:
 
 def _parts(path: Path) -> list[bytes]:
     """A file and, of a .gltf, what it links to."""
-    if not path.is_file():
-        raise InputError(f"mesh {str(path)!r}", "no such file", "check the path")
+    require_file(path, f"mesh {str(path)!r}")
     try:
         data = [path.read_bytes()]
     except OSError as error:

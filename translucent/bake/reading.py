@@ -11,6 +11,7 @@ from translucent.bake.encoding import Encoding
 from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
 from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.paths import require_file
 
 Array = npt.NDArray[np.float64]
 
@@ -38,8 +39,7 @@ def load_thickness_map(path: str | Path) -> Array:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(asked, f"suffix {path.suffix!r}", f"give one of {', '.join(_READERS)}")
-    if not path.is_file():
-        raise InputError(asked, "no such file", "check the path")
+    require_file(path, asked)
     try:
         scale, offset, stored = reader(path)
     except TranslucentError:

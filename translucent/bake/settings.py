@@ -76,7 +76,9 @@ class BakeSettings:
             return
         if self.medium is None:
             raise InputError(
-                "mode 'transmittance'", "no medium", "give one, for example tl.Medium.from_color('#7b1e3a', 0.01)"
+                "mode 'transmittance'",
+                "no medium",
+                "give one, for example tl.Medium.from_color('#7b1e3a', 0.01), or --color '#7b1e3a' --distance 1cm",
             )
         if not (self.medium.extinction > 0).any():
             raise InputError(

@@ -31,6 +31,7 @@ from translucent.bake.encoding import Encoding
 from translucent.bake.record import DEFINITIONS, Record, describe, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
 from translucent.frame import write_atomically
+from translucent.paths import require_place
 
 if TYPE_CHECKING:
     from translucent.bake.thickness_map import ThicknessMap, VertexThickness
@@ -105,10 +106,7 @@ def check_map_output(
     asked, suffix = f"output {str(path)!r}", path.suffix.lower()
     if suffix not in suffixes:
         raise InputError(asked, f"suffix {path.suffix!r}", f"use {', '.join(suffixes[:-1])} or {suffixes[-1]}")
-    if not os.path.isdir(path.parent):  # False, too, for a name that no folder can have
-        raise InputError(asked, f"no folder {str(path.parent)!r}", "make the folder first")
-    if os.path.isdir(path):
-        raise InputError(asked, "a folder of that name is there", "choose another name")
+    require_place(path, asked)
     if not os.access(path.parent, os.W_OK):
         raise RenderError(asked, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
     if suffix == ".glb" and (normalize or invert):

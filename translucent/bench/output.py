@@ -12,6 +12,7 @@ from translucent.bench.page.figure import require_packages
 from translucent.bench.page.overview import has_overview, write_overview
 from translucent.bench.record import Report
 from translucent.errors import RenderError
+from translucent.paths import require_folder
 
 
 def check_folder(folder: Path) -> None:
@@ -19,9 +20,12 @@ def check_folder(folder: Path) -> None:
 
     Raises
     ------
+    InputError
+        If its name, or that of a folder above, is one of a file.
     RenderError
         If it cannot be made or written to, or what draws the page is not installed.
     """
+    require_folder(folder, f"output {str(folder)!r}")
     require_packages()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -31,7 +35,7 @@ def check_folder(folder: Path) -> None:
         raise RenderError(
             f"output {str(folder)!r}",
             f"it is no folder that can be written to ({error.strerror or error})",
-            "check the path and its permissions",
+            "check its permissions",
         ) from error
 
 

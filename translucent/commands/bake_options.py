@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.common import F, medium_options, read_medium, unit_option
+from translucent.commands.model import mesh_file
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -91,19 +92,23 @@ def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
         If a value is wrong.
     """
     unit = given["unit"]
+    if given["high"] is None:
+        for name in ("cage", "high_distance"):
+            if given[name] is not None:
+                raise InputError(f"{_option(name)} {given[name]}", "no --high", "add --high MESH, or leave it out")
     settings = {name: given[name] for name in _SETTINGS}
     settings |= {name: _read_length(name, given[name], unit) for name in _LENGTHS if given[name] is not None}
     if given["tile"] is not None:
         settings["tile"] = given["tile"]
     medium = read_medium(given["color"], given["distance"], given["preset_name"])
     job = {
-        "model": _mesh_file(model, unit),
+        "model": mesh_file(model, unit),
         "output": str(output),
         "unit": unit,
         "settings": settings,
         "medium": None if medium is None else medium.extinction.tolist(),
     }
-    job |= {name: given[name] for name in ("high", "cage") if given[name] is not None}
+    job |= {name: mesh_file(given[name], unit) for name in ("high", "cage") if given[name] is not None}
     return job | {name: True for name in _FLAGS if given[name]}
 
 
@@ -116,15 +121,8 @@ def _read_length(name: str, text: str, unit: str) -> float | str:
     try:
         return parse_length(text, unit)
     except InputError as error:
-        raise InputError(f"--{name.replace('_', '-')} {text!r}", str(error)) from None
+        raise InputError(f"{_option(name)} {text!r}", str(error)) from None
 
 
-def _mesh_file(model: str, unit: str) -> str:
-    """The file of MODEL, which may be the name of a mesh of the toolkit."""
-    from translucent.assets import mesh_names, mesh_path
-
-    if model not in mesh_names() or Path(model).exists():
-        return model
-    if unit != "m":
-        raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
-    return str(mesh_path(model))
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -87,14 +88,28 @@ def require_translucent(model: str, scene: Scene) -> None:
 
 def read_mesh(model: str, unit: str) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
-    from translucent.assets import mesh_names, mesh_path
     from translucent.mesh import load_mesh
 
-    if model in mesh_names() and not Path(model).exists():
+    return load_mesh(mesh_file(model, unit), unit=unit)
+
+
+def mesh_file(model: str, unit: str) -> str:
+    """The file of a mesh, which may be the name of one of the toolkit's own."""
+    from translucent.assets import mesh_names, mesh_path
+
+    if os.path.lexists(model):
+        return model
+    if model in mesh_names():
         if unit != "m":
             raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
-        return load_mesh(mesh_path(model))
-    return load_mesh(model, unit=unit)
+        return str(mesh_path(model))
+    if not os.path.dirname(model) and not Path(model).suffix:
+        raise InputError(
+            f"mesh {model!r}",
+            "no file and no mesh of the toolkit",
+            f"give a path, or one of {', '.join(sorted(mesh_names()))}",
+        )
+    return model
 
 
 def _placed_camera(scene: Scene, view: View, size: tuple[int, int]) -> Camera:

@@ -33,8 +33,11 @@ class Pictures(NamedTuple):
         """Raise before any work is done where they could not be written."""
         from translucent.animation import check_animation
         from translucent.frame import check_exposure, check_output
+        from translucent.paths import require_folder
 
         check_exposure(self.exposure)
+        if self.aov is not None:
+            require_folder(self.aov, f"--aov {str(self.aov)!r}")
         if self.turntable is None:
             check_output(self.output)
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import shlex
 import sys
@@ -24,7 +25,7 @@ PATH = click.Path(path_type=Path)
 @click.command(epilog="Example: translucent report model.stl --unit mm -o out/report --quick")
 @click.argument("models", nargs=-1, metavar="[MODEL...]")
 @click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for report.html, .svg, .json and .csv.")
-@click.option("--quick", is_flag=True, help="Under a minute: fewer scenes, methods, pixels and repetitions.")
+@click.option("--quick", is_flag=True, help="About a minute: fewer scenes, methods, pixels and repetitions.")
 @click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
 @click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
 @click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
@@ -105,7 +106,9 @@ def _measured(
         if output is not None:
             write_report(part, output / "report.json")
 
-    with click.progressbar(length=1, file=sys.stderr, item_show_func=str) as bar:
+    # Where nobody watches, the bar would be an empty line before an error.
+    shown_in = sys.stderr if sys.stderr.isatty() else io.StringIO()
+    with click.progressbar(length=1, file=shown_in, item_show_func=str) as bar:
 
         def progress(what: str, done: int, parts: int) -> None:
             bar.length = parts

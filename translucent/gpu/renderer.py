@@ -90,9 +90,10 @@ class GpuRenderer:
         with self.context.current():
             job = self.prepare(scene, size, plan, backdrop)
             try:
+                self._timer.begin_frame()
                 if samples > 1:
                     self._average(job, samples)
-                self.run(job)
+                self._run_passes(job)
                 return self.read(job, samples)
             finally:
                 job.release()
@@ -136,6 +137,9 @@ class GpuRenderer:
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
         self._timer.begin_frame()
+        self._run_passes(job, geometry_only=geometry_only)
+
+    def _run_passes(self, job: FrameJob, *, geometry_only: bool = False) -> None:
         for spec in job.plan.passes:
             if geometry_only and not spec.geometry_passes:
                 continue
@@ -208,8 +212,7 @@ class GpuRenderer:
         job.averaging = True
         for right, down in sample_shifts(samples):
             job.place((right, down))
-            for spec in job.plan.passes:
-                self._pass(PASSES[spec.name]).run(job, spec)
+            self._run_passes(job)
         job.averaging = False
         job.place((0.0, 0.0))
 

@@ -9,12 +9,12 @@ import moderngl
 
 
 class PassTimer:
-    """OpenGL timer queries by name; the results are read only after the frame, so that nothing waits for them."""
+    """OpenGL timer queries by name; read after the frame, or a sample later, so that drawing does not wait for them."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._queries: dict[str, moderngl.Query] = {}
-        self._used: list[str] = []
+        self._seconds: dict[str, float] = {}  # of what was drawn in the frame before what the query has measured last
         # Mesa's software rasteriser measures the first query of a context from the beginning of time.
         texture = gl.texture((1, 1), 1)
         framebuffer = gl.framebuffer([texture])
@@ -27,17 +27,19 @@ class PassTimer:
 
     def begin_frame(self) -> None:
         """Forget the previous frame's times."""
-        self._used.clear()
+        self._seconds.clear()
 
     @contextmanager
     def measure(self, name: str) -> Iterator[None]:
-        """Time what is drawn inside; once per name and frame."""
+        """Time what is drawn inside; what a name is given to more than once in a frame adds up."""
         if name not in self._queries:
             self._queries[name] = self._gl.query(time=True)
-        with self._queries[name]:
+        query = self._queries[name]
+        before = self._seconds[name] + query.elapsed * 1e-9 if name in self._seconds else 0.0
+        with query:
             yield
-        self._used.append(name)
+        self._seconds[name] = before
 
     def seconds(self) -> dict[str, float]:
         """Seconds per name, in the order of the frame; waits for the GPU."""
-        return {name: self._queries[name].elapsed * 1e-9 for name in self._used}
+        return {name: before + self._queries[name].elapsed * 1e-9 for name, before in self._seconds.items()}

@@ -20,6 +20,7 @@ from urllib.parse import quote, unquote
 from translucent.errors import InputError
 from translucent.frame import write_atomically
 from translucent.materials.gltf_pack import gather
+from translucent.paths import require_file, require_place
 
 Json = dict[str, Any]
 
@@ -94,8 +95,7 @@ def read_gltf(path: str | Path) -> GltfFile:
     """
     path = Path(path)
     asked = f"glTF {str(path)!r}"
-    if not os.path.isfile(path):  # False, too, for a name that no file can have
-        raise InputError(asked, "no such file", "check the path")
+    require_file(path, asked)
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -183,10 +183,7 @@ def check_gltf_output(path: Path) -> None:
     """Raise `InputError` if `path` is no name for a glTF file in an existing folder."""
     if path.suffix.lower() not in (".glb", ".gltf"):
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .glb or .gltf")
-    if not os.path.isdir(path.parent):
-        raise InputError(f"output {str(path)!r}", f"no folder {str(path.parent)!r}", "make the folder first")
-    if os.path.isdir(path):
-        raise InputError(f"output {str(path)!r}", "a folder of that name is there", "choose another name")
+    require_place(path, f"output {str(path)!r}")
 
 
 def _is_link(holder: Json) -> bool:
