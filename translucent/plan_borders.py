@@ -94,14 +94,21 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
 
 def _starts_inside(scene: Scene, body: Object) -> bool:
     """Whether rays of the camera may start inside a body."""
-    low, high = body.bounds - scene.camera.eye
     if scene.camera.fov_y is None:
-        # Whether the picture's plane cuts the bounds.
-        forward = scene.camera.forward
-        return bool(np.where(forward > 0, low, high) @ forward < 0 < np.where(forward > 0, high, low) @ forward)
+        return picture_cuts(scene, body)
+    low, high = body.bounds - scene.camera.eye
     around = bool((low <= 0).all() and (high >= 0).all())
     # On a surface the winding number is the mean of both sides.
     return around and round(abs(body.winding_number(scene.camera.eye)), 6) >= 0.5
+
+
+def picture_cuts(scene: Scene, body: Object) -> bool:
+    """Whether an orthographic picture's plane, where its rays start, cuts the bounds of a body."""
+    if scene.camera.fov_y is not None:
+        return False
+    low, high = body.bounds - scene.camera.eye
+    forward = scene.camera.forward
+    return bool(np.where(forward > 0, low, high) @ forward < 0 < np.where(forward > 0, high, low) @ forward)
 
 
 def touching_borders(scene: Scene) -> str | None:

@@ -59,6 +59,20 @@ def test_white_furnace_of_a_sheet_and_from_inside(renderer: tl.Renderer) -> None
     np.testing.assert_allclose(renderer.render(inside, SIZE).radiance, 1.0, atol=1e-5)
 
 
+@pytest.mark.parametrize("method", [tl.SignedDepth(), tl.BackFaceDepth(), tl.DepthPeeling(), tl.FragmentLists()])
+def test_rays_of_an_orthographic_picture_that_cuts_a_body_bend_where_they_leave(
+    renderer: tl.Renderer, method: tl.Method
+) -> None:
+    pose = np.eye(4)
+    pose[2, 3] = 0.2
+    camera = tl.Camera(pose, None, 0.8)  # as far as borders mirror little inside
+    scene = tl.Scene([tl.Object(BALL, tl.Medium(ior=1.5))], camera, environment=tl.Environment.studio())
+    frame, truth = renderer.render(scene, (24, 24), method), tl.reference.render(scene, (24, 24), bounces=4)
+    assert frame.coverage.all()
+    off = np.abs(frame.radiance - truth.radiance).max(axis=2)
+    assert np.median(off) < 0.01  # 0.02 if they went straight
+
+
 @pytest.mark.parametrize("kind", LOSSLESS)
 def test_white_furnace_of_one_border(renderer: tl.Renderer, kind: str) -> None:
     medium, surface = LOSSLESS[kind]

@@ -9,6 +9,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import CONSTANTS, set_uniform
 from translucent.gpu.textures import texture_units
+from translucent.plan_borders import picture_cuts
 from translucent.render_plan import PassSpec
 from translucent.scene import Object
 from translucent.surface import Surface
@@ -28,6 +29,7 @@ class InterfacesPass:
         nothing = float(CONSTANTS["NOTHING"])
         sheets = tuple(i for i in spec.objects if i in job.sheets)
         solids = tuple(i for i in spec.objects if i not in sheets)
+        starts_inside = job.starts_inside or any(picture_cuts(job.scene, job.scene.objects[i]) for i in solids)
         for back in (False,) if job.one_border else (False, True):
             framebuffer = job.targets.left() if back else job.targets.entered()
             framebuffer.use()
@@ -37,7 +39,7 @@ class InterfacesPass:
             job.gl.cull_face = "front" if back else "back"
             job.bind_opaque(_UNITS["opaque_place"])
             exits = back and job.finds_exits
-            beyond = back and not exits and not job.starts_inside
+            beyond = back and not exits and not starts_inside
             if beyond:
                 job.targets.entered().color_attachments[0].use(_UNITS["entered"])
             if exits:
