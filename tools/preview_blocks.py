@@ -17,6 +17,9 @@ from translucent.preview.desk import Desk
 from translucent.preview.document import Document, Model
 from translucent.preview.script import Script, Step, perform, read_step
 
+#: Seconds after which the user does the next thing, whatever is under way.
+PATIENCE = 8.0
+
 #: What the user does, with the words of scripts.
 ACTIONS: tuple[dict[str, object], ...] = (
     {"do": "turn", "right": 20.0},
@@ -61,11 +64,15 @@ class Longest(Script):
                 longest, drawing = frame, desk.stage.drawing
             self.told[-1] = label, longest, drawing, now - self.began
         self.last = now
-        if (self.told and now - self.began < 0.4) or desk.more or desk.work.loaded is None:
+        loading = desk.work.loaded is None or desk.work.lanes["load"].task is not None
+        if not self.told and (loading or desk.more):
             return False
         if self.told:
-            label, longest, drawing, rest = self.told[-1]
-            print(f"{label:52} {1e3 * longest:7.0f} ms, {1e3 * drawing:7.0f} of drawing; at rest after {rest:6.1f} s")
+            label, longest, drawing, spent = self.told[-1]
+            if spent < 0.4 or loading or (desk.more and spent < PATIENCE):
+                return False
+            rest = "not at rest" if desk.more else "at rest"
+            print(f"{label:52} {1e3 * longest:7.0f} ms, {1e3 * drawing:7.0f} of drawing; {rest} after {spent:6.1f} s")
             sys.stdout.flush()
         if not self.steps:
             return True

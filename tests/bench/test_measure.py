@@ -24,7 +24,7 @@ from translucent.bench.run import Effort, measure_all
 from translucent.bench.scaling import ScalingRun
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.table import table
-from translucent.gpu.targets import Targets
+from translucent.gpu.storage import Storage
 from translucent.solids import Sphere
 
 #: Rounds are few and frames small: what is tested is that there are numbers.
@@ -283,7 +283,7 @@ def test_cost_is_measured_along_an_axis_and_limits_are_told(studio: Studio, monk
     monkeypatch.setattr(scaling, "METHODS", {"SignedDepth": tl.SignedDepth(), "KBuffer": tl.KBuffer(k=256)})
     ladder = scaling.Ladder("layers", "16 x 16", {2: layers(2), 20: layers(20), 30: gone})  # type: ignore[dict-item]
     monkeypatch.setattr(ScalingRun, "ladders", lambda self: [ladder])
-    monkeypatch.setattr(Targets, "largest_storage", 1000)
+    monkeypatch.setattr(Storage, "largest", 1000)
     *_, (name, series) = ScalingRun(studio, 0.0, quick=True).steps()
     assert name == "layers 30"
     found = {one.family: one.points for one in series}

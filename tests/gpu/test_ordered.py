@@ -12,7 +12,7 @@ import trimesh
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.gpu.targets import Targets
+from translucent.gpu.storage import Storage
 from translucent.metrics import interior
 from translucent.solids import Box, Sphere
 
@@ -339,16 +339,16 @@ def test_lists_grow_until_everything_fits(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(fragment_lists, "_FIRST_NODES_PER_PIXEL", 0)
     with tl.Renderer() as renderer:
         assert_equal_to_reference(renderer, shells(12), (96, 72), tl.FragmentLists())
-        grown = renderer.gpu._targets.storage("nodes", 0)  # type: ignore[union-attr]
+        grown = renderer.gpu._targets.buffers.get("nodes", 0)  # type: ignore[union-attr]
         renderer.render(shells(12), (96, 72), tl.FragmentLists())
-        assert renderer.gpu._targets.storage("nodes", 0) is grown  # type: ignore[union-attr]
+        assert renderer.gpu._targets.buffers.get("nodes", 0) is grown  # type: ignore[union-attr]
 
 
 def test_lists_that_no_buffer_holds_are_made_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
     size = (96, 72)
     with tl.Renderer() as renderer:
         whole = renderer.render(shells(12), size, tl.FragmentLists())
-    monkeypatch.setattr(Targets, "largest_storage", property(lambda _: 4 * 96 * 72 + 8))
+    monkeypatch.setattr(Storage, "largest", property(lambda _: 4 * 96 * 72 + 8))
     with tl.Renderer() as renderer:
         banded = renderer.render(shells(12), size, tl.FragmentLists())
     for name in ("radiance", "thickness", "layers", "valid"):
@@ -356,7 +356,7 @@ def test_lists_that_no_buffer_holds_are_made_in_bands(monkeypatch: pytest.Monkey
 
 
 def test_a_buffer_that_opengl_cannot_hold_is_one_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Targets, "largest_storage", property(lambda _: 1000))
+    monkeypatch.setattr(Storage, "largest", property(lambda _: 1000))
     with tl.Renderer() as renderer, pytest.raises(tl.RenderError, match=r"no room for 2 MB of surfaces.*DepthPeeling"):
         renderer.render(shells(3), (160, 120), tl.KBuffer(k=31))
 

@@ -1,4 +1,4 @@
-"""What frames share on the GPU, uploaded once: meshes, densities, environments and textures."""
+"""What frames share on the GPU, uploaded once: meshes, densities, environments, textures, and what lights see."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import moderngl
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.densities import GridTexture
 from translucent.gpu.environment_maps import EnvironmentMaps
+from translucent.gpu.storage import Storage
 from translucent.gpu.textures import TextureCache
 
 
@@ -18,8 +19,10 @@ class Resources:
         self.grids = GridTexture(gl)
         self.environments = EnvironmentMaps(gl)
         self.textures = TextureCache(gl)
+        #: What lights see is the same for frames of all sizes.
+        self.light_lists = Storage(gl, "light that media scatter")
 
     def release(self) -> None:
         """Free all of it."""
-        for cache in (self.meshes, self.grids, self.environments, self.textures):
+        for cache in (self.meshes, self.grids, self.environments, self.textures, self.light_lists):
             cache.release()

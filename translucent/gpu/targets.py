@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import moderngl
 
 from translucent.errors import RenderError
+from translucent.gpu.storage import Storage
 
 Size = tuple[int, int]
 
 
 class Targets:
-    """Framebuffers of one frame size, by what they hold."""
+    """Framebuffers of one frame size, by what they hold, and buffers for the lists of its pixels."""
 
     def __init__(self, gl: moderngl.Context, size: Size) -> None:
         limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
@@ -23,7 +22,7 @@ class Targets:
         self._gl = gl
         self.size = size
         self._framebuffers: dict[str, moderngl.Framebuffer] = {}
-        self._buffers: dict[str, moderngl.Buffer] = {}
+        self.buffers = Storage(gl, f"frame size {size[0]}x{size[1]}")
 
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:
         """Where thickness passes add up: RG32F (path, count), or RGBA32F (optical depth, count) and R32F (path)."""
@@ -79,43 +78,11 @@ class Targets:
             self._framebuffers["depth_only"] = self._gl.framebuffer(depth_attachment=self._gl.depth_texture(self.size))
         return self._framebuffers["depth_only"]
 
-    def storage(self, name: str, size: int) -> moderngl.Buffer:
-        """A buffer of at least `size` bytes that shaders write to; what it held is lost where it has to grow.
-
-        Raises
-        ------
-        RenderError
-            If a shader of this OpenGL cannot reach that many bytes, or there is no room for them.
-        """
-        buffer = self._buffers.get(name)
-        if buffer is not None and buffer.size >= size:
-            return buffer
-        if buffer is not None:
-            buffer.release()
-            del self._buffers[name]
-        try:
-            if size > self.largest_storage:
-                raise moderngl.Error(f"a shader reaches {self.largest_storage / 1e6:.0f} MB")
-            self._buffers[name] = self._gl.buffer(reserve=size)
-        except moderngl.Error as error:
-            raise RenderError(
-                f"frame size {self.size[0]}x{self.size[1]}",
-                f"OpenGL has no room for {size / 1e6:.0f} MB of surfaces ({error})",
-                "use DepthPeeling, render in parts, or smaller",
-            ) from error
-        return self._buffers[name]
-
-    @cached_property
-    def largest_storage(self) -> int:
-        """Bytes of a buffer that a shader can write to."""
-        return int(self._gl.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
-
     def bytes_per_pixel(self) -> int:
         """Bytes that the color targets and buffers in use take for each pixel."""
         textures = [t for f in self._framebuffers.values() for t in f.color_attachments]
-        buffers = sum(buffer.size for buffer in self._buffers.values())
         per_pixel = sum(t.components * (1 if t.dtype == "f1" else 4) for t in textures)
-        return int(per_pixel + buffers // (self.size[0] * self.size[1]))
+        return int(per_pixel + self.buffers.size // (self.size[0] * self.size[1]))
 
     def _get(
         self,
@@ -169,6 +136,4 @@ class Targets:
                 framebuffer.depth_attachment.release()
             framebuffer.release()
         self._framebuffers.clear()
-        for buffer in self._buffers.values():
-            buffer.release()
-        self._buffers.clear()
+        self.buffers.release()

@@ -55,9 +55,9 @@ class FragmentListsPass:
             capacity = self._nodes(job).size // _NODE
             if needed <= capacity:
                 self._walk(job, first, last)
-            elif needed * _NODE <= job.targets.largest_storage:
-                size = min(int(needed * _SLACK) * _NODE, job.targets.largest_storage // _NODE * _NODE)
-                job.targets.storage("nodes", size)
+            elif needed * _NODE <= job.targets.buffers.largest:
+                size = min(int(needed * _SLACK) * _NODE, job.targets.buffers.largest // _NODE * _NODE)
+                job.targets.buffers.get("nodes", size)
                 pending.append((first, last))
             elif last - first > 1:
                 middle = (first + last) // 2
@@ -65,20 +65,20 @@ class FragmentListsPass:
             else:
                 raise RenderError(
                     f"frame of {width}x{height} with FragmentLists",
-                    f"one row has {needed} surfaces, and this OpenGL holds {job.targets.largest_storage // _NODE}",
+                    f"one row has {needed} surfaces, and this OpenGL holds {job.targets.buffers.largest // _NODE}",
                     "use DepthPeeling",
                 )
 
     def _nodes(self, job: FrameJob) -> moderngl.Buffer:
         width, height = job.targets.size
-        first = min(_FIRST_NODES_PER_PIXEL * width * height * _NODE, job.targets.largest_storage // _NODE * _NODE)
-        return job.targets.storage("nodes", max(first, _NODE))
+        first = min(_FIRST_NODES_PER_PIXEL * width * height * _NODE, job.targets.buffers.largest // _NODE * _NODE)
+        return job.targets.buffers.get("nodes", max(first, _NODE))
 
     def _draw(self, job: FrameJob, spec: PassSpec, first: int, last: int) -> int:
         """Make the lists of some rows; returns how many nodes they need."""
         gl = job.gl
         width, height = job.targets.size
-        count, heads = job.targets.storage("count", 4), job.targets.storage("heads", 4 * width * height)
+        count, heads = job.targets.buffers.get("count", 4), job.targets.buffers.get("heads", 4 * width * height)
         count.write(np.zeros(1, np.uint32))
         heads.clear()
         for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, self._nodes(job))):

@@ -24,7 +24,7 @@ class KBufferPass:
         assert isinstance(job.plan.method, KBuffer)
         gl, k = job.gl, job.plan.method.k
         width, height = job.targets.size
-        words = job.targets.storage("words", 4 * (k + 1) * width * height)
+        words = job.targets.buffers.get("words", 4 * (k + 1) * width * height)
         # A count of 0, and k times no crossing.
         words.clear(chunk=np.array([0] + [0xFFFFFFFF] * k, np.uint32).tobytes(), size=4 * (k + 1) * width * height)
         words.bind_to_storage_buffer(0)

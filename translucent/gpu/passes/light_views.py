@@ -63,17 +63,17 @@ class LightViewsPass:
         job.bind()
         for name, binding in _READ.items():
             if name != "light_ends" or job.scene.opaque:
-                job.targets.storage(name, 1).bind_to_storage_buffer(binding)
+                job.resources.light_lists.get(name, 1).bind_to_storage_buffer(binding)
 
     def _look(self, job: FrameJob, spec: PassSpec) -> LightViews:
         """What all lights see, in the largest views that fit."""
         for side in _SIDES:
             if (found := self._look_closely(job, spec, side)) is not None:
                 return found
+        megabytes = job.resources.light_lists.largest / 1e6
         raise RenderError(
             f"{len(job.scene.lights)} lights on media that scatter",
-            f"what they see does not fit into the {job.targets.largest_storage / 1e6:.0f} MB that a shader of this "
-            "OpenGL reaches",
+            f"what they see does not fit into the {megabytes:.0f} MB that a shader of this OpenGL reaches",
             "use fewer lights, or simpler bodies",
         )
 
@@ -97,18 +97,19 @@ class LightViewsPass:
 
     def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> bool:
         """Make all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
-        storage, cells = job.targets.storage, sum(_cells(light_job) for light_job in jobs)
+        lists = job.resources.light_lists
+        cells = sum(_cells(light_job) for light_job in jobs)
         # Where a light is inside, each of its lists begins with a crossing of its own.
         spare = sum(_cells(light_job) for light_job in jobs if light_job.starts_inside)
-        most = job.targets.largest_storage // max(_NODE, _MEDIUM)
-        if 4 * cells > job.targets.largest_storage or spare > most:
+        most = lists.largest // max(_NODE, _MEDIUM)
+        if 4 * cells > lists.largest or spare > most:
             return False
-        heads, count = storage("light_heads", 4 * cells), storage("light_count", 4)
+        heads, count = lists.get("light_heads", 4 * cells), lists.get("light_count", 4)
         if job.scene.opaque:
-            storage("light_ends", 4 * cells).bind_to_storage_buffer(_ENDS)
+            lists.get("light_ends", 4 * cells).bind_to_storage_buffer(_ENDS)
         needed = min(int(_FIRST_SHARE * cells) + 1, most)
         while True:
-            nodes, media = storage("light_nodes", _NODE * needed), storage("light_media", _MEDIUM * needed)
+            nodes, media = lists.get("light_nodes", _NODE * needed), lists.get("light_media", _MEDIUM * needed)
             count.write(np.zeros(1, np.uint32))
             heads.clear()
             for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, nodes), (_MEDIA, media)):
@@ -167,7 +168,7 @@ class LightViewsPass:
 
 
 def _seen(job: FrameJob) -> object:
-    """Equal for frames in which lights see the same and the same buffers hold it; keeps nothing alive."""
+    """Equal for frames in which lights see the same; keeps nothing alive."""
     scene = job.scene
     objects = tuple(
         (
@@ -180,7 +181,7 @@ def _seen(job: FrameJob) -> object:
         )
         for body in scene.objects
     )
-    return weakref.ref(job.targets), objects, tuple(_light_key(light) for light in scene.lights), scene.overlap
+    return objects, tuple(_light_key(light) for light in scene.lights), scene.overlap
 
 
 def _light_key(light: Light) -> tuple[object, ...]:
