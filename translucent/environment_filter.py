@@ -79,10 +79,16 @@ def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
 
 @lru_cache(maxsize=KEPT)
 def _filtered(source: EnvironmentMap) -> FilteredEnvironment:
-    pixels, cosines = _sized(source, LEVEL_SIZE), _cosines(*LEVEL_SIZE)
     roughness = np.arange(1, LEVELS + 1) / LEVELS
-    with np.errstate(under="ignore"):
-        levels = np.stack([_convolved(pixels, ggx_lobe(cosines, alpha)) for alpha in roughness**2]).astype(np.float32)
+    color = source.pixels[0, 0]
+    if (source.pixels == color).all():  # which blurring leaves as it is
+        levels = np.full((LEVELS, *LEVEL_SIZE, 3), color, dtype=np.float32)
+    else:
+        pixels, cosines = _sized(source, LEVEL_SIZE), _cosines(*LEVEL_SIZE)
+        with np.errstate(under="ignore"):
+            levels = np.stack([_convolved(pixels, ggx_lobe(cosines, alpha)) for alpha in roughness**2]).astype(
+                np.float32
+            )
     return FilteredEnvironment(source, levels, roughness, irradiance_map(source).pixels.astype(np.float32))
 
 

@@ -152,10 +152,21 @@ def _light(look: Look) -> DirectionalLight:
 @lru_cache(maxsize=2)
 def _environment(name: str, background: str, rotation: float, scene: Scene) -> Environment:
     """What lights the scene; kept, since what is made of it for rough surfaces is kept with it."""
-    lit = named_environment(name) if name else scene.environment
+    lit = environment_of(name) if name else scene.environment
     if lit.kind == "image" and rotation:
         lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
-    return lit.with_background(named_environment(background)) if background else lit
+    return lit.with_background(environment_of(background)) if background else lit
+
+
+def environment_of(name: str) -> Environment:
+    """The environment of a name, or of a file as it is now; the last ones are kept."""
+    path = Path(name)
+    return _environment_of(name, path.stat().st_mtime_ns if path.is_file() else 0)
+
+
+@lru_cache(maxsize=4)
+def _environment_of(name: str, written: int) -> Environment:
+    return named_environment(name)
 
 
 @lru_cache(maxsize=4)

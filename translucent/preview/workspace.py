@@ -19,6 +19,7 @@ from translucent.preview.baking import Bake, bake_map
 from translucent.preview.document import Document, Model, Orbit
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
+from translucent.preview.lighting import Lighting, prepare
 from translucent.preview.measuring import Measured, Measuring, Truth, truth_levels
 from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
@@ -82,7 +83,10 @@ class Workspace:
             "truth": Lane("truth"),
             "bake": Lane("bake"),
             "ray": Lane("ray"),
+            "light": Lane("light"),
         }
+        self._lighting = Lighting(self.lanes["light"])
+        self.lanes["light"].start("filtering the environment", prepare, lambda _: None)
         self._models: list[Loaded] = []
         self._refused: Model | None = None
         self._scene: tuple[Document, Loaded, Scene] | None = None
@@ -165,11 +169,12 @@ class Workspace:
 
     def scene(self) -> Scene | None:
         """What is to be seen; the same object for as long as nothing about it changes."""
-        document, loaded = self.document, self.loaded
-        if loaded is None or document.orbit is None:
+        loaded = self.loaded
+        if loaded is None or self.document.orbit is None:
             return None
+        document = self._lighting.lit(self.document)
         if self.bake is not None and self.show_bake:
-            return self.bake.seen_from(document.orbit)
+            return self.bake.seen_from(self.document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
             same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))

@@ -1,0 +1,65 @@
+"""Environments of files, which take a second to read: in the background, with the one before on show meanwhile."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+from translucent.brdf_table import brdf_table
+from translucent.environment_files import READERS
+from translucent.environment_filter import filtered
+from translucent.preview.document import Document
+from translucent.preview.scenes import environment_of
+from translucent.preview.tasks import Lane, Task
+
+#: What lights, and what is behind.
+Names = tuple[str, str]
+
+
+@dataclass
+class Lighting:
+    """Reads what documents ask for.
+
+    Parameters
+    ----------
+    lane : Lane
+    """
+
+    lane: Lane
+    _ready: Names = ("", "")
+    _asked: Names | None = None
+
+    def lit(self, document: Document) -> Document:
+        """The document, with the environments before if its own have not been read."""
+        look = document.look
+        wanted = look.environment, look.background
+        if not any(map(_is_file, wanted)):
+            self._ready, self._asked = wanted, None
+        elif wanted != self._asked:
+            self._asked = wanted
+            self.lane.start("reading the environment", lambda _: _prepare(wanted), lambda _: self._take(wanted))
+        if wanted == self._ready:
+            return document
+        environment, background = self._ready
+        return dataclasses.replace(
+            document, look=dataclasses.replace(look, environment=environment, background=background)
+        )
+
+    def _take(self, names: Names) -> None:
+        self._ready = names
+
+
+def prepare(_: Task) -> None:
+    """What frames with rough surfaces need first, made before somebody waits for it."""
+    brdf_table()
+    filtered(environment_of("studio"))
+
+
+def _is_file(name: str) -> bool:
+    return Path(name).suffix.lower() in READERS
+
+
+def _prepare(names: Names) -> None:
+    for name in filter(None, names):
+        filtered(environment_of(name))
