@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import sys
 from pathlib import Path
 
 import click
@@ -59,3 +61,8 @@ def preview(
     elif todo is not None:
         for message in work.messages:
             click.echo(f"{message.kind}: {message.text}", err=True)
+    if not work.ended:
+        # At exit CPython before 3.14 unwinds the stacks of threads that nobody waits for, at which C++ libraries abort.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)

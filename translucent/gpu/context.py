@@ -22,6 +22,9 @@ from translucent.gpu.osmesa import OSMesaContext
 
 Backend = Literal["egl", "window", "osmesa"]
 
+#: Version of what we speak to OpenGL with. Looking it up takes a millisecond, and every frame records it.
+MODERNGL = version("moderngl")
+
 #: OpenGL 3.3 core is what every raster path needs.
 REQUIRED = 330
 
@@ -100,7 +103,7 @@ class GpuContext:
             "backend": self.backend,
             "renderer": self.renderer,
             "driver": str(self.info["GL_VERSION"]),
-            "moderngl": version("moderngl"),
+            "moderngl": MODERNGL,
         }
 
     @contextmanager

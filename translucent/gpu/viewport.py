@@ -137,6 +137,8 @@ class Viewport:
             gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
         )
         self._gathering = gl.vertex_array(self._gather, [])
+        self._place = build_program(gl, vertex, "present/place.frag", picture=0)
+        self._placing = gl.vertex_array(self._place, [])
         self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
         self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
         # moderngl goes back to the framebuffer in use whenever it makes another one, and fails if that is gone. So
@@ -172,6 +174,17 @@ class Viewport:
             self._coarse = self._gl.framebuffer([texture])
         self._at_once = True
         return self._coarse
+
+    def place(self, window: moderngl.Framebuffer, part: tuple[int, int, int, int]) -> None:
+        """Draw the picture into a part of a window: its left and bottom, width and height in pixels."""
+        window.use()
+        whole = window.viewport
+        window.viewport = part
+        self._gl.enable_only(moderngl.NOTHING)
+        self.texture.use(0)
+        set_uniform(self._place, "part", part)
+        self._placing.render(moderngl.TRIANGLES, vertices=3)
+        window.viewport = whole
 
     def resize(self, size: Size) -> None:
         """Make room for pictures of a size; rounded down to a multiple of the largest stride.

@@ -26,9 +26,14 @@ def viewport_panel(desk: Desk) -> None:
     scale = imgui.get_io().display_framebuffer_scale
     pixels = max(int(room.x * scale.x), 8), max(int(room.y * scale.y), 8)
     desk.more = desk.draw(pixels)
-    texture = desk.stage.viewport.texture
-    imgui.image(imgui.ImTextureRef(texture.glo), room, ImVec2(0, 1), ImVec2(1, 0))
-    imgui.set_cursor_screen_pos(corner)
+    if imgui.is_window_docked():
+        # Behind all panels, of which this one is transparent: on a software rasteriser imgui takes long for pictures.
+        bottom = imgui.get_io().display_size.y - corner.y - room.y
+        desk.stage.place((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
+    else:
+        texture = desk.stage.viewport.texture
+        imgui.image(imgui.ImTextureRef(texture.glo), room, ImVec2(0, 1), ImVec2(1, 0))
+        imgui.set_cursor_screen_pos(corner)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
     _mouse(desk, corner, room)

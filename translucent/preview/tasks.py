@@ -129,6 +129,11 @@ class Lane:
         self._waiting.put(None)
         self._thread.join(patience)
 
+    @property
+    def ended(self) -> bool:
+        """Whether the thread is no more."""
+        return not self._thread.is_alive()
+
     def _run(self) -> None:
         while (task := self._waiting.get()) is not None:
             task.run()

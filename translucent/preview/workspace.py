@@ -234,6 +234,11 @@ class Workspace:
         for lane in self.lanes.values():
             lane.close()
 
+    @property
+    def ended(self) -> bool:
+        """Whether none of the work is under way any more."""
+        return all(lane.ended for lane in self.lanes.values())
+
     def _set(self, history: History) -> None:
         if history.present != self.history.present:
             self.changed = time.monotonic()
