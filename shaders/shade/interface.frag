@@ -6,6 +6,7 @@
 #include <View>
 #include <Body>
 #include "lib/ray.glsl"
+#include "shade/highlight.glsl"
 #include "shade/surface_textures.glsl"
 
 #if OPAQUE
@@ -26,7 +27,7 @@ in vec3 from_eye;
 in vec2 surface_uv;
 
 layout(location = 0) out vec4 out_normal;  // unit; w: place
-layout(location = 1) out vec4 out_surface;  // object, roughness, transmission
+layout(location = 1) out vec4 out_surface;  // object, roughness, transmission, variance of normals
 #if !BACK
 layout(location = 2) out vec4 out_color;
 #endif
@@ -34,6 +35,7 @@ layout(location = 2) out vec4 out_color;
 void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
     vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
+    float variance = normal_variance(normal);
     float roughness = surface_roughness * texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, surface_uv)).g;
     float transmission = surface_color.w * texture(transmission_texture, picture_place(TRANSMISSION_TEXTURE, surface_uv)).r;
 #if !BACK
@@ -58,7 +60,7 @@ void main() {
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
     out_normal = vec4(normal, place);
-    out_surface = vec4(float(object), clamp(roughness, 0.0, 1.0), transmission, 1.0);
+    out_surface = vec4(float(object), clamp(roughness, 0.0, 1.0), transmission, variance);
 #if !BACK
     out_color = vec4(tint, 1.0);
 #endif

@@ -4,6 +4,7 @@
 
 #include "lib/interface.glsl"
 #include "shade/environment_light.glsl"
+#include "shade/highlight.glsl"
 #include "shade/surface_textures.glsl"
 
 uniform sampler2D reflectance_table;  // scale and bias of the reflectance at normal incidence
@@ -18,6 +19,7 @@ struct OpaqueFinish {
     float roughness;
     vec3 emitted;
     vec3 normal;        // unit, towards the side that the mesh calls outside
+    float variance;     // of normals within a pixel
     bool is_hole;
 };
 
@@ -26,8 +28,9 @@ OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 place, vec2 uv) {
     vec4 painted = texture(color_texture, picture_place(COLOR_TEXTURE, uv));
     vec4 rough = texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, uv));
     vec3 emitted = opaque_emissive * texture(emissive_texture, picture_place(EMISSIVE_TEXTURE, uv)).rgb;
+    vec3 mapped = mapped_normal(normal, place, uv);
     return OpaqueFinish(base * painted.rgb, opaque_finish.x * rough.b, clamp(opaque_finish.y * rough.g, 0.0, 1.0), emitted,
-                        mapped_normal(normal, place, uv), painted.a < opaque_finish.w);
+                        mapped, normal_variance(mapped), painted.a < opaque_finish.w);
 }
 
 // What the microfacets of one of the two layers mirror, relative to those without any loss.
@@ -62,7 +65,7 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) 
     vec3 sum = mix(coat.mirrored, metal.mirrored, finish.metallic)
             * environment_light(reflected_direction(ray, normal), finish.roughness)
         + painted * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI;
-    float alpha = max(finish.roughness * finish.roughness, SMALLEST_HIGHLIGHT);
+    float alpha = highlight_alpha(finish.roughness, finish.variance);
     for (int light = 0; light < light_count; ++light) {
         vec4 at = light_place[light];
         vec3 way = at.xyz - at.w * place;

@@ -13,13 +13,14 @@
 #include "lib/two_stream.glsl"
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
+#include "shade/highlight.glsl"
 #include "shade/refraction.glsl"
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
 uniform sampler2D straight_optical_depth;
 uniform sampler2D straight_thickness;
-uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission
+uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 #if !ONE_BORDER
 uniform sampler2D left_finish;       // object of what is left
@@ -80,10 +81,9 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     return towards / distance_m;
 }
 
-// Microfacets that mirror the lights; nothing shadows them. A mirror shows a point of light as a small disc.
-vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float roughness) {
+// Microfacets that mirror the lights; nothing shadows them.
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
     vec3 sum = vec3(0.0);
-    float alpha = max(roughness * roughness, SMALLEST_HIGHLIGHT);
     float cos_view = max(-dot(normal, ray), 1e-3);
     for (int light = 0; light < light_count; ++light) {
         vec3 irradiance;
@@ -249,7 +249,7 @@ void main() {
     vec3 mirrored = vec3(0.0);
     if (reflectance > 0.0) {
         mirrored = mirrored_share * environment_light(reflected_direction(ray, normal), finish.roughness)
-            + highlights(point, normal, ray, finish.ior, finish.roughness) * (finish.is_sheet ? 2.0 : 1.0);
+            + highlights(point, normal, ray, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
     }
 
     vec3 light = vec3(0.0);

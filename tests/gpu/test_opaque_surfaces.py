@@ -217,3 +217,13 @@ def test_a_normal_map_leans_right_with_red_and_up_with_green(
         light = tl.DirectionalLight(-direction, (np.pi,) * 3)
         found = picture(renderer, plate(surface, mesh), camera=camera, lights=[light])[12, 16, 0]
         assert found == pytest.approx(max(side * normal @ direction, 0.0), abs=2e-3)  # half floats
+
+
+@pytest.mark.parametrize("angle", [20.0, 80.0])
+def test_a_ball_of_polished_metal_mirrors_a_light_whole(renderer: tl.Renderer, angle: float) -> None:
+    """As a mirroring sphere does: its intensity is E R^2 / 4 to all sides."""
+    towards = np.array([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
+    camera = tl.Camera.orthographic((0.013, 0.007, 5), (0.013, 0.007, 0), height=2.4)
+    ball = plate(tl.Surface(metallic=1.0, roughness=0.0), Sphere().tessellate(300))
+    found = picture(renderer, ball, camera=camera, lights=[tl.DirectionalLight(-towards, (3, 3, 3))])
+    assert found[..., 0].sum() * (2.4 / SIZE[1]) ** 2 == pytest.approx(3 / 4, rel=0.15)

@@ -217,6 +217,23 @@ def test_what_passes_paint_is_not_reflected_whatever_its_color(renderer: tl.Rend
     np.testing.assert_allclose(renderer.render(scene, SIZE).radiance, np.tile(expected, (*SIZE[::-1], 1)), rtol=1e-5)
 
 
+@pytest.mark.parametrize("size", [48, 96, 200])
+@pytest.mark.parametrize("angle", [20.0, 80.0])
+def test_a_ball_mirrors_a_light_whole_however_few_pixels_show_it(
+    renderer: tl.Renderer, angle: float, size: int
+) -> None:
+    """A mirroring sphere scatters alike to all sides: its intensity is F E R^2 / 4, F that of half the angle."""
+    towards = np.array([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
+    light = tl.DirectionalLight(-towards, (3, 3, 3))
+    camera = tl.Camera.orthographic((0.013, 0.007, 5), (0.013, 0.007, 0), height=2.4)
+    black = tl.Environment.constant((0.0, 0.0, 0.0))
+    scene = tl.Scene([tl.Object(BALL, tl.Medium(absorption=1.0, ior=1.5))], camera, [light], black)
+    intensity = renderer.render(scene, (size, size)).radiance[..., 0].sum() * (2.4 / size) ** 2
+    expected = optics.fresnel_dielectric(np.cos(np.radians(angle / 2)), 1.5) * 3 / 4
+    # The filter is about a pixel wide: that it is met at pixel centers only is an error of up to a tenth.
+    assert intensity == pytest.approx(expected, rel=0.15)
+
+
 def test_straight_quantities_do_not_bend(renderer: tl.Renderer) -> None:
     """Thickness, optical depth and transmittance stay those of the view ray."""
     straight = renderer.render(shown(BALL, tl.Medium(absorption=1.0), SKY), SIZE)
