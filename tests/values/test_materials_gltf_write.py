@@ -50,6 +50,19 @@ def test_a_clear_medium_has_no_distance(two_boxes: Path, tmp_path: Path) -> None
     assert read_materials(tmp_path / "out.glb")[0].medium() == tl.Medium(ior=1.3)
 
 
+def test_without_a_name_only_what_light_enters_is_filled(two_boxes: Path, tmp_path: Path) -> None:
+    file = read_gltf(two_boxes)
+    file.tree["meshes"][1]["primitives"][0]["material"] = 1
+    write_gltf(file, tmp_path / "opaque.glb")
+    assert write_medium(tmp_path / "opaque.glb", tmp_path / "all.glb", JADE) == [0, 1]
+    file.tree["materials"][0]["extensions"] = {"KHR_materials_transmission": {"transmissionFactor": 0.8}}
+    write_gltf(file, tmp_path / "glass.glb")
+    assert write_medium(tmp_path / "glass.glb", tmp_path / "out.glb", JADE) == [0]
+    assert read_gltf(tmp_path / "out.glb").tree["materials"][1] == file.tree["materials"][1]
+    # A name is asked for as it is.
+    assert write_medium(tmp_path / "glass.glb", tmp_path / "named.glb", JADE, object_name="Other") == [1]
+
+
 def test_everything_else_stays(two_boxes: Path, tmp_path: Path) -> None:
     write_medium(two_boxes, tmp_path / "out.glb", JADE)
     before, after = read_gltf(two_boxes), read_gltf(tmp_path / "out.glb")

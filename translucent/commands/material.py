@@ -65,7 +65,12 @@ def _texture_text(entry: GltfMaterial) -> str:
 @click.argument("model")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="A .glb or .gltf file.")
 @medium_options
-@click.option("--object", "object_name", metavar="NAME", help="Only the objects of this name. Default: all.")
+@click.option(
+    "--object",
+    "object_name",
+    metavar="NAME",
+    help="Only the objects of this name. Default: all that light enters, or all.",
+)
 @click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
 @common_options
 def apply(

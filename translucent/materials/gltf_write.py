@@ -66,7 +66,8 @@ def write_medium(
         Where the color is stated, in metres: what the medium was made with. None: where the densest channel lets 1/e
         pass.
     object_name : str, optional
-        Name of nodes or meshes. A material that others use, too, is duplicated. None: all objects.
+        Name of nodes or meshes. A material that others use, too, is duplicated. None: what light enters already, or
+        all objects where that is none.
     thickness : float, optional
         thicknessFactor in the mesh's own units, > 0. None: what the material has, else the smallest side of the
         object's box (of the largest of several).
@@ -89,10 +90,10 @@ def write_medium(
     if thickness is not None and not 0 < thickness < math.inf:
         raise InputError(f"thickness {thickness!r}", "not above 0 and finite", "give a length, for example 0.02")
     file = read_gltf(path_in)
-    materials_of(file)  # a file that is wrong before is not made worse
+    entered = {material.index for material in materials_of(file) if material.transmission > 0}
     tree = copy.deepcopy(file.tree)
     edited = GltfFile(file.path, tree, file.chunks)
-    targets = _own_materials(edited, object_name)
+    targets = _own_materials(edited, object_name, entered)
     for index, sizes in targets.items():
         _give(edited, index, medium, distance, thickness, sizes, keep_ior)
     used = tree.setdefault("extensionsUsed", [])
@@ -110,12 +111,17 @@ def _uses(tree: Json, extension: str) -> bool:
     return any(extension in material.get("extensions", {}) for material in tree["materials"])
 
 
-def _own_materials(file: GltfFile, object_name: str | None) -> dict[int, list[float]]:
-    """Indices of the materials of the named objects and of them alone, each with the sizes of its objects."""
+def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -> dict[int, list[float]]:
+    """Indices of the materials of the named objects and of them alone, each with the sizes of its objects.
+
+    Without a name: those that light enters, or all of them where nothing has one.
+    """
     meshes = file.items("meshes")
     mine = set(range(len(meshes))) if object_name is None else _meshes_named(file, object_name)
     if not mine:
         raise InputError(f"glTF {str(file.path)!r}", "it has no mesh", "give a model with a mesh")
+    used = {primitive.get("material") for index in mine for primitive in primitives(file, meshes[index])}
+    chosen = used & entered if object_name is None else set()
     taken = {
         primitive.get("material")
         for index, mesh in enumerate(meshes)
@@ -128,6 +134,8 @@ def _own_materials(file: GltfFile, object_name: str | None) -> dict[int, list[fl
     for index in sorted(mine):
         for primitive in primitives(file, meshes[index]):
             old = primitive.get("material")
+            if chosen and old not in chosen:
+                continue
             if old is None or old in taken:
                 if old not in copies:
                     copies[old] = len(materials)

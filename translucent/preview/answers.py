@@ -10,7 +10,7 @@ from translucent.gltf.load import SUFFIXES
 from translucent.materials.gltf_write import write_medium
 from translucent.preview.actions import Change
 from translucent.preview.desk import Desk
-from translucent.preview.dialogs import answer
+from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
 from translucent.preview.exports import write_picture, write_turntable
 from translucent.preview.scenes import medium_of, method_of
@@ -45,8 +45,10 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
             if work.bake is not None:
                 bake = work.bake
                 work.attempt(lambda: bake.map.save(path), f"wrote {path}")
-        case _:
+        case "png" | "exr" | "turntable":
             _export(desk, kind, path)
+        case _:
+            work.tell("error", f"file {path!r}; {kind!r} is nothing to read or write; use {', '.join(QUESTIONS)}")
 
 
 def _export(desk: Desk, kind: str, path: str) -> None:

@@ -87,6 +87,8 @@ class Desk:
         return more or unmeasured or bool(self.work.busy)
 
     def _measure(self, scene: Scene) -> None:
+        if self.work.shows_map:
+            return
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)
         lane = self.work.lanes["draw"].task

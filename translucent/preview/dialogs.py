@@ -17,7 +17,7 @@ SESSIONS = ["Sessions", "*.toml", "All files", "*"]
 PANORAMAS = ["Pictures of all directions", "*.hdr *.exr *.png *.jpg", "All files", "*"]
 
 #: What is asked for: the title, the file that is proposed where one is written, and the kinds.
-_QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
+QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
     "open": ("Open a model", None, MODELS),
     "open session": ("Open a session", None, SESSIONS),
     "save session": ("Save the session", "session.toml", SESSIONS),
@@ -35,7 +35,7 @@ def open_dialog(kind: str) -> Any | None:
     """A dialog that is now open, or None where the system has none."""
     if sys.platform.startswith("linux") and not any(map(shutil.which, ("zenity", "kdialog", "matedialog", "qarma"))):
         return None
-    title, proposed, kinds = _QUESTIONS[kind]
+    title, proposed, kinds = QUESTIONS[kind]
     if proposed is None:
         return portable_file_dialogs.open_file(title, "", kinds)
     return portable_file_dialogs.save_file(title, proposed, kinds)

@@ -173,7 +173,7 @@ class Workspace:
         if loaded is None or self.document.orbit is None:
             return None
         document = self._lighting.lit(self.document)
-        if self.bake is not None and self.show_bake:
+        if self.bake is not None and self.shows_map:
             return self.bake.seen_from(self.document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
@@ -183,6 +183,11 @@ class Workspace:
         scene = scene_of(document, loaded)
         self._scene = document, loaded, scene
         return scene
+
+    @property
+    def shows_map(self) -> bool:
+        """Whether the model is painted with the baked map, and no medium to be seen."""
+        return self.bake is not None and self.show_bake
 
     @property
     def busy(self) -> list[Task]:
