@@ -8,9 +8,11 @@ from collections.abc import Sequence
 
 from translucent.bench.row import Quantity, Row
 
-#: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much.
+#: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much. A report
+#: compares each row with some hundred others of about its time, of which chance takes five for different at two standard
+#: errors, and none at three.
 TIME_MARGIN = 1.05
-NOISES = 2.0
+NOISES = 3.0
 
 #: Errors closer than this are equal, as are all below `ERROR_FLOOR`: float32 of a path has no more to say.
 ERROR_MARGIN = 1.5
