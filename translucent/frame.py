@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -290,7 +291,7 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was."""
     path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
     try:
-        handle, name = tempfile.mkstemp(prefix=".partial-", suffix=path.suffix, dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=_partial(path), suffix=path.suffix, dir=path.parent)
     except OSError as error:
         raise RenderError(
             f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder"
@@ -310,6 +311,18 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_partial(path: Path) -> None:
+    """Remove what a process that was killed while it wrote `path` may have left beside it."""
+    path = Path(os.path.realpath(path))
+    for left in path.parent.glob(f"{_partial(path)}*"):
+        left.unlink(missing_ok=True)
+
+
+def _partial(path: Path) -> str:
+    """How the names of temporary files for `path` begin."""
+    return f".partial-{zlib.crc32(os.fsencode(path.name)):08x}-"
 
 
 def write_text_atomically(path: Path, text: str) -> None:

@@ -71,6 +71,29 @@ def whole(jobs: list[Job]) -> None:
         assert jobs_module.is_done(job, content_hash(job))
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_what_a_killed_process_left_is_removed(make_jobs: Any) -> None:
+    (job,) = make_jobs(1)
+    output = Path(job["output"])
+    output.parent.mkdir(exist_ok=True)
+    for written in (output, sidecar_of(output)):
+        code = (
+            "import os, signal, sys, pathlib; from translucent.frame import write_atomically\n"
+            "write_atomically(pathlib.Path(sys.argv[1]), lambda path: os.kill(os.getpid(), signal.SIGKILL))\n"
+        )
+        assert subprocess.run([sys.executable, "-c", code, str(written)], check=False).returncode == -signal.SIGKILL
+    left = list(output.parent.iterdir())
+    assert len(left) == 2
+    assert all(path.name.startswith(".partial-") for path in left)
+    (output.parent / ".partial-00000000-of.another").write_text("kept")
+    bake_file(job)
+    assert {path.name for path in output.parent.iterdir()} == {
+        output.name,
+        sidecar_of(output).name,
+        ".partial-00000000-of.another",
+    }
+
+
 def test_a_job_is_done_and_done_once(make_jobs: Any) -> None:
     (job,) = make_jobs(1)
     first = run_job(job)
