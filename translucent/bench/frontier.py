@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from translucent.bench.row import Quantity, Row
 
 #: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much. A report
-#: compares each row with some hundred others of about its time, of which chance takes five for different at two standard
+#: compares some hundred pairs of rows of about the same time, of which chance takes five for different at two standard
 #: errors, and none at three.
 TIME_MARGIN = 1.05
 NOISES = 3.0
