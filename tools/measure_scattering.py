@@ -1,15 +1,17 @@
 """Time and error of light that is scattered once: points of fragment lists, and marching.
 
-``python tools/measure_scattering.py`` prints a table for the two milky bodies of the report. Marching is measured
-twice: with the depth towards a light from the same lists, which is exact and costs one look for a step; and through a
-body that is a grid of voxels (all of density 1, so that the picture is the same), where each step marches on to the
-light, voxel by voxel, as it is done where there are no lists. For each number of points the last columns tell how many
-times as long marching takes for the same error, interpolated between its steps.
+``python tools/measure_scattering.py [PIXELS]`` prints a table for the two milky bodies of the report, with that many
+pixels along a side (96). Marching is measured twice: with the depth towards a light from the same lists, which is
+exact and costs one look for a step; and through a body that is a grid of voxels (all of density 1, so that the picture
+is the same), where each step marches on to the light, voxel by voxel, as it is done where there are no lists. For each
+number of points the last columns tell how many times as long marching takes for the same error, interpolated between
+its steps.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import sys
 import time
 
 import numpy as np
@@ -17,7 +19,7 @@ import numpy as np
 import translucent as tl
 from translucent.bench.cases import CASES
 
-SIZE = (96, 96)
+SIZE = (int(sys.argv[1]),) * 2 if len(sys.argv) > 1 else (96, 96)
 POINTS = (2, 4, 8, 16)
 STEPS = (8, 16, 32, 64, 128)
 VOXELS = 32

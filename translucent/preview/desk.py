@@ -87,7 +87,7 @@ class Desk:
         return more or unmeasured or bool(self.work.busy)
 
     def _measure(self, scene: Scene) -> None:
-        if self.work.shows_map:
+        if self.work.shown_bake is not None:
             return
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)

@@ -61,8 +61,10 @@ class Task:
         return time.monotonic() - self.started
 
     def cancel(self) -> None:
-        """Nobody waits any more; the work ends at its next report."""
+        """Nobody waits any more; the work ends at its next report, and does not begin if it has not."""
         self._cancelled.set()
+        # A task may wait long behind another one, and what it would have drawn is large.
+        self.work = self.then = _nothing
 
     def report(self, share: float | None, detail: str = "") -> None:
         """Tell how far the work is; raises `CancelledError` if nobody waits for it."""
@@ -81,6 +83,10 @@ class Task:
             self.error = error
         finally:
             self._finished.set()
+
+
+def _nothing(_: Any) -> None:
+    """What is left of a task that nobody waits for."""
 
 
 class Lane:

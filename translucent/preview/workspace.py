@@ -173,8 +173,8 @@ class Workspace:
         if loaded is None or self.document.orbit is None:
             return None
         document = self._lighting.lit(self.document)
-        if self.bake is not None and self.shows_map:
-            return self.bake.seen_from(self.document.orbit)
+        if (bake := self.shown_bake) is not None:
+            return bake.seen_from(self.document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
             same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))
@@ -185,9 +185,9 @@ class Workspace:
         return scene
 
     @property
-    def shows_map(self) -> bool:
-        """Whether the model is painted with the baked map, and no medium to be seen."""
-        return self.bake is not None and self.show_bake
+    def shown_bake(self) -> Bake | None:
+        """The map that the model is painted with, so that there is no medium to be seen; None if it is not."""
+        return self.bake if self.show_bake else None
 
     @property
     def busy(self) -> list[Task]:
