@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -175,8 +175,8 @@ class Environment:
         if self.map is not None:
             return self.map
         if self.kind == "gradient":
-            return EnvironmentMap.from_formula(self.lighting, GRADIENT_MAP_HEIGHT)
-        return EnvironmentMap(np.broadcast_to(self.mean, (2, 4, 3)))
+            return _gradient_map(tuple(self.first.tolist()), tuple(self.second.tolist()))
+        return _uniform_map(tuple(self.mean.tolist()))
 
     def radiance(self, directions: npt.ArrayLike, backdrop: npt.ArrayLike) -> Array:
         """Radiance seen along rays, (..., 3): that of the background, if there is one.
@@ -226,6 +226,19 @@ class Environment:
 
 #: Rows of the picture of a gradient: between two of them, a sine differs from a straight line by 2e-5.
 GRADIENT_MAP_HEIGHT = 256
+
+
+# Environments that light alike share one picture, so that it is blurred, and uploaded, once.
+
+
+@lru_cache(maxsize=8)
+def _gradient_map(bottom: tuple[float, ...], top: tuple[float, ...]) -> EnvironmentMap:
+    return EnvironmentMap.from_formula(Environment.gradient(bottom, top).lighting, GRADIENT_MAP_HEIGHT)
+
+
+@lru_cache(maxsize=8)
+def _uniform_map(radiance: tuple[float, ...]) -> EnvironmentMap:
+    return EnvironmentMap(np.broadcast_to(np.array(radiance), (2, 4, 3)))
 
 
 def gradient_share(direction: npt.ArrayLike) -> Array:

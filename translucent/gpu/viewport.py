@@ -6,6 +6,8 @@ step takes long on a slow machine, and that after `stride`^2 of them each pixel 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -162,18 +164,24 @@ class Viewport:
         assert chosen is not None
         return chosen
 
-    def at_once(self, factor: float) -> moderngl.Framebuffer:
-        """A framebuffer for a whole picture that is smaller by a factor, to be shown instead, until `present`."""
+    @contextmanager
+    def at_once(self, factor: float) -> Iterator[moderngl.Framebuffer]:
+        """Draw a whole picture, smaller by a factor, that is shown instead until `present`.
+
+        What was shown before stays if that fails.
+        """
         size = max(round(self.size[0] / factor), 1), max(round(self.size[1] / factor), 1)
-        self._rest.use()
-        if self._coarse is None or self._coarse.size != size:
-            self._release_coarse()
-            texture = self._gl.texture(size, 4)
-            if factor == 1.0:
-                texture.filter = moderngl.NEAREST, moderngl.NEAREST
-            self._coarse = self._gl.framebuffer([texture])
-        self._at_once = True
-        return self._coarse
+        known = self._coarse
+        made = known if known is not None and known.size == size else self._make_coarse(size, factor)
+        try:
+            yield made
+        except BaseException:
+            if made is not known:
+                self._release(made)
+            raise
+        if known is not None and known is not made:
+            self._release(known)
+        self._coarse, self._at_once = made, True
 
     def place(self, window: moderngl.Framebuffer, part: tuple[int, int, int, int]) -> None:
         """Draw the picture into a part of a window: its left and bottom, width and height in pixels."""
@@ -334,19 +342,24 @@ class Viewport:
             if side is not None:
                 side.release()
         self._sides = [None, None]
-        self._release_coarse()
-        if self._screen is not None:
-            self._screen.color_attachments[0].release()
-            self._screen.release()
-            self._screen = None
+        for picture in (self._coarse, self._screen):
+            if picture is not None:
+                self._release(picture)
+        self._coarse = self._screen = None
+        self._at_once = False
         self.size = (0, 0)
 
-    def _release_coarse(self) -> None:
-        if self._coarse is not None:
-            self._coarse.color_attachments[0].release()
-            self._coarse.release()
-            self._coarse = None
-        self._at_once = False
+    def _make_coarse(self, size: Size, factor: float) -> moderngl.Framebuffer:
+        self._rest.use()
+        texture = self._gl.texture(size, 4)
+        if factor == 1.0:
+            texture.filter = moderngl.NEAREST, moderngl.NEAREST
+        return self._gl.framebuffer([texture])
+
+    def _release(self, picture: moderngl.Framebuffer) -> None:
+        self._rest.use()
+        picture.color_attachments[0].release()
+        picture.release()
 
     def _side(self, number: int, size: Size) -> _Side:
         side = self._sides[number]
@@ -377,7 +390,7 @@ class Viewport:
 
 @lru_cache(maxsize=4)
 def shifts(samples: int) -> npt.NDArray[np.float64]:
-    """(samples, 2): where in a pixel its later samples are. Slow when first asked for."""
+    """(samples, 2): where in a pixel its later samples are."""
     return sample_shifts(samples)
 
 

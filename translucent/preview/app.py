@@ -242,7 +242,7 @@ class _Window:
         from translucent.preview.stage import Stage
 
         implot.create_context()
-        self.desk = Desk(self.work, Stage(open_context("window").gl))
+        self.desk = Desk(self.work, Stage(open_context("window").gl, self.work.compiler))
         self._drops = accept_drops(self._dropped)
         if self.script is None:
             self.work.recent = read_recent()

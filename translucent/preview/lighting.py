@@ -12,6 +12,7 @@ from translucent.environment_filter import filtered
 from translucent.preview.document import Document
 from translucent.preview.scenes import environment_of
 from translucent.preview.tasks import Lane, Task
+from translucent.sampling import sample_shifts
 
 #: What lights, and what is behind.
 Names = tuple[str, str]
@@ -51,9 +52,11 @@ class Lighting:
 
 
 def prepare(_: Task) -> None:
-    """What frames with rough surfaces need first, made before somebody waits for it."""
+    """What frames with surfaces, and smooth edges, need first, made before somebody waits for it."""
+    sample_shifts(1)  # imports a large part of SciPy
     brdf_table()
-    filtered(environment_of("studio"))
+    for name in ("light-table", "studio"):
+        filtered(environment_of(name))
 
 
 def _is_file(name: str) -> bool:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import time
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from translucent.assets import shader_path
 from translucent.errors import TranslucentError
 from translucent.gpu.context import open_context
+from translucent.gpu.passes.variants import PostponedError, ProgramName
 from translucent.gpu.viewport import STRIDES, Probe, Shown, Viewport
+from translucent.preview.compiling import FRAME, Compiled, Compiler
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of
 from translucent.preview.workspace import Workspace
@@ -55,6 +58,8 @@ class Stage:
     ----------
     context : moderngl.Context, optional
         Of the window; None opens one without a window.
+    compiler : Compiler, optional
+        Compiles what a picture needs, from the second one on, while the one before stays on show.
 
     Attributes
     ----------
@@ -69,11 +74,13 @@ class Stage:
         Seconds that the last call of `draw` took.
     """
 
-    def __init__(self, context: Any = None) -> None:
+    def __init__(self, context: Any = None, compiler: Compiler | None = None) -> None:
         # Whoever owns the window draws into it next, wherever we have drawn.
         self._window = None if context is None else context.detect_framebuffer()
         self._own = open_context() if context is None else None
         self._gl = context if self._own is None else self._own.gl
+        self._compiler = compiler
+        self._gl.extra = None if compiler is None else compiler.ledger
         with self.current():
             self.renderer = Renderer(context=self._gl)
             self.viewport = Viewport(self.renderer.gpu)
@@ -82,6 +89,7 @@ class Stage:
         self.problem = self.shader_problem = ""
         self.drawing = 0.0
         self._shown: tuple[object, ...] = ()
+        self._postponed: tuple[object, ...] = ()
         self._presented: tuple[object, ...] = ()
         self._costs: dict[tuple[str, ...], float] = {}
         self._strides = [4, 4]
@@ -103,6 +111,9 @@ class Stage:
             try:
                 more = self._draw(workspace, size)
                 self.problem = ""
+            except PostponedError as missing:
+                self._postpone(workspace, missing.program)
+                more = True
             except TranslucentError as error:
                 self.problem, more = str(error), False
             finally:
@@ -125,8 +136,11 @@ class Stage:
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
         both = display.compare == "method"
         wanted = (scene, methods[0], methods[1] if both else None, self.viewport.size, self.renderer)
+        if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
+            return True
         fresh = wanted != self._shown
         if not fresh:
+            self._begin_compiling(workspace, scene)
             self.watch(workspace)
         else:
             self.plans = [
@@ -147,8 +161,8 @@ class Stage:
         """While things move: the picture itself and nothing beside it."""
         look, begun = workspace.document.look, time.perf_counter()
         factor = self._factor(self.plans[0], FACTORS)
-        framebuffer = self.viewport.at_once(factor)
-        plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone)
+        with self.viewport.at_once(factor) as framebuffer:
+            plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone)
         self._finish(0, plan, factor, begun)
         self._presented = ()
         return True
@@ -238,17 +252,65 @@ class Stage:
             self._newest = newest
             self.reload(workspace)
 
+    def _begin_compiling(self, workspace: Workspace, scene: Scene) -> None:
+        """There is a first picture: from now on, it stays on show while another process compiles."""
+        if self._compiler is not None and not self._compiler.begun:
+            self._compiler.begin(scene, self._drawn_plans, self._newest, partial(self._take_compiled, workspace))
+
+    @property
+    def _drawn_plans(self) -> list[RenderPlan]:
+        return [plan for plan in self.plans if plan is not None]
+
+    def _postpone(self, workspace: Workspace, program: ProgramName) -> None:
+        """Ask for what is missing; until it is there, the same picture is not tried again."""
+        compiler, scene = self._compiler, workspace.scene()
+        assert compiler is not None
+        assert scene is not None
+        self._postponed, self._shown = self._shown, ()
+        if compiler.lane.task is None:
+
+            def take(found: Compiled) -> None:
+                self._take_compiled(workspace, found)
+                # Where it could not be compiled, the window will tell why.
+                compiler.ledger.elsewhere.add(program)
+
+            compiler.ask("compiling shaders", scene, self._drawn_plans, self._newest, take)
+
+    def _take_compiled(self, workspace: Workspace, found: Compiled) -> None:
+        assert self._compiler is not None
+        self._compiler.take(found)
+        if found.programs is None:
+            text = f"shaders are compiled in the window, which stands still meanwhile: {found.problem}"
+            workspace.tell("warning", text)
+
     def reload(self, workspace: Workspace) -> None:
         """Compile the shaders anew; if that fails, go on with those there are, and tell why."""
+        compiler, scene = self._compiler, workspace.scene()
+        if compiler is None or not compiler.ledger.postpones or scene is None:
+            return self._rebuild(workspace)
+
+        def take(found: Compiled) -> None:
+            if found.programs is not None and found.problem:
+                self.shader_problem = found.problem
+                return
+            compiler.ledger.postpones = False  # should anything still be missing
+            self._rebuild(workspace)
+            compiler.ledger.elsewhere.clear()
+            compiler.ledger.postpones = True
+            self._take_compiled(workspace, found)
+
+        return compiler.ask("compiling shaders", scene, self._drawn_plans, self._newest, take)
+
+    def _rebuild(self, workspace: Workspace) -> None:
         scene = workspace.scene()
         with self.current():
             fresh = Renderer(context=self._gl)
             viewport = None
             try:
                 viewport = Viewport(fresh.gpu)
-                viewport.resize((64, 64))
-                for plan in self.plans if scene is not None else ():
-                    if scene is not None and plan is not None:
+                viewport.resize(FRAME)
+                for plan in self._drawn_plans if scene is not None else ():
+                    if scene is not None:
                         viewport.step(0, scene, fresh.plan(scene, plan.method), 1)
             except TranslucentError as error:
                 self.shader_problem = str(error)

@@ -16,6 +16,7 @@ from translucent.errors import InputError, TranslucentError
 from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map
+from translucent.preview.compiling import Compiler
 from translucent.preview.document import Document, Model, Orbit
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
@@ -64,6 +65,8 @@ class Workspace:
         The reference of the whole picture, if the split shows it.
     bake : Bake, optional
         The last map.
+    compiler : Compiler
+        Compiles shaders in the background, for a stage that waits for them.
     """
 
     def __init__(self, document: Document | None = None) -> None:
@@ -76,6 +79,7 @@ class Workspace:
         self.truth: Truth | None = None
         self.bake: Bake | None = None
         self.show_bake = True
+        self.compiler = Compiler()
         self._measuring = Measuring()
         self.lanes = {
             "load": Lane("load"),
@@ -84,6 +88,7 @@ class Workspace:
             "bake": Lane("bake"),
             "ray": Lane("ray"),
             "light": Lane("light"),
+            "compile": self.compiler.lane,
         }
         self._lighting = Lighting(self.lanes["light"])
         self.lanes["light"].start("filtering the environment", prepare, lambda _: None)
@@ -192,7 +197,8 @@ class Workspace:
     @property
     def busy(self) -> list[Task]:
         """Work that the user may want to see, or to cancel."""
-        return [lane.task for lane in self.lanes.values() if lane.task is not None]
+        tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
+        return [task for task in tasks if task.name or task is not self.compiler.lane.task]
 
     def measure(self, work: Callable[[Measuring, Task], Any], name: str, then: Callable[[Any], None]) -> None:
         """Draw something in the background, with a renderer of its own."""

@@ -1,0 +1,233 @@
+"""Shaders compiled by another process: those that the window needs, while it shows the last picture."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent import assets as data
+from translucent.gpu.passes.variants import ProgramLedger, ProgramName
+from translucent.mesh import Mesh
+from translucent.preview import compiling
+from translucent.preview.actions import Change, ChoosePreset
+from translucent.preview.compiling import Compiled, Compiler, stand_in
+from translucent.preview.document import Document, Model
+from translucent.preview.elsewhere import Companion
+from translucent.preview.stage import Stage
+from translucent.preview.workspace import Workspace
+from translucent.showcase import showcase
+from translucent.solids import Box, Sphere
+from translucent.texture import Texture
+
+SIZE = (160, 96)
+LEAF = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+BALL = Sphere(radius=0.02).tessellate(24)
+GLASS = tl.Medium.from_color((0.2, 0.6, 0.3), 0.01, ior=1.5)
+MILK = tl.Medium(absorption=1.0, scattering=(30.0, 40.0, 50.0), ior=1.35)
+METHODS = (
+    tl.SignedDepth(),
+    tl.BackFaceDepth(),
+    tl.ThinLayer(1e-3),
+    tl.DepthPeeling(),
+    tl.FragmentLists(),
+    tl.KBuffer(4),
+)
+
+
+def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "it takes too long"
+        work.update()
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def work() -> Iterator[Workspace]:
+    made = Workspace(Document(Model("sphere")))
+    made.size = SIZE
+    wait(made, lambda: made.loaded is not None)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stage(work: Workspace) -> Iterator[Stage]:
+    made = Stage(compiler=work.compiler)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+    """What another process would do, done in this one, once the event is set."""
+    go = threading.Event()
+
+    def call(_: Companion, task: Any, work: Callable[..., Any], *arguments: Any) -> Any:
+        go.wait(60.0)
+        return work(task.report, *arguments)
+
+    monkeypatch.setattr(Companion, "call", call)
+    compiling._engine.cache_clear()
+    return go
+
+
+def finish(stage: Stage, work: Workspace) -> None:
+    end = time.monotonic() + 60.0
+    while stage.draw(work, SIZE) or work.compiler.lane.task is not None:
+        work.update()
+        assert time.monotonic() < end, "the picture is never done"
+
+
+def pixels(stage: Stage) -> np.ndarray:
+    with stage.current():
+        return stage.viewport.pixels().astype(int)
+
+
+def sky() -> tl.Environment:
+    return tl.Environment.image(np.full((50, 100, 3), 0.5))
+
+
+def scenes() -> dict[str, tl.Scene]:
+    ball, lamp = showcase(BALL), tl.DirectionalLight((0.0, -1.0, -1.0), 3.0)
+    uv = Mesh(BALL.vertices, BALL.faces, uv=BALL.vertices[:, :2])
+    checks = Texture(np.indices((128, 128)).sum(axis=0)[..., None] % 2 * np.ones(3))
+    painted = tl.Surface(roughness=0.3, color_texture=checks, normal_texture=Texture(np.full((50, 30, 3), 0.5)))
+    floor = tl.Object(Box((-0.1, -0.03, -0.1), (0.1, -0.025, 0.1)).tessellate())
+    grown = tl.LinearDensity(1, 0.5, 1.5)
+    return {
+        "ball": ball,
+        "knot": showcase(tl.load_mesh(data.mesh_path("knot"))),
+        "glass": showcase(BALL, GLASS),
+        "milk": showcase(BALL, MILK, environment=sky(), lights=[lamp]),
+        "lamp": showcase(BALL, MILK, lights=[tl.PointLight((0.0, 0.05, 0.0), (1.0, 1.0, 1.0))]),
+        "painted": tl.Scene([tl.Object(uv, GLASS, surface=painted)], ball.camera),
+        "two": tl.Scene([tl.Object(BALL, GLASS), tl.Object(BALL, MILK, np.diag([0.5, 0.5, 0.5, 1.0]))], ball.camera),
+        "union": tl.Scene([tl.Object(BALL, tl.Medium(a)) for a in (1.0, 2.0)], ball.camera, overlap="union"),
+        "floor": tl.Scene([*ball.objects, floor], ball.camera, [lamp], sky()),
+        "glow": showcase(BALL, tl.Medium(absorption=(1.0, 2.0, 3.0), emission=1.0)),
+        "grown": tl.Scene([tl.Object(BALL, tl.Medium(5.0), density=grown)], ball.camera),
+        "leaf": tl.Scene([tl.Object(LEAF, GLASS, sheet_thickness=1e-3)], ball.camera),
+    }
+
+
+def needed(scene: tl.Scene, plan: tl.RenderPlan) -> set[ProgramName]:
+    with tl.Renderer() as renderer:
+        gl = renderer.gpu.context.gl
+        gl.extra = ledger = ProgramLedger()
+        with renderer.gpu.context.current():
+            renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
+    return ledger.needed
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> None:
+    scene = scenes()[name]
+    with tl.Renderer() as renderer:
+        for method in (None, *METHODS):
+            try:
+                plan = renderer.plan(scene, method)
+            except tl.InputError:
+                continue
+            assert needed(stand_in(scene), plan) >= needed(scene, plan), method
+
+
+def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
+    scene, compiler, found = stand_in(showcase(BALL, GLASS)), Compiler(), list[Compiled]()
+    with tl.Renderer() as renderer:
+        plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
+    compiler.ask("", scene, plans, 0.0, found.append)
+    while not found:
+        compiler.lane.poll(pytest.fail)
+    compiler.lane.close()
+    assert found == [Compiled(frozenset(needed(scene, plans[0]) | needed(scene, plans[1])))]
+
+
+def test_the_last_picture_stays_until_the_next_one_is_compiled(
+    stage: Stage, work: Workspace, near: threading.Event
+) -> None:
+    near.set()
+    finish(stage, work)
+    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    near.clear()
+    before = pixels(stage)
+    work.do(ChoosePreset("whole_milk"))
+    for _ in range(3):
+        assert stage.draw(work, SIZE)
+        work.update()
+    assert [task.name for task in work.busy] == ["compiling shaders"]
+    np.testing.assert_array_equal(pixels(stage), before)
+    near.set()
+    finish(stage, work)
+    assert stage.problem == ""
+    alone = Stage()
+    try:
+        finish(alone, work)
+        np.testing.assert_allclose(pixels(stage), pixels(alone), atol=1)
+    finally:
+        alone.close()
+    assert (pixels(stage) != before).any()
+
+
+def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: threading.Event) -> None:
+    near.set()
+    finish(stage, work)
+    near.clear()
+    work.do(Change("material.distance", 0.003))
+    assert stage.draw(work, SIZE)
+    assert stage._shown
+    assert not [task for task in work.busy if task.name == "compiling shaders"]
+    near.set()
+
+
+def test_where_no_process_can_draw_the_window_compiles_by_itself(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def call(*_: Any) -> Any:
+        raise tl.RenderError("compiling shaders", "its process ended with status 9", "close other programs")
+
+    monkeypatch.setattr(Companion, "call", call)
+    finish(stage, work)
+    work.do(ChoosePreset("whole_milk"))
+    finish(stage, work)
+    assert stage.problem == ""
+    assert "shaders are compiled in the window" in work.messages[-1].text
+    assert "status 9" in work.messages[-1].text
+    told = len(work.messages)
+    work.do(Change("display.method", "depth-peeling"))
+    finish(stage, work)
+    assert len(work.messages) == told
+
+
+def test_a_shader_that_does_not_compile_is_told_by_the_process(
+    stage: Stage, work: Workspace, near: threading.Event, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near.set()
+    finish(stage, work)
+    before = stage.renderer
+    shutil.copytree(data._folder("shaders"), tmp_path / "shaders")
+    monkeypatch.setattr(data, "_folder", lambda kind: tmp_path / kind)
+    broken = tmp_path / "shaders" / "thickness" / "signed_depth.frag"
+    good = broken.read_text()
+    broken.write_text(good + "\nvoid broken( {\n")
+    stage._newest += 1.0
+    stage.reload(work)
+    wait(work, lambda: work.compiler.lane.task is None)
+    assert "shaders/thickness/signed_depth.frag:" in stage.shader_problem
+    assert stage.renderer is before
+    broken.write_text(good)
+    stage._newest += 1.0
+    stage.reload(work)
+    wait(work, lambda: work.compiler.lane.task is None)
+    assert stage.shader_problem == ""
+    assert stage.renderer is not before
+    finish(stage, work)
+    assert stage.problem == ""

@@ -1,0 +1,190 @@
+"""Shaders compiled in another process, before the window needs them.
+
+A driver takes up to a second to compile what a new kind of scene needs, and meanwhile the window would stand still. But
+drivers keep what they have compiled on disk, for all processes (Mesa and NVIDIA do): another process that draws a frame
+of that kind first leaves the window almost nothing to do. Blender compiles its shaders in such a way since 4.2.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from translucent.environment import Environment
+from translucent.environment_map import EnvironmentMap
+from translucent.errors import TranslucentError
+from translucent.gpu.passes.variants import ProgramLedger, ProgramName
+from translucent.gpu.renderer import GpuRenderer
+from translucent.mesh import Mesh
+from translucent.preview.elsewhere import Companion
+from translucent.preview.tasks import CancelledError, Lane, Task, problem
+from translucent.render_plan import RenderPlan
+from translucent.scene import Object, Scene
+from translucent.solids import Box
+from translucent.surface import Surface
+from translucent.texture import Texture
+
+#: Size of the frames that are drawn to have their shaders compiled. No power of two: drivers compile another code for
+#: pictures whose sides are, and those of windows seldom are.
+FRAME = (72, 40)
+
+#: Sides of small pictures in place of large ones, by whether those are powers of two.
+SIDES = {True: 64, False: 60}
+
+#: How many boxes, one within the other, stand in for a mesh: rays then cross as many layers as methods can tell apart.
+BOXES = 4
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """What has come of a request.
+
+    Attributes
+    ----------
+    programs : frozenset of ProgramName or None
+        That the driver now keeps; None if no other process can draw here.
+    problem : str
+        Why that is, or the compiler's message; or nothing.
+    """
+
+    programs: frozenset[ProgramName] | None
+    problem: str = ""
+
+
+class Compiler:
+    """Has another process compile what frames need.
+
+    Attributes
+    ----------
+    ledger : ProgramLedger
+        For the context that waits.
+    lane : Lane
+        One request after the other; a task that nobody waits for has no name.
+    begun : bool
+    """
+
+    def __init__(self) -> None:
+        self._companion = Companion()
+        self.begun = False
+        self.ledger = ProgramLedger()
+        self.lane = Lane("compile", self._companion.close)
+
+    def begin(
+        self, scene: Scene, plans: Sequence[RenderPlan], written: float, then: Callable[[Compiled], None]
+    ) -> None:
+        """Start the process, with a frame like the one that is on show; from now on, the context waits for it."""
+        self.begun = self.ledger.postpones = True
+        self.ledger.elsewhere |= self.ledger.needed
+        self.ask("", scene, plans, written, then)
+
+    def take(self, found: Compiled) -> None:
+        """Let the context build what there is."""
+        if found.programs is None:
+            self.ledger.postpones = False
+        else:
+            self.ledger.elsewhere |= found.programs
+
+    def ask(
+        self,
+        name: str,
+        scene: Scene,
+        plans: Sequence[RenderPlan],
+        written: float,
+        then: Callable[[Compiled], None],
+    ) -> None:
+        """Compile what plans of a scene need from the shaders that were `written` last at this time."""
+
+        def work(task: Task) -> Compiled:
+            try:
+                return self._companion.call(task, compile_frames, stand_in(scene), tuple(plans), written)
+            except CancelledError:
+                raise
+            except Exception as error:  # noqa: BLE001 - whatever it is, the window can do the work itself
+                return Compiled(None, problem(error))
+
+        self.lane.start(name, work, then)
+
+
+def compile_frames(
+    report: Callable[[float | None, str], None], scene: Scene, plans: Sequence[RenderPlan], written: float
+) -> Compiled:
+    """Draw a scene by plans, and tell which programs that took."""
+    engine, ledger = _engine(written)
+    trouble = ""
+    with engine.context.current() as gl:
+        picture = gl.framebuffer([gl.texture(FRAME, 4)])
+        try:
+            for number, plan in enumerate(plans):
+                report(number / len(plans), str(plan.method))
+                engine.draw(scene, picture, plan, 0.0, "none")
+        except TranslucentError as error:
+            trouble = str(error)
+        finally:
+            gl.finish()
+            picture.release()
+    return Compiled(frozenset(ledger.needed), trouble)
+
+
+@lru_cache(maxsize=1)
+def _engine(written: float) -> tuple[GpuRenderer, ProgramLedger]:
+    """Of the process, for shaders of a time."""
+    engine, ledger = GpuRenderer(), ProgramLedger()
+    engine.context.gl.extra = ledger
+    return engine, ledger
+
+
+def stand_in(scene: Scene) -> Scene:
+    """A scene that is drawn with the same programs, and quickly sent and drawn: boxes for meshes, and no pictures."""
+    return dataclasses.replace(
+        scene,
+        objects=[_object_like(item) for item in scene.objects],
+        environment=_environment_like(scene.environment),
+    )
+
+
+def _object_like(item: Object) -> Object:
+    surface = None if item.surface is None else _surface_like(item.surface)
+    return dataclasses.replace(item, mesh=_boxes(item.mesh), surface=surface)
+
+
+def _boxes(mesh: Mesh) -> Mesh:
+    box = Box().tessellate()
+    size = np.maximum(mesh.bounds[1] - mesh.bounds[0], 0.1 * mesh.diagonal)  # a leaf may be flat
+    shares = np.linspace(1.0, 0.5, BOXES)
+    vertices = (mesh.center + shares[:, None, None] * size * box.vertices).reshape(-1, 3)
+    faces = (box.faces + len(box.vertices) * np.arange(BOXES)[:, None, None]).reshape(-1, 3)
+    return Mesh(vertices, faces, None if mesh.uv is None else np.zeros((len(vertices), 2)), mesh.name)
+
+
+def _surface_like(surface: Surface) -> Surface:
+    pictures: dict[str, Any] = {
+        field.name: _texture_like(value)
+        for field in dataclasses.fields(surface)
+        if isinstance(value := getattr(surface, field.name), Texture)
+    }
+    return dataclasses.replace(surface, **pictures)
+
+
+def _texture_like(texture: Texture) -> Texture:
+    height, width, channels = texture.pixels.shape
+    pixels = np.ones((_side_like(height), _side_like(width), channels), dtype=np.float32)
+    return dataclasses.replace(texture, pixels=pixels)
+
+
+def _environment_like(environment: Environment) -> Environment:
+    background = environment.background and _environment_like(environment.background)
+    if environment.map is not None:
+        side = _side_like(environment.map.size[1])
+        return dataclasses.replace(environment, map=EnvironmentMap(np.ones((side, 2 * side, 3))), background=background)
+    # One color: nothing is to be blurred.
+    return dataclasses.replace(environment, second=environment.first, background=background)
+
+
+def _side_like(side: int) -> int:
+    return SIDES[math.log2(side).is_integer()]
