@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 import numpy.typing as npt
 
@@ -25,11 +27,32 @@ def corner_normals(mesh: Mesh) -> Array:
     normals = mesh.face_normals
     corner_group = _smooth_groups(faces, normals)
     weighted = normals[:, None] * _corner_angles(mesh)[..., None]
-    sums = np.zeros((int(corner_group.max()) + 1, 3))
-    np.add.at(sums, corner_group.ravel(), weighted.reshape(-1, 3))
-    smooth = sums[corner_group]
+    smooth = np.empty_like(weighted)
+    for axis in range(3):
+        smooth[..., axis] = np.bincount(corner_group.ravel(), weighted[..., axis].ravel())[corner_group]
     length = np.linalg.norm(smooth, axis=2, keepdims=True)
     return np.where(length > 1e-12, smooth / np.where(length > 1e-12, length, 1.0), normals[:, None])
+
+
+#: Of meshes that have been drawn, or are about to be.
+_drawn: WeakKeyDictionary[Mesh, npt.NDArray[np.float32]] = WeakKeyDictionary()
+
+
+def drawn_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
+    """`corner_normals` in the precision of the GPU: made once for each mesh, in a second for a million."""
+    if mesh not in _drawn:
+        keep_drawn_normals(mesh, corner_normals(mesh))
+    return _drawn[mesh]
+
+
+def keep_drawn_normals(mesh: Mesh, normals: npt.NDArray[np.floating]) -> None:
+    """Let `drawn_normals` be these, which have been made elsewhere."""
+    _drawn[mesh] = normals.astype(np.float32, copy=False)
+
+
+def has_drawn_normals(mesh: Mesh) -> bool:
+    """Whether `drawn_normals` have been made."""
+    return mesh in _drawn
 
 
 def _welded(mesh: Mesh) -> npt.NDArray[np.int64]:

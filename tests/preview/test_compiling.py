@@ -14,6 +14,7 @@ import pytest
 
 import translucent as tl
 from translucent import assets as data
+from translucent.corner_normals import corner_normals, drawn_normals, has_drawn_normals
 from translucent.gpu.passes.variants import ProgramLedger, ProgramName
 from translucent.mesh import Mesh
 from translucent.preview import compiling
@@ -140,6 +141,23 @@ def test_what_stands_in_for_a_scene_is_drawn_with_its_programs(name: str) -> Non
             assert needed(stand_in(scene), plan) >= needed(scene, plan), method
 
 
+def test_normals_of_a_large_mesh_come_from_another_process(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "SMOOTHED_AT_ONCE", 100)
+    finish(stage, work)
+    mesh = work.loaded.scene.objects[0].mesh  # type: ignore[union-attr]
+    assert not has_drawn_normals(mesh)
+    wait(work, lambda: work.compiler.lane.task is None)
+    here: list[Mesh] = []
+    monkeypatch.setattr("translucent.corner_normals.corner_normals", here.append)
+    work.do(ChoosePreset("whole_milk"))
+    finish(stage, work)
+    assert stage.problem == ""
+    assert not here
+    np.testing.assert_array_equal(drawn_normals(mesh), corner_normals(mesh).astype(np.float32))
+
+
 def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
     scene, compiler, found = stand_in(showcase(BALL, GLASS)), Compiler(), list[Compiled]()
     with tl.Renderer() as renderer:
@@ -163,7 +181,7 @@ def test_the_last_picture_stays_until_the_next_one_is_compiled(
     for _ in range(3):
         assert stage.draw(work, SIZE)
         work.update()
-    assert [task.name for task in work.busy] == ["compiling shaders"]
+    assert [task.name for task in work.busy] == ["preparing the picture"]
     np.testing.assert_array_equal(pixels(stage), before)
     near.set()
     finish(stage, work)
@@ -184,7 +202,7 @@ def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: thr
     work.do(Change("material.distance", 0.003))
     assert stage.draw(work, SIZE)
     assert stage._shown
-    assert not [task for task in work.busy if task.name == "compiling shaders"]
+    assert not [task for task in work.busy if task.name == "preparing the picture"]
     near.set()
 
 
@@ -192,7 +210,7 @@ def test_where_no_process_can_draw_the_window_compiles_by_itself(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def call(*_: Any) -> Any:
-        raise tl.RenderError("compiling shaders", "its process ended with status 9", "close other programs")
+        raise tl.RenderError("preparing the picture", "its process ended with status 9", "close other programs")
 
     monkeypatch.setattr(Companion, "call", call)
     finish(stage, work)

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 import moderngl
 import numpy as np
 
-from translucent.corner_normals import corner_normals
+from translucent.corner_normals import drawn_normals
 from translucent.mesh import Mesh
 
 
@@ -54,10 +54,12 @@ class MeshBuffers:
     def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Each face with vertices of its own, which carry smooth normals and texture coordinates."""
         if self._border is None:
-            corners = (mesh.vertices - mesh.center)[mesh.faces]
-            uv = np.zeros((*mesh.faces.shape, 2)) if mesh.uv is None else mesh.uv[mesh.faces]
-            content = np.concatenate([corners, corner_normals(mesh), uv], axis=2)
-            self._border = self._gl.buffer(content.astype(np.float32))
+            content = np.zeros((*mesh.faces.shape, 8), dtype=np.float32)
+            content[..., :3] = (mesh.vertices - mesh.center).astype(np.float32)[mesh.faces]
+            content[..., 3:6] = drawn_normals(mesh)
+            if mesh.uv is not None:
+                content[..., 6:] = mesh.uv[mesh.faces]
+            self._border = self._gl.buffer(content)
         return self._border
 
     def release(self) -> None:

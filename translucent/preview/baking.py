@@ -12,6 +12,7 @@ import numpy as np
 from translucent.aovs import EMPTY, false_colors
 from translucent.bake.thickness_map import ThicknessMap
 from translucent.color import srgb_to_linear
+from translucent.corner_normals import drawn_normals
 from translucent.environment import Environment
 from translucent.medium import Medium
 from translucent.mesh import Mesh
@@ -67,6 +68,7 @@ def bake_map(task: Task, body: Object, medium: Medium, mode: str, size: int, ray
         options["medium"] = medium
     # xatlas holds the interpreter's lock while it makes texture coordinates.
     baked = in_a_process(task, _bake, body.mesh, options)
+    _ = baked.mesh.diagnosis, drawn_normals(baked.mesh)  # which the picture needs
     return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
 
 

@@ -1,4 +1,4 @@
-"""Shaders compiled in another process, before the window needs them.
+"""What a new kind of picture needs, made in another process: compiled shaders, and the normals of large meshes.
 
 A driver takes up to a second to compile what a new kind of scene needs, and meanwhile the window would stand still. But
 drivers keep what they have compiled on disk, for all processes (Mesa and NVIDIA do): another process that draws a frame
@@ -15,7 +15,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from translucent.corner_normals import corner_normals, has_drawn_normals, keep_drawn_normals
 from translucent.environment import Environment
 from translucent.environment_map import EnvironmentMap
 from translucent.errors import TranslucentError
@@ -36,6 +38,9 @@ FRAME = (72, 40)
 
 #: Sides of small pictures in place of large ones, by whether those are powers of two.
 SIDES = {True: 64, False: 60}
+
+#: Triangles of which normals take so little time that no process need be asked.
+SMOOTHED_AT_ONCE = 50_000
 
 #: How many boxes, one within the other, stand in for a mesh: rays then cross as many layers as methods can tell apart.
 BOXES = 4
@@ -58,7 +63,7 @@ class Compiled:
 
 
 class Compiler:
-    """Has another process compile what frames need.
+    """Has another process compile what frames need, and smooth their meshes.
 
     Attributes
     ----------
@@ -83,6 +88,10 @@ class Compiler:
         self.ledger.elsewhere |= self.ledger.needed
         self.ask("", scene, plans, written, then)
 
+    def lacks_normals(self, scene: Scene, plans: Sequence[RenderPlan]) -> bool:
+        """Whether the context should wait for normals."""
+        return self.ledger.postpones and bool(unsmoothed(scene, plans))
+
     def take(self, found: Compiled) -> None:
         """Let the context build what there is."""
         if found.programs is None:
@@ -98,10 +107,13 @@ class Compiler:
         written: float,
         then: Callable[[Compiled], None],
     ) -> None:
-        """Compile what plans of a scene need from the shaders that were `written` last at this time."""
+        """Make what plans of a scene need, with the shaders that were `written` last at this time."""
 
         def work(task: Task) -> Compiled:
             try:
+                for mesh in unsmoothed(scene, plans):
+                    task.report(None, "normals")
+                    keep_drawn_normals(mesh, self._companion.call(task, smoothed, mesh.vertices, mesh.faces))
                 return self._companion.call(task, compile_frames, stand_in(scene), tuple(plans), written)
             except CancelledError:
                 raise
@@ -109,6 +121,26 @@ class Compiler:
                 return Compiled(None, problem(error))
 
         self.lane.start(name, work, then)
+
+
+def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
+    """Large meshes that plans draw with normals which nobody has made yet."""
+    drawn = {
+        i
+        for plan in plans
+        for step in plan.passes
+        for i in step.objects
+        if step.name == "interfaces" or (step.name == "opaque" and scene.objects[i].surface is not None)
+    }
+    meshes = (scene.objects[i].mesh for i in sorted(drawn))
+    return [mesh for mesh in meshes if len(mesh.faces) > SMOOTHED_AT_ONCE and not has_drawn_normals(mesh)]
+
+
+def smoothed(
+    report: Callable[[float | None, str], None], vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]
+) -> npt.NDArray[np.float32]:
+    """`corner_normals` of a mesh."""
+    return corner_normals(Mesh(vertices, faces)).astype(np.float32)
 
 
 def compile_frames(

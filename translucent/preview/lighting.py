@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from translucent.brdf_table import brdf_table
+from translucent.corner_normals import corner_normals
 from translucent.environment_files import READERS
 from translucent.environment_filter import filtered
 from translucent.preview.document import Document
 from translucent.preview.scenes import environment_of
 from translucent.preview.tasks import Lane, Task
 from translucent.sampling import sample_shifts
+from translucent.solids import Box
 
 #: What lights, and what is behind.
 Names = tuple[str, str]
@@ -53,7 +55,8 @@ class Lighting:
 
 def prepare(_: Task) -> None:
     """What frames with surfaces, and smooth edges, need first, made before somebody waits for it."""
-    sample_shifts(1)  # imports a large part of SciPy
+    sample_shifts(1)  # these two import large parts of SciPy
+    corner_normals(Box().tessellate())
     brdf_table()
     for name in ("light-table", "studio"):
         filtered(environment_of(name))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from translucent.corner_normals import drawn_normals
 from translucent.environment import Environment
 from translucent.errors import InputError
 from translucent.lights import DirectionalLight
@@ -58,6 +59,8 @@ def load(model: Model) -> Loaded:
         scene = showcase(load_mesh(model.path, unit=model.unit))
     for item in scene.objects:
         _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
+        if item.has_interface or item.surface is not None:
+            drawn_normals(item.mesh)
     return Loaded(model, scene, material_of(scene))
 
 

@@ -151,6 +151,9 @@ class Stage:
             self.viewport.restart()
             self._truth = None
             self._strides = [self._factor(plan, STRIDES) for plan in self.plans]
+            if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
+                self._postpone(workspace)
+                return True
             if display.mode == "picture" and display.compare == "off":
                 return self._draw_at_once(scene, methods[0], workspace)
         drawn = [self._step(side, scene, display.antialias) for side in ((1, 0) if both else (0,))]
@@ -191,7 +194,7 @@ class Stage:
         """The least of the factors with which a picture is drawn quickly, as far as one can tell."""
         known = None if plan is None else self._costs.get(_kind(plan))
         if known is None:
-            return factors[0] if plan is None else factors[len(factors) // 2]
+            return factors[0] if plan is None else factors[-2]
         return next((factor for factor in factors if known / factor**2 <= BUDGET), factors[-1])
 
     def _present(self, workspace: Workspace, scene: Scene, changed: bool) -> None:
@@ -261,7 +264,7 @@ class Stage:
     def _drawn_plans(self) -> list[RenderPlan]:
         return [plan for plan in self.plans if plan is not None]
 
-    def _postpone(self, workspace: Workspace, program: ProgramName) -> None:
+    def _postpone(self, workspace: Workspace, program: ProgramName | None = None) -> None:
         """Ask for what is missing; until it is there, the same picture is not tried again."""
         compiler, scene = self._compiler, workspace.scene()
         assert compiler is not None
@@ -271,10 +274,10 @@ class Stage:
 
             def take(found: Compiled) -> None:
                 self._take_compiled(workspace, found)
-                # Where it could not be compiled, the window will tell why.
-                compiler.ledger.elsewhere.add(program)
+                if program is not None:
+                    compiler.ledger.elsewhere.add(program)  # if it could not be compiled, the window will tell why
 
-            compiler.ask("compiling shaders", scene, self._drawn_plans, self._newest, take)
+            compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, take)
 
     def _take_compiled(self, workspace: Workspace, found: Compiled) -> None:
         assert self._compiler is not None
@@ -299,7 +302,7 @@ class Stage:
             compiler.ledger.postpones = True
             self._take_compiled(workspace, found)
 
-        return compiler.ask("compiling shaders", scene, self._drawn_plans, self._newest, take)
+        return compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, take)
 
     def _rebuild(self, workspace: Workspace) -> None:
         scene = workspace.scene()

@@ -34,8 +34,9 @@ _SIDES = (1024, 512, 256, 128)
 _COUNT, _HEADS, _NODES, _MEDIA, _ENDS = 0, 1, 2, 5, 6
 _READ = {"light_heads": 3, "light_nodes": 4, "light_media": _MEDIA, "light_ends": _ENDS}
 
-#: Nodes in the first buffers, for each texel; frames that need more get larger ones, and keep them.
-_FIRST_SHARE = 0.5
+#: Nodes in the first buffers, for each texel: enough for most bodies. Frames that need more get larger ones, and keep
+#: them.
+_FIRST_SHARE = 1.25
 
 #: Room beyond what a frame needed, so that the next one does not have to grow again.
 _SLACK = 1.25
