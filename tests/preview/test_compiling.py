@@ -22,6 +22,7 @@ from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
 from translucent.preview.document import Document, Model
 from translucent.preview.elsewhere import Companion
+from translucent.preview.measuring import Measuring
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
 from translucent.showcase import showcase
@@ -156,6 +157,34 @@ def test_normals_of_a_large_mesh_come_from_another_process(
     assert stage.problem == ""
     assert not here
     np.testing.assert_array_equal(drawn_normals(mesh), corner_normals(mesh).astype(np.float32))
+
+
+def test_what_is_measured_is_compiled_by_another_process(
+    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near.set()
+    work.do(Change("display.method", "k-buffer"))
+    finish(stage, work)
+    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    scene = work.scene()
+    assert scene is not None
+    asked: list[ProgramName] = []
+    compile_ = work.compiler.compile
+
+    def compile_and_note(scene: tl.Scene, plans: Any, missing: ProgramName) -> None:
+        asked.append(missing)
+        compile_(scene, plans, missing)
+
+    monkeypatch.setattr(work.compiler, "compile", compile_and_note)
+    measuring = Measuring(work.compiler)
+    try:
+        for _ in range(2):
+            frame = measuring.render(scene, SIZE, tl.DepthPeeling())
+    finally:
+        measuring.close()
+    assert len(asked) == 1
+    with tl.Renderer() as renderer:
+        np.testing.assert_array_equal(frame.thickness, renderer.render(scene, SIZE, tl.DepthPeeling()).thickness)
 
 
 def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:

@@ -179,7 +179,7 @@ def test_undo_brings_the_last_model_back(work: Workspace) -> None:
 def test_the_error_is_measured(work: Workspace) -> None:
     scene = work.scene()
     assert scene is not None
-    measuring = Measuring()
+    measuring = Measuring(work.compiler)
     try:
         found = measure(measuring, Task("", lambda _: None, lambda _: None), scene, None, SIZE)
     finally:

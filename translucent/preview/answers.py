@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
-from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.materials.gltf_write import write_medium
 from translucent.preview.actions import Change
@@ -40,11 +38,10 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
         case "environment" | "background":
             work.do(Change(f"look.{kind}", path))
         case "save glb":
-            work.attempt(lambda: _save_medium(desk, path), f"wrote {path}")
+            _save_medium(desk, path)
         case "map":
             if work.bake is not None:
-                bake = work.bake
-                work.attempt(lambda: bake.map.save(path), f"wrote {path}")
+                work.write(path, work.bake.map.save)
         case "png" | "exr" | "turntable":
             _export(desk, kind, path)
         case _:
@@ -58,11 +55,9 @@ def _export(desk: Desk, kind: str, path: str) -> None:
     method, size = method_of(document.display.method, document.material), desk.stage.viewport.size
     look = document.look.exposure, document.look.tone
     if kind == "turntable":
-        work = partial(write_turntable, path=path, scene=scene, method=method, size=size, look=look)
-        desk.work.export(path, partial(work, count=desk.export["pictures"]))
+        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"])
     else:
-        work = partial(write_picture, path=path, scene=scene, method=method, size=size, look=look)
-        desk.work.export(path, partial(work, transparent=desk.export["transparent"]))
+        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"])
 
 
 def _save_medium(desk: Desk, path: str) -> None:
@@ -70,5 +65,6 @@ def _save_medium(desk: Desk, path: str) -> None:
     source, material = desk.get("model.path"), desk.work.document.material
     if Path(source).suffix.lower() not in SUFFIXES:
         do = "copy the medium as glTF, or export the model as .glb first"
-        raise InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do)
-    write_medium(source, path, medium_of(material), distance=material.distance)
+        return desk.work.tell("error", f"saving into {path!r}: {Path(source).name} is no glTF file; {do}")
+    medium = medium_of(material)
+    return desk.work.write(path, lambda to: write_medium(source, to, medium, distance=material.distance))

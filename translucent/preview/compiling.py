@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -68,14 +69,18 @@ class Compiler:
     Attributes
     ----------
     ledger : ProgramLedger
-        For the context that waits.
+        For the contexts that wait.
     lane : Lane
         One request after the other; a task that nobody waits for has no name.
+    written : float
+        When the shaders were written that are in use.
     begun : bool
     """
 
     def __init__(self) -> None:
         self._companion = Companion()
+        self._turn = threading.Lock()
+        self.written = 0.0
         self.begun = False
         self.ledger = ProgramLedger()
         self.lane = Lane("compile", self._companion.close)
@@ -92,13 +97,6 @@ class Compiler:
         """Whether the context should wait for normals."""
         return self.ledger.postpones and bool(unsmoothed(scene, plans))
 
-    def take(self, found: Compiled) -> None:
-        """Let the context build what there is."""
-        if found.programs is None:
-            self.ledger.postpones = False
-        else:
-            self.ledger.elsewhere |= found.programs
-
     def ask(
         self,
         name: str,
@@ -108,19 +106,45 @@ class Compiler:
         then: Callable[[Compiled], None],
     ) -> None:
         """Make what plans of a scene need, with the shaders that were `written` last at this time."""
+        self.written = written
 
         def work(task: Task) -> Compiled:
+            for mesh in unsmoothed(scene, plans):
+                task.report(None, "normals")
+                found = self._call(task, smoothed, mesh.vertices, mesh.faces)
+                if isinstance(found, Compiled):
+                    return found
+                keep_drawn_normals(mesh, found)
+            compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), written)
+            return compiled
+
+        self.lane.start(name, work, then)
+
+    def compile(self, scene: Scene, plans: Sequence[RenderPlan], missing: ProgramName) -> None:
+        """Compile what plans of a scene need now, for a thread that can wait for it."""
+        # Others wait, too: it is not cut short.
+        task = Task("preparing the picture", lambda _: None, lambda _: None)
+        found = self._call(task, compile_frames, stand_in(scene), tuple(plans), self.written)
+        self.take(found, missing)
+
+    def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
+        """Let contexts build what there is, and what was `missing`, though it may not be there: they tell why."""
+        if found.programs is None:
+            self.ledger.postpones = False
+        else:
+            self.ledger.elsewhere |= found.programs
+        if missing is not None:
+            self.ledger.elsewhere.add(missing)
+
+    def _call(self, task: Task, work: Callable[..., Any], *arguments: Any) -> Any:
+        """What the process answers; if it cannot, a `Compiled` that says why."""
+        with self._turn:
             try:
-                for mesh in unsmoothed(scene, plans):
-                    task.report(None, "normals")
-                    keep_drawn_normals(mesh, self._companion.call(task, smoothed, mesh.vertices, mesh.faces))
-                return self._companion.call(task, compile_frames, stand_in(scene), tuple(plans), written)
+                return self._companion.call(task, work, *arguments)
             except CancelledError:
                 raise
             except Exception as error:  # noqa: BLE001 - whatever it is, the window can do the work itself
                 return Compiled(None, problem(error))
-
-        self.lane.start(name, work, then)
 
 
 def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:

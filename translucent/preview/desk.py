@@ -19,9 +19,8 @@ from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
 from translucent.scene import Scene
 
-#: Seconds after which a view counts as still, and the name of what then begins.
+#: Seconds after which a view counts as still.
 STILL = 0.25
-MEASURING = "measuring"
 
 #: sRGB of lines that warn, that tell of errors, and that matter less.
 WARNING, ERROR, FAINT = (1.0, 0.75, 0.35, 1.0), (1.0, 0.45, 0.35, 1.0), (0.62, 0.64, 0.68, 1.0)
@@ -91,10 +90,8 @@ class Desk:
             return
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)
-        lane = self.work.lanes["draw"].task
-        # What the user has asked for, a picture or a turntable, is not to be cut short.
-        if document.display.inset and (lane is None or lane.name == MEASURING):
-            self.work.measure(lambda own, task: measure(own, task, scene, method, size), MEASURING, self._take)
+        if document.display.inset:
+            self.work.measure(lambda own, task: measure(own, task, scene, method, size), "measuring", self._take)
         if document.display.compare in ("reference", "error"):
             levels = (1,) if document.display.compare == "error" else None
             self.work.draw_truth(scene, method, size, levels)

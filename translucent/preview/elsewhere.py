@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import sys
 import warnings
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -15,6 +16,9 @@ from translucent.preview.tasks import Task
 
 #: Seconds between looks whether anybody still waits for the result.
 PATIENCE = 0.1
+
+#: Seconds in which a process that has been told to end removes what it has half written.
+PARTING = 5.0
 
 Result = TypeVar("Result")
 
@@ -80,7 +84,8 @@ class Companion:
             process, pipe = self._running
             self._running = None
             process.terminate()
-            process.join()
+            process.join(PARTING)
+            process.kill()
             pipe.close()
 
 
@@ -112,6 +117,7 @@ def _answer(task: Task, pipe: Connection) -> tuple[bool, Any]:
 def _run(pipe: Connection) -> None:
     """In the process: until nobody is at the other end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     warnings.showwarning = lambda message, *_, **__: pipe.send(("warning", str(message)))
     while True:
         try:

@@ -1,26 +1,29 @@
-"""Files that the previewer draws in the background: pictures, with transparency or quantities, and turntables."""
+"""Files that the previewer has drawn by another process: pictures, with transparency or quantities, and turntables."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.animation import check_animation, write_animation
-from translucent.color import exposure_scale, linear_to_srgb
 from translucent.errors import InputError
-from translucent.frame import SUFFIXES, Frame, check_output, write_atomically
-from translucent.medium import Medium
-from translucent.preview.measuring import Measuring, Size
-from translucent.preview.tasks import Task
+from translucent.frame import SUFFIXES, check_output
+from translucent.renderer import Renderer
 from translucent.scene import Scene
 from translucent.thickness import Method
-from translucent.tone import tone_curve
 from translucent.turntable import turntable
+
+Size: TypeAlias = tuple[int, int]
+
+#: Exposure in stops, and the name of the tone curve.
+Look: TypeAlias = tuple[float, str]
+
+#: Tells how far it is, and at what.
+Report: TypeAlias = Callable[[float | None, str], None]
 
 #: Of files with a moving picture.
 MOVING = (".gif", ".webp", ".mp4")
@@ -39,62 +42,37 @@ def check_export(path: str) -> None:
 
 
 def write_picture(
-    measuring: Measuring,
-    task: Task,
+    report: Report,
     path: str,
     scene: Scene,
     method: Method | None,
     size: Size,
-    look: tuple[float, str] = (0.0, "none"),
+    look: Look = (0.0, "none"),
     transparent: bool = False,
 ) -> None:
-    """Write a .png (of the body alone, if transparent) or an .exr with all quantities."""
-    task.report(None, "drawing")
-    frame = measuring.renderer.render(scene, size, method, samples=16)
-    task.report(None, "writing")
-    if not (transparent and Path(path).suffix.lower() == ".png"):
-        frame.save(path, *look)
-        return
-    write_atomically(Path(path), partial(_write_rgba, pixels=cut_out(measuring, scene, frame, size, method, look)))
-
-
-def cut_out(
-    measuring: Measuring, scene: Scene, frame: Frame, size: Size, method: Method | None, look: tuple[float, str]
-) -> npt.NDArray[np.uint8]:
-    """(h, w, 4): the bodies with what is seen through them, and nothing beside them; smooth at the edges."""
-    # Coverage is the opacity of the same bodies filled with what nothing passes.
-    dense = Medium(absorption=1e6 / max(scene.diagonal, 1e-9))
-    bodies = [dataclasses.replace(item, medium=dense, surface=None) if item.medium else item for item in scene.objects]
-    shadow = measuring.renderer.render(dataclasses.replace(scene, objects=bodies), size, method, samples=16)
-    coverage = 1.0 - shadow.transmittance.mean(axis=2)
-    exposure, tone = look
-    curve = tone_curve(tone)
-    color = linear_to_srgb(curve(frame.radiance * exposure_scale(exposure)))
-    alpha = np.clip(coverage, 0.0, 1.0)[..., None]
-    return np.asarray(np.rint(np.concatenate([np.clip(color, 0, 1), alpha], axis=2) * 255.0), dtype=np.uint8)
-
-
-def _write_rgba(path: Path, pixels: npt.NDArray[np.uint8]) -> None:
-    from PIL import Image
-
-    Image.fromarray(pixels).save(path, format="PNG")
+    """Write a .png, or an .exr with all quantities; transparent, it lacks what is seen beside and behind the bodies."""
+    report(None, "drawing")
+    with Renderer() as renderer:
+        frame = renderer.render(scene, size, method, samples=16, transparent=transparent)
+    report(None, "writing")
+    frame.save(path, *look)
 
 
 def write_turntable(
-    measuring: Measuring,
-    task: Task,
+    report: Report,
     path: str,
     scene: Scene,
     method: Method | None,
     size: Size,
-    look: tuple[float, str] = (0.0, "none"),
+    look: Look = (0.0, "none"),
     count: int = 48,
 ) -> None:
     """Write an animation of the model from all around."""
+    with Renderer() as renderer:
 
-    def pictures() -> Iterator[npt.NDArray[np.uint8]]:
-        for i, seen in enumerate(turntable(scene, count)):
-            task.report(i / count, f"picture {i + 1} of {count}")
-            yield measuring.renderer.render(seen, size, method, samples=4).to_srgb8(*look)
+        def pictures() -> Iterator[npt.NDArray[np.uint8]]:
+            for i, seen in enumerate(turntable(scene, count)):
+                report(i / count, f"picture {i + 1} of {count}")
+                yield renderer.render(seen, size, method, samples=4).to_srgb8(*look)
 
-    write_animation(Path(path), pictures(), FPS)
+        write_animation(Path(path), pictures(), FPS)

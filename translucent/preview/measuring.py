@@ -6,7 +6,7 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,9 @@ from translucent.appearance import thickness_samples
 from translucent.camera import Camera
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frame import Frame
+from translucent.gpu.passes.variants import PostponedError
 from translucent.metrics import Errors, compare
+from translucent.preview.compiling import Compiler
 from translucent.preview.numbers import Seen
 from translucent.preview.tasks import Task
 from translucent.reference.hits import camera_hits
@@ -96,18 +98,32 @@ class Crossing:
     body: int | None
 
 
-@dataclass
 class Measuring:
-    """A renderer that belongs to the thread of a lane."""
+    """A renderer that belongs to the thread of a lane.
 
-    _renderer: Renderer | None = field(default=None)
+    Parameters
+    ----------
+    compiler : Compiler
+        Compiles what frames need: done in this thread, it would stop the window.
+    """
 
-    @property
-    def renderer(self) -> Renderer:
-        """Made when first needed, in the thread that needs it."""
+    def __init__(self, compiler: Compiler) -> None:
+        self._compiler = compiler
+        self._renderer: Renderer | None = None
+        self._written = 0.0
+
+    def render(self, scene: Scene, size: Size, method: Method | None) -> Frame:
+        """A frame; the renderer is made when first needed, in the thread that needs it."""
+        if self._written != self._compiler.written:
+            self.close()  # it has compiled other shaders
         if self._renderer is None:
-            self._renderer = Renderer()
-        return self._renderer
+            self._renderer, self._written = Renderer(), self._compiler.written
+            self._renderer.gpu.context.gl.extra = self._compiler.ledger
+        while True:
+            try:
+                return self._renderer.render(scene, size, method)
+            except PostponedError as missing:
+                self._compiler.compile(scene, [self._renderer.plan(scene, method)], missing.program)
 
     def close(self) -> None:
         """Free it, in its thread."""
@@ -124,7 +140,7 @@ def measure(measuring: Measuring, task: Task, scene: Scene, method: Method | Non
     task.report(None, "drawing")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TranslucentWarning)  # invalid pixels are counted, below
-        frame = measuring.renderer.render(plain, small, method)
+        frame = measuring.render(plain, small, method)
     task.report(None, "float64 reference")
     truth = reference.render(plain, small, method)
     errors: tuple[Errors, ...] = ()

@@ -271,17 +271,12 @@ class Stage:
         assert scene is not None
         self._postponed, self._shown = self._shown, ()
         if compiler.lane.task is None:
+            then = partial(self._take_compiled, workspace, missing=program)
+            compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, then)
 
-            def take(found: Compiled) -> None:
-                self._take_compiled(workspace, found)
-                if program is not None:
-                    compiler.ledger.elsewhere.add(program)  # if it could not be compiled, the window will tell why
-
-            compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, take)
-
-    def _take_compiled(self, workspace: Workspace, found: Compiled) -> None:
+    def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         assert self._compiler is not None
-        self._compiler.take(found)
+        self._compiler.take(found, missing)
         if found.programs is None:
             text = f"shaders are compiled in the window, which stands still meanwhile: {found.problem}"
             workspace.tell("warning", text)

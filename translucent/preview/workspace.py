@@ -18,6 +18,7 @@ from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
 from translucent.preview.document import Document, Model, Orbit
+from translucent.preview.elsewhere import in_a_process
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
@@ -80,7 +81,7 @@ class Workspace:
         self.bake: Bake | None = None
         self.show_bake = True
         self.compiler = Compiler()
-        self._measuring = Measuring()
+        self._measuring = Measuring(self.compiler)
         self.lanes = {
             "load": Lane("load"),
             "draw": Lane("draw", self._measuring.close),
@@ -88,6 +89,7 @@ class Workspace:
             "bake": Lane("bake"),
             "ray": Lane("ray"),
             "light": Lane("light"),
+            "write": Lane("write"),
             "compile": self.compiler.lane,
         }
         self._lighting = Lighting(self.lanes["light"])
@@ -227,13 +229,24 @@ class Workspace:
 
         self.lanes["bake"].start(f"baking {mode}", lambda task: bake_map(task, body, medium, mode, size, rays), show)
 
-    def export(self, path: str, work: Callable[[Measuring, Task], None]) -> None:
-        """Draw a file in the background."""
+    def export(self, path: str, work: Callable[..., None], *arguments: Any) -> None:
+        """Have another process draw a file by ``work(report, path, *arguments)``."""
         try:
             check_export(path)
         except TranslucentError as error:
             return self.tell("error", str(error))
-        return self.measure(work, f"writing {Path(path).name}", lambda _: self.tell("info", f"wrote {path}"))
+        return self._write(path, lambda task: in_a_process(task, work, path, *arguments))
+
+    def write(self, path: str, work: Callable[[str], object]) -> None:
+        """Write a file in the background."""
+        self._write(path, lambda _: work(path))
+
+    def _write(self, path: str, work: Callable[[Task], object]) -> None:
+        if (other := self.lanes["write"].task) is not None:
+            return self.tell("error", f"{path!r} is not written: {other.name} is under way; wait for it, or cancel it")
+        done = f"wrote {path}"
+        self.lanes["write"].start(f"writing {Path(path).name}", work, lambda _: self.tell("info", done))
+        return None
 
     def tell(self, kind: Literal["info", "warning", "error"], text: str) -> None:
         """A line for the user, unless it is what the last one said."""

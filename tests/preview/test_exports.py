@@ -1,0 +1,111 @@
+"""Files from the window: drawn by another process, one at a time, and whole or not there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import translucent as tl
+from translucent.preview.document import Document, Model
+from translucent.preview.exports import write_picture, write_turntable
+from translucent.preview.workspace import Workspace
+from translucent.showcase import showcase
+from translucent.solids import Box
+
+SIZE = (64, 40)
+SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), size=SIZE)
+
+
+def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "it takes too long"
+        work.update()
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def work() -> Iterator[Workspace]:
+    made = Workspace(Document(Model("sphere")))
+    wait(made, lambda: made.loaded is not None)
+    yield made
+    made.close()
+
+
+def told(share: float | None, detail: str = "") -> None:
+    """Nobody looks."""
+
+
+@pytest.mark.parametrize("transparent", [False, True])
+def test_a_picture_is_the_one_that_render_makes(tmp_path: Path, transparent: bool) -> None:
+    write_picture(told, str(tmp_path / "a.png"), SCENE, None, SIZE, (0.5, "neutral"), transparent)
+    with tl.Renderer() as renderer:
+        renderer.render(SCENE, SIZE, samples=16, transparent=transparent).save(tmp_path / "b.png", 0.5, "neutral")
+    written, expected = (np.asarray(Image.open(tmp_path / name)) for name in ("a.png", "b.png"))
+    assert written.shape[2] == (4 if transparent else 3)
+    np.testing.assert_array_equal(written, expected)
+
+
+def test_a_turntable_shows_the_model_from_all_around(tmp_path: Path) -> None:
+    at: list[str] = []
+    write_turntable(lambda _, detail: at.append(detail), str(tmp_path / "a.gif"), SCENE, None, SIZE, count=3)
+    assert at == ["picture 1 of 3", "picture 2 of 3", "picture 3 of 3"]
+    with Image.open(tmp_path / "a.gif") as moving:
+        assert (moving.n_frames, moving.size) == (3, SIZE)
+
+
+def test_the_window_has_another_process_write(work: Workspace, tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    work.export(str(path), write_picture, SCENE, None, SIZE)
+    assert [task.name for task in work.busy if task.name.startswith("writing")] == ["writing a.png"]
+    work.export(str(tmp_path / "b.png"), write_picture, SCENE, None, SIZE)
+    assert "b.png' is not written: writing a.png is under way" in work.messages[-1].text
+    wait(work, lambda: work.lanes["write"].task is None)
+    assert work.messages[-1].text == f"wrote {path}"
+    with Image.open(path) as image:
+        assert image.size == SIZE
+    assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_what_cannot_be_written_is_told_at_once(work: Workspace, tmp_path: Path) -> None:
+    for name, reason in (("a.tiff", "suffix '.tiff'"), ("none/a.png", "none")):
+        work.export(str(tmp_path / name), write_picture, SCENE, None, SIZE)
+        assert work.lanes["write"].task is None
+        assert work.messages[-1].kind == "error"
+        assert reason in work.messages[-1].text
+
+
+def slow(report: Callable[[float | None, str], None], path: str) -> None:
+    with Path(path).open("wb") as stream:
+        try:
+            stream.write(b"half")
+            report(0.5, "at it")
+            time.sleep(60.0)
+        finally:
+            Path(path).unlink()
+
+
+def test_a_file_that_nobody_waits_for_is_not_left_half_written(work: Workspace, tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    work.export(str(path), slow)
+    task = work.lanes["write"].task
+    assert task is not None
+    wait(work, lambda: task.share == 0.5)
+    assert path.exists()
+    task.cancel()
+    wait(work, lambda: task.finished)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_in_the_background_that_cannot_be_written_is_told(work: Workspace, tmp_path: Path) -> None:
+    def fails(path: str) -> None:
+        raise tl.RenderError(f"writing {path!r}", "the disk is full", "make room")
+
+    work.write(str(tmp_path / "map.exr"), fails)
+    wait(work, lambda: work.lanes["write"].task is None)
+    assert "the disk is full" in work.messages[-1].text
