@@ -89,7 +89,7 @@ def main() -> int:
     steps = [read_step(action, "the tool") for action in (*ACTIONS, *ACTIONS)]
     for model in sys.argv[1:]:
         steps += [Step("open", {"model": model, "unit": "m"}), Step("turn", {"right": 20.0, "up": 5.0})] * 2
-    app.run(Document(Model("knot")), (1280, 800), script=Longest(steps[::-1]))
+    app.leave(app.run(Document(Model("knot")), (1280, 800), script=Longest(steps[::-1])))
     return 0
 
 

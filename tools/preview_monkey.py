@@ -22,7 +22,6 @@ from typing import Any
 from translucent.presets import presets
 from translucent.preview.actions import Change, ChoosePreset, Pan, Turn, View, Zoom
 from translucent.preview.document import RANGES, Document, Model, Orbit
-from translucent.preview.measuring import crossing, measure
 from translucent.preview.scenes import method_of
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
@@ -161,7 +160,7 @@ class Monkey:
         self.stage.probe(*pixel, self.random.choice((0, 1)))
         scene = self.work.scene()
         if scene is not None and 0 <= pixel[0] < size[0] and 0 <= pixel[1] < size[1] and self.random.random() < 0.2:
-            crossing(scene, size, pixel)
+            self.work.cross(scene, size, pixel, lambda _: None)
 
     def session(self) -> None:
         path = str(self.folder / "session.toml")
@@ -180,7 +179,7 @@ class Monkey:
         def take(measured: Any) -> None:
             self.work.measured = measured
 
-        self.work.measure(lambda own, task: measure(own, task, scene, method, (64, 36)), "measuring", take)
+        self.work.measure(scene, method, (64, 36), take)
         if self.random.random() < 0.7:
             self.settle(lambda: self.work.lanes["draw"].task is None)
 

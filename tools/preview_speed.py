@@ -55,7 +55,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "ball.ply"
         ball.export(path)
-        app.run(Document(Model(str(path))), (1966, 808), script=orbit)
+        work = app.run(Document(Model(str(path))), (1966, 808), script=orbit)
     frames, inside = np.diff(orbit.frames)[5:], np.array(orbit.inside[1:])[5:]
     print(f"{len(ball.faces)} triangles, viewport {orbit.sizes}, {len(frames)} frames")
     print(
@@ -63,6 +63,7 @@ def main() -> int:
     )
     print(f"renderer {1e3 * np.median(inside):.1f} ms, whole frame {1e3 * np.median(frames):.1f} ms,")
     print(f"share outside the renderer {1 - np.median(inside) / np.median(frames):.0%}")
+    app.leave(work)
     return 0
 
 

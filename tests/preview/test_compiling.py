@@ -15,14 +15,14 @@ import pytest
 import translucent as tl
 from translucent import assets as data
 from translucent.corner_normals import corner_normals, drawn_normals, has_drawn_normals
-from translucent.gpu.passes.variants import ProgramLedger, ProgramName
+from translucent.gpu.ledger import Ledger, PostponedError, ProgramName
 from translucent.mesh import Mesh
 from translucent.preview import compiling
+from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
 from translucent.preview.document import Document, Model
 from translucent.preview.elsewhere import Companion
-from translucent.preview.measuring import Measuring
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
 from translucent.showcase import showcase
@@ -124,7 +124,7 @@ def scenes() -> dict[str, tl.Scene]:
 def needed(scene: tl.Scene, plan: tl.RenderPlan) -> set[ProgramName]:
     with tl.Renderer() as renderer:
         gl = renderer.gpu.context.gl
-        gl.extra = ledger = ProgramLedger()
+        gl.extra = ledger = Ledger()
         with renderer.gpu.context.current():
             renderer.gpu.draw(scene, gl.simple_framebuffer(SIZE), plan, 0.0, "none")
     return ledger.needed
@@ -157,34 +157,6 @@ def test_normals_of_a_large_mesh_come_from_another_process(
     assert stage.problem == ""
     assert not here
     np.testing.assert_array_equal(drawn_normals(mesh), corner_normals(mesh).astype(np.float32))
-
-
-def test_what_is_measured_is_compiled_by_another_process(
-    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    near.set()
-    work.do(Change("display.method", "k-buffer"))
-    finish(stage, work)
-    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
-    scene = work.scene()
-    assert scene is not None
-    asked: list[ProgramName] = []
-    compile_ = work.compiler.compile
-
-    def compile_and_note(scene: tl.Scene, plans: Any, missing: ProgramName) -> None:
-        asked.append(missing)
-        compile_(scene, plans, missing)
-
-    monkeypatch.setattr(work.compiler, "compile", compile_and_note)
-    measuring = Measuring(work.compiler)
-    try:
-        for _ in range(2):
-            frame = measuring.render(scene, SIZE, tl.DepthPeeling())
-    finally:
-        measuring.close()
-    assert len(asked) == 1
-    with tl.Renderer() as renderer:
-        np.testing.assert_array_equal(frame.thickness, renderer.render(scene, SIZE, tl.DepthPeeling()).thickness)
 
 
 def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
@@ -222,6 +194,37 @@ def test_the_last_picture_stays_until_the_next_one_is_compiled(
     finally:
         alone.close()
     assert (pixels(stage) != before).any()
+
+
+def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
+    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near.set()
+    finish(stage, work)
+    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    monkeypatch.setattr(stages, "BUDGET", 0.0)
+    made: list[bool] = []
+    draw = stage._draw
+
+    def count(*arguments: Any) -> bool:
+        try:
+            return draw(*arguments)
+        except PostponedError as error:
+            made.append(error.program is None)
+            raise
+
+    monkeypatch.setattr(stage, "_draw", count)
+    work.do(ChoosePreset("whole_milk"))
+    work.do(Change("look.light", True))
+    finish(stage, work)
+    assert stage.problem == ""
+    assert sum(made) > 5
+    alone = Stage()
+    try:
+        finish(alone, work)
+        np.testing.assert_allclose(pixels(stage), pixels(alone), atol=1)
+    finally:
+        alone.close()
 
 
 def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: threading.Event) -> None:

@@ -16,7 +16,7 @@ from translucent import assets as data
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, Turn
 from translucent.preview.document import Document, Model
-from translucent.preview.measuring import Measuring, crossing, measure
+from translucent.preview.measuring import crossing
 from translucent.preview.stage import Stage
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
@@ -81,7 +81,7 @@ def test_the_picture_is_the_one_that_render_makes(
     assert probe is not None
     assert probe.thickness == pytest.approx(frame.thickness[y, x], rel=1e-5)
     assert (probe.covered, probe.valid) == (True, True)
-    found = crossing(scene, SIZE, (int(x), int(y)))
+    found = crossing(lambda *_: None, scene, SIZE, (int(x), int(y)))
     assert found.thickness == pytest.approx(frame.thickness[y, x], rel=1e-4)
     assert found.layers % 2 == 0
     assert found.body == 0
@@ -179,11 +179,11 @@ def test_undo_brings_the_last_model_back(work: Workspace) -> None:
 def test_the_error_is_measured(work: Workspace) -> None:
     scene = work.scene()
     assert scene is not None
-    measuring = Measuring(work.compiler)
-    try:
-        found = measure(measuring, Task("", lambda _: None, lambda _: None), scene, None, SIZE)
-    finally:
-        measuring.close()
+    work.measure(scene, None, SIZE, lambda found: setattr(work, "measured", found))
+    wait(work, lambda: work.lanes["draw"].task is None)
+    found = work.measured
+    assert found is not None
+    assert found.scene is scene
     thickness, transmittance = found.errors
     # Signed depth is exact up to float32 in units of the diagonal.
     assert thickness.median < 1e-6 * scene.diagonal

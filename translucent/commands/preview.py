@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import sys
 from pathlib import Path
 
 import click
@@ -37,7 +35,7 @@ def preview(
 
     With --script, the window does what the script says, and closes; --screenshot keeps a picture of it.
     """
-    from translucent.preview.app import require_display, run
+    from translucent.preview.app import leave, require_display, run
     from translucent.preview.document import Document, Model
     from translucent.preview.script import Script, read_script
     from translucent.preview.session import load_session
@@ -61,8 +59,4 @@ def preview(
     elif todo is not None:
         for message in work.messages:
             click.echo(f"{message.kind}: {message.text}", err=True)
-    if not work.ended:
-        # At exit CPython before 3.14 unwinds the stacks of threads that nobody waits for, at which C++ libraries abort.
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(0)
+    leave(work)

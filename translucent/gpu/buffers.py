@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from translucent.corner_normals import drawn_normals
+from translucent.gpu.ledger import before_making
 from translucent.mesh import Mesh
 
 
@@ -54,6 +55,7 @@ class MeshBuffers:
     def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Each face with vertices of its own, which carry smooth normals and texture coordinates."""
         if self._border is None:
+            before_making(self._gl)
             content = np.zeros((*mesh.faces.shape, 8), dtype=np.float32)
             content[..., :3] = (mesh.vertices - mesh.center).astype(np.float32)[mesh.faces]
             content[..., 3:6] = drawn_normals(mesh)

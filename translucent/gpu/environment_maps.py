@@ -11,6 +11,7 @@ import numpy as np
 from translucent.environment import Environment
 from translucent.environment_filter import filtered
 from translucent.environment_map import EnvironmentMap
+from translucent.gpu.ledger import before_making
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,7 @@ class EnvironmentMaps:
         """The environment as it is."""
         source = environment.light_map
         if (texture := self._sharp.get(source)) is None:
+            before_making(self._gl)
             texture = self._sharp[source] = self._texture(source.pixels)
         return texture
 
@@ -48,6 +50,7 @@ class EnvironmentMaps:
         """What rough surfaces mirror and receive of it; filtered on first use."""
         source = environment.light_map
         if (maps := self._filtered.get(source)) is None:
+            before_making(self._gl)
             found = filtered(environment)
             count, height, width = found.levels.shape[:3]
             levels = self._gl.texture_array((width, height, count), 3, found.levels.astype(np.float32), dtype="f4")

@@ -7,6 +7,7 @@ from functools import cached_property
 import moderngl
 
 from translucent.errors import RenderError
+from translucent.gpu.ledger import before_making
 
 
 class Storage:
@@ -34,6 +35,7 @@ class Storage:
         buffer = self._buffers.get(name)
         if buffer is not None and buffer.size >= size:
             return buffer
+        before_making(self._gl)
         if buffer is not None:
             buffer.release()
             del self._buffers[name]

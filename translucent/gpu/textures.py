@@ -9,6 +9,7 @@ import numpy as np
 
 from translucent.brdf_table import brdf_table
 from translucent.errors import RenderError
+from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import set_uniform
 from translucent.surface import Surface
 from translucent.texture import Texture
@@ -60,6 +61,7 @@ class TextureCache:
             height, width, channels = texture.pixels.shape
             if max(width, height) > (limit := int(self._gl.info["GL_MAX_TEXTURE_SIZE"])):
                 raise RenderError(f"{texture!r}", f"this OpenGL ends at {limit}", "give a smaller picture")
+            before_making(self._gl)
             content = np.ones((height, width, 4), dtype=np.float16)
             with np.errstate(under="ignore"):
                 content[..., :channels] = texture.pixels

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -21,15 +20,12 @@ from translucent.frame import Frame
 from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
+from translucent.gpu.strides import STRIDES, places, shifts
 from translucent.render_plan import RenderPlan
-from translucent.sampling import sample_shifts
 from translucent.scene import Scene
 from translucent.tone import TONES
 
 Size = tuple[int, int]
-
-#: Strides of steps; the sides of pictures are multiples of the largest.
-STRIDES = (1, 2, 4, 8)
 
 #: Samples of a pixel after which its edges are smooth.
 SAMPLES = 16
@@ -99,7 +95,7 @@ class _Side:
 
     def known(self) -> list[int]:
         """Which place of the stride x stride ones stands in for each, and for those that no stride has, 0."""
-        order = _order(self.stride)
+        order = places(self.stride)
         found = [0] * STRIDES[-1] ** 2
         for (x, y), block in order[: max(self.step, 1)]:
             for i in range(x, x + block):
@@ -232,7 +228,7 @@ class Viewport:
         chosen = self._side(side, self.size)
         chosen.stride = stride
         round_, number = divmod(chosen.step, stride * stride)
-        phase, _ = _order(stride)[number]
+        phase, _ = places(stride)[number]
         right, down = shifts(samples)[(round_ - 1) % samples] if round_ else (0.0, 0.0)
         self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
@@ -386,24 +382,3 @@ class Viewport:
             self._gl.blend_equation = moderngl.FUNC_ADD
             self._gl.blend_func = moderngl.ONE, moderngl.ONE
         self._gathering.render(moderngl.TRIANGLES, vertices=3)
-
-
-@lru_cache(maxsize=4)
-def shifts(samples: int) -> npt.NDArray[np.float64]:
-    """(samples, 2): where in a pixel its later samples are."""
-    return sample_shifts(samples)
-
-
-@lru_cache(maxsize=4)
-def _order(stride: int) -> list[tuple[Size, int]]:
-    """Places within stride x stride pixels, in the order in which they are drawn, and how far each one's color goes."""
-    order: list[tuple[Size, int]] = [((0, 0), stride)]
-    block = stride // 2
-    while block:
-        # Diagonals first: half of the new pixels already make the picture look sharper in both directions.
-        known = {place for place, _ in order}
-        places = [(x, y) for y in range(0, stride, block) for x in range(0, stride, block) if (x, y) not in known]
-        places.sort(key=lambda place: (place[0] % (2 * block) == 0) + (place[1] % (2 * block) == 0))
-        order += [(place, block) for place in places]
-        block //= 2
-    return order

@@ -100,6 +100,17 @@ def run(
     return window.work
 
 
+def leave(work: Workspace) -> None:
+    """End the process here if threads of a closed window are still at work.
+
+    At exit CPython before 3.14 unwinds the stacks of threads that nobody waits for, at which C++ libraries abort.
+    """
+    if not work.ended:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
+
+
 @contextmanager
 def _told_as_messages(work: Workspace) -> Iterator[None]:
     """Warnings go to the window, not to a terminal that nobody sees."""

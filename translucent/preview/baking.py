@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +19,7 @@ from translucent.preview.document import Orbit
 from translucent.preview.elsewhere import in_a_process
 from translucent.preview.numbers import length_text
 from translucent.preview.orbiting import camera_of
-from translucent.preview.tasks import Task
+from translucent.preview.tasks import Report, Task
 from translucent.scene import Object, Scene
 from translucent.surface import Surface
 from translucent.texture import Texture
@@ -72,7 +71,7 @@ def bake_map(task: Task, body: Object, medium: Medium, mode: str, size: int, ray
     return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
 
 
-def _bake(report: Callable[[float | None, str], None], mesh: Mesh, options: dict[str, Any]) -> ThicknessMap:
+def _bake(report: Report, mesh: Mesh, options: dict[str, Any]) -> ThicknessMap:
     from translucent.bake.bake import bake_thickness
 
     def progress(done: int, total: int, cast: int) -> None:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -22,16 +22,18 @@ from translucent.corner_normals import corner_normals, has_drawn_normals, keep_d
 from translucent.environment import Environment
 from translucent.environment_map import EnvironmentMap
 from translucent.errors import TranslucentError
-from translucent.gpu.passes.variants import ProgramLedger, ProgramName
+from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.renderer import GpuRenderer
+from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
 from translucent.mesh import Mesh
 from translucent.preview.elsewhere import Companion
-from translucent.preview.tasks import CancelledError, Lane, Task, problem
+from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
 from translucent.render_plan import RenderPlan
 from translucent.scene import Object, Scene
 from translucent.solids import Box
 from translucent.surface import Surface
 from translucent.texture import Texture
+from translucent.tone import TONES
 
 #: Size of the frames that are drawn to have their shaders compiled. No power of two: drivers compile another code for
 #: pictures whose sides are, and those of windows seldom are.
@@ -68,30 +70,29 @@ class Compiler:
 
     Attributes
     ----------
-    ledger : ProgramLedger
-        For the contexts that wait.
+    ledger : Ledger
+        For the context that waits.
     lane : Lane
         One request after the other; a task that nobody waits for has no name.
-    written : float
-        When the shaders were written that are in use.
-    begun : bool
     """
 
     def __init__(self) -> None:
         self._companion = Companion()
-        self._turn = threading.Lock()
-        self.written = 0.0
-        self.begun = False
-        self.ledger = ProgramLedger()
-        self.lane = Lane("compile", self._companion.close)
+        self.ledger = Ledger()
+        self.lane = Lane("compile")
 
     def begin(
         self, scene: Scene, plans: Sequence[RenderPlan], written: float, then: Callable[[Compiled], None]
     ) -> None:
         """Start the process, with a frame like the one that is on show; from now on, the context waits for it."""
-        self.begun = self.ledger.postpones = True
+        self.ledger.postpones = True
         self.ledger.elsewhere |= self.ledger.needed
-        self.ask("", scene, plans, written, then)
+
+        def work(task: Task) -> Compiled:
+            self._call(task, show_frames, stand_in(scene), plans[0], written)
+            return self._make(task, scene, plans, written)
+
+        self.lane.start("", work, then)
 
     def lacks_normals(self, scene: Scene, plans: Sequence[RenderPlan]) -> bool:
         """Whether the context should wait for normals."""
@@ -106,29 +107,20 @@ class Compiler:
         then: Callable[[Compiled], None],
     ) -> None:
         """Make what plans of a scene need, with the shaders that were `written` last at this time."""
-        self.written = written
+        self.lane.start(name, lambda task: self._make(task, scene, plans, written), then)
 
-        def work(task: Task) -> Compiled:
-            for mesh in unsmoothed(scene, plans):
-                task.report(None, "normals")
-                found = self._call(task, smoothed, mesh.vertices, mesh.faces)
-                if isinstance(found, Compiled):
-                    return found
-                keep_drawn_normals(mesh, found)
-            compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), written)
-            return compiled
-
-        self.lane.start(name, work, then)
-
-    def compile(self, scene: Scene, plans: Sequence[RenderPlan], missing: ProgramName) -> None:
-        """Compile what plans of a scene need now, for a thread that can wait for it."""
-        # Others wait, too: it is not cut short.
-        task = Task("preparing the picture", lambda _: None, lambda _: None)
-        found = self._call(task, compile_frames, stand_in(scene), tuple(plans), self.written)
-        self.take(found, missing)
+    def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan], written: float) -> Compiled:
+        for mesh in unsmoothed(scene, plans):
+            task.report(None, "normals")
+            found = self._call(task, smoothed, mesh.vertices, mesh.faces)
+            if isinstance(found, Compiled):
+                return found
+            keep_drawn_normals(mesh, found)
+        compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), written)
+        return compiled
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
-        """Let contexts build what there is, and what was `missing`, though it may not be there: they tell why."""
+        """Let the context build what there is, and what was `missing`: if it is not there, the window tells why."""
         if found.programs is None:
             self.ledger.postpones = False
         else:
@@ -138,13 +130,16 @@ class Compiler:
 
     def _call(self, task: Task, work: Callable[..., Any], *arguments: Any) -> Any:
         """What the process answers; if it cannot, a `Compiled` that says why."""
-        with self._turn:
-            try:
-                return self._companion.call(task, work, *arguments)
-            except CancelledError:
-                raise
-            except Exception as error:  # noqa: BLE001 - whatever it is, the window can do the work itself
-                return Compiled(None, problem(error))
+        try:
+            return self._companion.call(task, work, *arguments)
+        except CancelledError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever it is, the window can do the work itself
+            return Compiled(None, problem(error))
+
+    def close(self) -> None:
+        """End the process."""
+        self._companion.close()
 
 
 def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
@@ -161,15 +156,13 @@ def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
 
 
 def smoothed(
-    report: Callable[[float | None, str], None], vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]
+    report: Report, vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]
 ) -> npt.NDArray[np.float32]:
     """`corner_normals` of a mesh."""
     return corner_normals(Mesh(vertices, faces)).astype(np.float32)
 
 
-def compile_frames(
-    report: Callable[[float | None, str], None], scene: Scene, plans: Sequence[RenderPlan], written: float
-) -> Compiled:
+def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], written: float) -> Compiled:
     """Draw a scene by plans, and tell which programs that took."""
     engine, ledger = _engine(written)
     trouble = ""
@@ -187,10 +180,24 @@ def compile_frames(
     return Compiled(frozenset(ledger.needed), trouble)
 
 
+def show_frames(report: Report, scene: Scene, plan: RenderPlan, written: float) -> None:
+    """Show a frame in all ways that a window has, and two beside each other."""
+    engine, _ = _engine(written)
+    with engine.context.current():
+        viewport = Viewport(engine)
+        viewport.resize(FRAME)
+        for side in (0, 1):
+            viewport.step(side, scene, plan, 1)
+        for mode, right_side, tone in product(MODES, RIGHT_SIDES, TONES):
+            report(None, mode)
+            viewport.present(Shown(mode, right_side, 0.5, tone=tone))
+        viewport.release()
+
+
 @lru_cache(maxsize=1)
-def _engine(written: float) -> tuple[GpuRenderer, ProgramLedger]:
+def _engine(written: float) -> tuple[GpuRenderer, Ledger]:
     """Of the process, for shaders of a time."""
-    engine, ledger = GpuRenderer(), ProgramLedger()
+    engine, ledger = GpuRenderer(), Ledger()
     engine.context.gl.extra = ledger
     return engine, ledger
 

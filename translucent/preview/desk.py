@@ -13,7 +13,7 @@ from imgui_bundle import hello_imgui, imgui
 from translucent.preview.actions import Change
 from translucent.preview.dialogs import open_dialog
 from translucent.preview.document import RANGES
-from translucent.preview.measuring import Crossing, Measured, measure
+from translucent.preview.measuring import Crossing, Measured
 from translucent.preview.scenes import method_of
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
@@ -91,7 +91,7 @@ class Desk:
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)
         if document.display.inset:
-            self.work.measure(lambda own, task: measure(own, task, scene, method, size), "measuring", self._take)
+            self.work.measure(scene, method, size, self._take)
         if document.display.compare in ("reference", "error"):
             levels = (1,) if document.display.compare == "error" else None
             self.work.draw_truth(scene, method, size, levels)

@@ -2,23 +2,40 @@
 
 from __future__ import annotations
 
+import io
+import itertools
 import multiprocessing
+import os
+import pickle
 import signal
 import sys
+import threading
+import time
 import warnings
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
+from translucent.density import DensityGrid
+from translucent.environment_map import EnvironmentMap
 from translucent.errors import RenderError, TranslucentWarning
-from translucent.preview.tasks import Task
+from translucent.mesh import Mesh
+from translucent.preview.tasks import CancelledError, Task
+from translucent.texture import Texture
 
 #: Seconds between looks whether anybody still waits for the result.
 PATIENCE = 0.1
 
-#: Seconds in which a process that has been told to end removes what it has half written.
+#: How far these processes stand back where the window needs the processor.
+NICENESS = 10
+
+#: Seconds in which work that nobody waits for may come to an end, before its process is ended.
 PARTING = 5.0
+
+#: What is large and never changes: sent once, and kept for as long as it lives here.
+KEPT = (Mesh, EnvironmentMap, Texture, DensityGrid)
 
 Result = TypeVar("Result")
 
@@ -36,7 +53,8 @@ class Companion:
     """A process that does one thing after the other; it begins with the first of them, and again if it had to end."""
 
     def __init__(self) -> None:
-        self._running: tuple[BaseProcess, Connection] | None = None
+        self._running: _Running | None = None
+        self._turn = threading.Lock()
 
     def call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
         """The result of `work(report, *arguments)`, which calls ``report(share, detail)``; its warnings are given here.
@@ -44,7 +62,8 @@ class Companion:
         Parameters
         ----------
         task : Task
-            Is told how far the work is; the process ends when nobody waits for it any more.
+            Is told how far the work is. When nobody waits for it any more, the work ends at its next report, or if that
+            takes too long, the process.
         work : callable
             A function of a module: the process finds it by its name.
         *arguments
@@ -59,20 +78,32 @@ class Companion:
         Exception
             What `work` raises.
         """
-        process, pipe = self._running = self._running or _start()
+        while not self._turn.acquire(timeout=PATIENCE):
+            task.report(task.share, task.detail)
         try:
-            pipe.send((work, arguments))
-            failed, content = _answer(task, pipe)
+            return self._call(task, work, *arguments)
+        finally:
+            self._turn.release()
+
+    def _call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
+        running = self._running = self._running or _Running()
+        try:
+            running.ask(work, arguments)
+            failed, content = running.answer(task)
         except (EOFError, ConnectionError):
-            process.join()
+            status = running.status()
             self.close()
             raise RenderError(
                 task.name,
-                f"its process ended with status {process.exitcode}, as when the memory is full",
+                f"its process ended with status {status}, as when the memory is full",
                 "close other programs, or ask for less",
             ) from None
+        except CancelledError:
+            if not running.stop():
+                self.close()
+            raise
         except BaseException:
-            self.close()  # nothing else would stop what it is at
+            self.close()
             raise
         if failed:
             raise content
@@ -81,52 +112,142 @@ class Companion:
     def close(self) -> None:
         """End the process, whatever it is at."""
         if self._running is not None:
-            process, pipe = self._running
-            self._running = None
-            process.terminate()
-            process.join(PARTING)
-            process.kill()
-            pipe.close()
+            running, self._running = self._running, None
+            running.close()
 
 
-def _start() -> tuple[BaseProcess, Connection]:
-    # Spawned, not forked: OpenGL and threads do not survive a fork.
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_run, args=(theirs,), daemon=True)
-    process.start()
-    theirs.close()
-    return process, ours
+class _Running:
+    """A process, and what it has been sent."""
+
+    def __init__(self) -> None:
+        # Spawned, not forked: OpenGL and threads do not survive a fork.
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process: BaseProcess = context.Process(target=_run, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+        self._numbers = itertools.count(1)
+        self._tokens: WeakKeyDictionary[object, int] = WeakKeyDictionary()
+        self._sent: set[int] = set()
+        self._at = 0
+
+    def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+        """Send work, after what it needs that has not been sent before."""
+        stream = io.BytesIO()
+        pickler = _Pickler(stream, self._token)
+        pickler.dump((work, arguments))
+        gone = self._sent - set(self._tokens.values())
+        self._sent -= gone
+        self._pipe.send(("drop", gone))
+        for token, thing in pickler.found.items():
+            if token not in self._sent:
+                self._pipe.send(("keep", (token, thing)))
+                self._sent.add(token)
+        self._at = next(self._numbers)
+        self._pipe.send(("work", (self._at, stream.getvalue())))
+
+    def answer(self, task: Task) -> tuple[bool, Any]:
+        """Whether the work failed, and its result or error."""
+        while True:
+            if not self._pipe.poll(PATIENCE):
+                task.report(task.share, task.detail)
+                continue
+            kind, content = self._pipe.recv()
+            if kind in ("done", "failed"):
+                return kind == "failed", content
+            if kind == "warning":
+                warnings.warn(content, TranslucentWarning, stacklevel=4)
+            else:
+                task.report(*content)
+
+    def stop(self) -> bool:
+        """Have the work end at its next report; whether it did so in time."""
+        end = time.monotonic() + PARTING
+        try:
+            self._pipe.send(("stop", self._at))
+            while self._pipe.poll(max(end - time.monotonic(), 0.0)):
+                if self._pipe.recv()[0] in ("done", "failed"):
+                    return True
+        except (EOFError, ConnectionError):
+            pass
+        return False
+
+    def status(self) -> int | None:
+        """With what the process has ended."""
+        self._process.join()
+        return self._process.exitcode
+
+    def close(self) -> None:
+        """End the process; it has some time to remove what it has half written."""
+        self._process.terminate()
+        self._process.join(PARTING)
+        self._process.kill()
+        self._pipe.close()
+
+    def _token(self, thing: object) -> int:
+        return self._tokens.setdefault(thing, next(self._numbers))
 
 
-def _answer(task: Task, pipe: Connection) -> tuple[bool, Any]:
-    """Whether the work failed, and its result or error."""
-    while True:
-        if not pipe.poll(PATIENCE):
-            task.report(task.share, task.detail)
-            continue
-        kind, content = pipe.recv()
-        if kind in ("done", "failed"):
-            return kind == "failed", content
-        if kind == "warning":
-            warnings.warn(content, TranslucentWarning, stacklevel=3)
-        else:
-            task.report(*content)
+class _Pickler(pickle.Pickler):
+    """Writes tokens for what is kept; `found` has the things themselves."""
+
+    def __init__(self, stream: io.BytesIO, token: Callable[[object], int]) -> None:
+        super().__init__(stream, protocol=pickle.HIGHEST_PROTOCOL)
+        self._token = token
+        self.found: dict[int, object] = {}
+
+    def persistent_id(self, thing: object) -> int | None:
+        if not isinstance(thing, KEPT):
+            return None
+        token = self._token(thing)
+        self.found[token] = thing
+        return token
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads what `_Pickler` writes."""
+
+    def __init__(self, stream: io.BytesIO, kept: dict[int, object]) -> None:
+        super().__init__(stream)
+        self._kept = kept
+
+    def persistent_load(self, token: Any) -> object:
+        return self._kept[token]
 
 
 def _run(pipe: Connection) -> None:
     """In the process: until nobody is at the other end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # not at once: files are removed that are half written
     warnings.showwarning = lambda message, *_, **__: pipe.send(("warning", str(message)))
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+    kept: dict[int, object] = {}
     while True:
         try:
-            work, arguments = pipe.recv()
+            kind, content = pipe.recv()
         except EOFError:
             return
-        try:
-            result = work(lambda share, detail: pipe.send(("report", (share, detail))), *arguments)
-        except Exception as error:  # noqa: BLE001 - raised where the result is waited for
-            pipe.send(("failed", error))
-        else:
-            pipe.send(("done", result))
+        if kind == "keep":
+            token, kept[token] = content
+        elif kind == "drop":
+            for token in content:
+                del kept[token]
+        elif kind == "work":
+            _work(pipe, kept, *content)
+
+
+def _work(pipe: Connection, kept: dict[int, object], number: int, content: bytes) -> None:
+    def report(share: float | None, detail: str = "") -> None:
+        while pipe.poll():
+            if pipe.recv() == ("stop", number):
+                raise CancelledError
+        pipe.send(("report", (share, detail)))
+
+    try:
+        work, arguments = _Unpickler(io.BytesIO(content), kept).load()
+        result = work(report, *arguments)
+    except Exception as error:  # noqa: BLE001 - raised where the result is waited for
+        pipe.send(("failed", error))
+    else:
+        pipe.send(("done", result))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeAlias
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from translucent.animation import check_animation, write_animation
 from translucent.errors import InputError
 from translucent.frame import SUFFIXES, check_output
+from translucent.preview.tasks import Report
 from translucent.renderer import Renderer
 from translucent.scene import Scene
 from translucent.thickness import Method
@@ -21,9 +22,6 @@ Size: TypeAlias = tuple[int, int]
 
 #: Exposure in stops, and the name of the tone curve.
 Look: TypeAlias = tuple[float, str]
-
-#: Tells how far it is, and at what.
-Report: TypeAlias = Callable[[float | None, str], None]
 
 #: Of files with a moving picture.
 MOVING = (".gif", ".webp", ".mp4")

@@ -1,12 +1,12 @@
-"""What the background finds out: errors against the reference, histograms, what is on one ray."""
+"""What another process finds out: errors against the reference, histograms, what is on one ray."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +16,9 @@ from translucent.appearance import thickness_samples
 from translucent.camera import Camera
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frame import Frame
-from translucent.gpu.passes.variants import PostponedError
 from translucent.metrics import Errors, compare
-from translucent.preview.compiling import Compiler
 from translucent.preview.numbers import Seen
-from translucent.preview.tasks import Task
+from translucent.preview.tasks import Report
 from translucent.reference.hits import camera_hits
 from translucent.renderer import Renderer
 from translucent.scene import Object, Scene
@@ -98,50 +96,22 @@ class Crossing:
     body: int | None
 
 
-class Measuring:
-    """A renderer that belongs to the thread of a lane.
-
-    Parameters
-    ----------
-    compiler : Compiler
-        Compiles what frames need: done in this thread, it would stop the window.
-    """
-
-    def __init__(self, compiler: Compiler) -> None:
-        self._compiler = compiler
-        self._renderer: Renderer | None = None
-        self._written = 0.0
-
-    def render(self, scene: Scene, size: Size, method: Method | None) -> Frame:
-        """A frame; the renderer is made when first needed, in the thread that needs it."""
-        if self._written != self._compiler.written:
-            self.close()  # it has compiled other shaders
-        if self._renderer is None:
-            self._renderer, self._written = Renderer(), self._compiler.written
-            self._renderer.gpu.context.gl.extra = self._compiler.ledger
-        while True:
-            try:
-                return self._renderer.render(scene, size, method)
-            except PostponedError as missing:
-                self._compiler.compile(scene, [self._renderer.plan(scene, method)], missing.program)
-
-    def close(self) -> None:
-        """Free it, in its thread."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+@lru_cache(maxsize=1)
+def _renderer() -> Renderer:
+    """Of the process that measures."""
+    return Renderer()
 
 
-def measure(measuring: Measuring, task: Task, scene: Scene, method: Method | None, size: Size) -> Measured:
+def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> Measured:
     """Compare a small picture of the scene with the reference, as straight rays see both."""
     height = MEASURED_HEIGHT
     small = max(round(height * size[0] / size[1]), 1), height
     plain = straight(scene)
-    task.report(None, "drawing")
+    report(None, "drawing")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TranslucentWarning)  # invalid pixels are counted, below
-        frame = measuring.render(plain, small, method)
-    task.report(None, "float64 reference")
+        frame = _renderer().render(plain, small, method)
+    report(None, "float64 reference")
     truth = reference.render(plain, small, method)
     errors: tuple[Errors, ...] = ()
     doubt = ""
@@ -172,30 +142,24 @@ def _index_matched(item: Object) -> Object:
     return dataclasses.replace(item, medium=medium, surface=None)
 
 
-def truth_levels(
-    task: Task,
-    scene: Scene,
-    method: Method | None,
-    size: Size,
-    deliver: Callable[[Truth], None],
-    levels: tuple[int, ...] | None = None,
-) -> None:
-    """The reference of the whole picture, coarse first; each level goes to `deliver`.
+def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Scene, tuple[int, ...]]:
+    """What the reference of a whole picture shows, and the shares of its size at which it is drawn, coarse first.
 
     With `levels` given it is that of straight rays, for differences of thickness.
     """
     bent = any(item.has_interface for item in scene.objects) and levels is None
-    seen = scene
-    if not bent or any(item.surface is not None and any(item.surface.textures) for item in scene.objects):
-        seen, bent = straight(scene), False
-    levels = levels or (BENT_LEVELS if bent else LEVELS)
-    for number, level in enumerate(levels):
-        task.report(number / len(levels), f"at 1/{level}")
-        small = max(size[0] // level, 1), max(size[1] // level, 1)
-        deliver(Truth(scene, method, reference.render(seen, small, method), level))
+    textured = any(item.surface is not None and any(item.surface.textures) for item in scene.objects)
+    if not bent or textured:
+        return straight(scene), levels or LEVELS
+    return scene, BENT_LEVELS
 
 
-def crossing(scene: Scene, size: Size, pixel: Size) -> Crossing:
+def truth_frame(report: Report, scene: Scene, method: Method | None, size: Size) -> Frame:
+    """The reference of a picture."""
+    return reference.render(scene, size, method)
+
+
+def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
     """What the reference finds on the ray through a pixel's center."""
     camera = pixel_camera(scene.camera, size, pixel)
     one = dataclasses.replace(straight(scene), camera=camera)

@@ -11,7 +11,7 @@ from translucent.aovs import false_colors, marks
 from translucent.preview import numbers
 from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.desk import Desk, Probed, em
-from translucent.preview.measuring import crossing
+from translucent.preview.measuring import Crossing
 from translucent.units import metres_per_unit
 
 #: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
@@ -246,14 +246,14 @@ def why_not(desk: Desk, right: bool) -> str:
 
 def _ask_crossing(desk: Desk, probed: Probed) -> None:
     scene, size = desk.work.scene(), desk.stage.viewport.size
-    if scene is None or "ray" not in desk.work.lanes or desk.work.lanes["ray"].task is not None:
+    if scene is None or desk.work.lanes["ray"].task is not None:
         return
     probed.asked = True
 
-    def take(found: object) -> None:
-        probed.crossing = found  # type: ignore[assignment]
+    def take(found: Crossing) -> None:
+        probed.crossing = found
 
-    desk.work.lanes["ray"].start("", lambda _: crossing(scene, size, probed.pixel), take)
+    desk.work.cross(scene, size, probed.pixel, take)
 
 
 def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:

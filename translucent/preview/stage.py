@@ -12,8 +12,9 @@ from typing import Any, TypeVar
 from translucent.assets import shader_path
 from translucent.errors import TranslucentError
 from translucent.gpu.context import open_context
-from translucent.gpu.passes.variants import PostponedError, ProgramName
-from translucent.gpu.viewport import STRIDES, Probe, Shown, Viewport
+from translucent.gpu.ledger import PostponedError, ProgramName
+from translucent.gpu.strides import STRIDES
+from translucent.gpu.viewport import Probe, Shown, Viewport
 from translucent.preview.compiling import FRAME, Compiled, Compiler
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of
@@ -88,6 +89,7 @@ class Stage:
         self.timings = [Timing(), Timing()]
         self.problem = self.shader_problem = ""
         self.drawing = 0.0
+        self._begun = False
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._presented: tuple[object, ...] = ()
@@ -107,12 +109,15 @@ class Stage:
         What goes wrong is told in `problem`, and the last picture stays.
         """
         started = time.perf_counter()
+        if self._compiler is not None:
+            self._compiler.ledger.begin_frame(BUDGET)
         with self.current():
             try:
                 more = self._draw(workspace, size)
                 self.problem = ""
-            except PostponedError as missing:
-                self._postpone(workspace, missing.program)
+            except PostponedError as error:
+                if error.program is not None:
+                    self._postpone(workspace, self._shown, error.program)
                 more = True
             except TranslucentError as error:
                 self.problem, more = str(error), False
@@ -140,7 +145,7 @@ class Stage:
             return True
         fresh = wanted != self._shown
         if not fresh:
-            self._begin_compiling(workspace, scene)
+            self._begin(workspace, scene)
             self.watch(workspace)
         else:
             self.plans = [
@@ -152,13 +157,15 @@ class Stage:
             self._truth = None
             self._strides = [self._factor(plan, STRIDES) for plan in self.plans]
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
-                self._postpone(workspace)
+                self._postpone(workspace, wanted)
                 return True
             if display.mode == "picture" and display.compare == "off":
                 return self._draw_at_once(scene, methods[0], workspace)
-        drawn = [self._step(side, scene, display.antialias) for side in ((1, 0) if both else (0,))]
-        self._present(workspace, scene, changed=any(drawn))
-        return any(drawn)
+        # One side at a time, the one that is behind: two would take twice as long.
+        sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
+        drawn = any(self._step(side, scene, display.antialias) for side in sides)
+        self._present(workspace, scene, changed=drawn)
+        return drawn
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """While things move: the picture itself and nothing beside it."""
@@ -194,7 +201,7 @@ class Stage:
         """The least of the factors with which a picture is drawn quickly, as far as one can tell."""
         known = None if plan is None else self._costs.get(_kind(plan))
         if known is None:
-            return factors[0] if plan is None else factors[-2]
+            return factors[0] if plan is None else factors[-2:][0]
         return next((factor for factor in factors if known / factor**2 <= BUDGET), factors[-1])
 
     def _present(self, workspace: Workspace, scene: Scene, changed: bool) -> None:
@@ -255,21 +262,25 @@ class Stage:
             self._newest = newest
             self.reload(workspace)
 
-    def _begin_compiling(self, workspace: Workspace, scene: Scene) -> None:
-        """There is a first picture: from now on, it stays on show while another process compiles."""
-        if self._compiler is not None and not self._compiler.begun:
+    def _begin(self, workspace: Workspace, scene: Scene) -> None:
+        """There is a first picture: from now on, it stays on show while later ones are prepared."""
+        if self._begun:
+            return
+        self._begun = True
+        workspace.prepare()
+        if self._compiler is not None:
             self._compiler.begin(scene, self._drawn_plans, self._newest, partial(self._take_compiled, workspace))
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
         return [plan for plan in self.plans if plan is not None]
 
-    def _postpone(self, workspace: Workspace, program: ProgramName | None = None) -> None:
+    def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Ask for what is missing; until it is there, the same picture is not tried again."""
         compiler, scene = self._compiler, workspace.scene()
         assert compiler is not None
         assert scene is not None
-        self._postponed, self._shown = self._shown, ()
+        self._postponed, self._shown = wanted, ()
         if compiler.lane.task is None:
             then = partial(self._take_compiled, workspace, missing=program)
             compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, then)

@@ -7,9 +7,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, TypeAlias
 
 from translucent.errors import TranslucentError
+
+#: Tells how far work is, 0 to 1 if that is known, and what it is at.
+Report: TypeAlias = Callable[[float | None, str], None]
 
 
 class CancelledError(Exception):
@@ -95,13 +98,10 @@ class Lane:
     Parameters
     ----------
     name : str
-    at_end : callable, optional
-        Called in the thread when the lane ends.
     """
 
-    def __init__(self, name: str, at_end: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, name: str) -> None:
         self.task: Task | None = None
-        self._at_end = at_end
         self._waiting: SimpleQueue[Task | None] = SimpleQueue()
         # A daemon: nobody who closes the window waits for a reference that nobody will see.
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -144,7 +144,6 @@ class Lane:
         while (task := self._waiting.get()) is not None:
             task.run()
             del task  # or it, and its model, would stay until the next one
-        self._at_end()
 
 
 def problem(error: Exception) -> str:

@@ -8,7 +8,6 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,11 +17,11 @@ from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
 from translucent.preview.document import Document, Model, Orbit
-from translucent.preview.elsewhere import in_a_process
+from translucent.preview.elsewhere import Companion, in_a_process
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
-from translucent.preview.measuring import Measured, Measuring, Truth, truth_levels
+from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
 from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Lane, Task
@@ -81,10 +80,11 @@ class Workspace:
         self.bake: Bake | None = None
         self.show_bake = True
         self.compiler = Compiler()
-        self._measuring = Measuring(self.compiler)
+        #: What takes a moment, and what takes long.
+        self._measuring, self._reference = Companion(), Companion()
         self.lanes = {
             "load": Lane("load"),
-            "draw": Lane("draw", self._measuring.close),
+            "draw": Lane("draw"),
             "truth": Lane("truth"),
             "bake": Lane("bake"),
             "ray": Lane("ray"),
@@ -93,7 +93,6 @@ class Workspace:
             "compile": self.compiler.lane,
         }
         self._lighting = Lighting(self.lanes["light"])
-        self.lanes["light"].start("filtering the environment", prepare, lambda _: None)
         self._models: list[Loaded] = []
         self._refused: Model | None = None
         self._scene: tuple[Document, Loaded, Scene] | None = None
@@ -202,19 +201,41 @@ class Workspace:
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
         return [task for task in tasks if task.name or task is not self.compiler.lane.task]
 
-    def measure(self, work: Callable[[Measuring, Task], Any], name: str, then: Callable[[Any], None]) -> None:
-        """Draw something in the background, with a renderer of its own."""
-        self.lanes["draw"].start(name, lambda task: work(self._measuring, task), then)
+    def prepare(self) -> None:
+        """Make what later pictures need, now that the first is there."""
+        if self.lanes["light"].task is None:
+            self.lanes["light"].start("", prepare, lambda _: None)
+
+    def measure(
+        self, scene: Scene, method: Method | None, size: tuple[int, int], then: Callable[[Measured], None]
+    ) -> None:
+        """Compare a small picture with the reference, in the background."""
+
+        def work(task: Task) -> Measured:
+            found = self._measuring.call(task, measure, scene, method, size)
+            return dataclasses.replace(found, scene=scene, method=method)
+
+        self.lanes["draw"].start("measuring", work, then)
+
+    def cross(
+        self, scene: Scene, size: tuple[int, int], pixel: tuple[int, int], then: Callable[[Crossing], None]
+    ) -> None:
+        """Follow the ray of a pixel in the reference, in the background."""
+        self.lanes["ray"].start("", lambda task: self._measuring.call(task, crossing, scene, size, pixel), then)
 
     def draw_truth(
         self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
     ) -> None:
         """Draw the reference of the whole picture in the background; `truth` is the finest that is there."""
+        seen, shares = truth_plan(scene, levels)
 
-        def deliver(truth: Truth) -> None:
-            self.truth = truth
+        def work(task: Task) -> None:
+            for number, level in enumerate(shares):
+                task.report(number / len(shares), f"at 1/{level}")
+                small = max(size[0] // level, 1), max(size[1] // level, 1)
+                frame = self._reference.call(task, truth_frame, seen, method, small)
+                self.truth = Truth(scene, method, frame, level)
 
-        work = partial(truth_levels, scene=scene, method=method, size=size, deliver=deliver, levels=levels)
         self.lanes["truth"].start("float64 reference", work, lambda _: None)
 
     def start_bake(self, mode: str, size: int, rays: int) -> None:
@@ -255,6 +276,8 @@ class Workspace:
 
     def close(self) -> None:
         """End all work."""
+        for companion in (self._measuring, self._reference, self.compiler):
+            companion.close()  # nobody will see what they are at
         for lane in self.lanes.values():
             lane.close()
 

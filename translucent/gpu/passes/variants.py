@@ -2,50 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import build_program
-
-#: What names a program in every process: its files, and its switches.
-ProgramName: TypeAlias = tuple[tuple[str, str], tuple[tuple[str, int], ...]]
-
-
-class PostponedError(Exception):
-    """A frame needs a program that its context is not to compile yet."""
-
-    def __init__(self, program: ProgramName) -> None:
-        super().__init__(f"{program} has not been compiled")
-        self.program = program
-
-
-@dataclass(eq=False)
-class ProgramLedger:
-    """What the frames of a context have needed, and what it may compile. It is the context's ``extra``, if anything.
-
-    Attributes
-    ----------
-    postpones : bool
-        Programs that `elsewhere` does not have raise a `PostponedError`.
-    elsewhere : set of ProgramName
-        What another process has compiled: the driver finds it on disk.
-    needed : set of ProgramName
-        What this context has compiled.
-    """
-
-    postpones: bool = False
-    elsewhere: set[ProgramName] = field(default_factory=set)
-    needed: set[ProgramName] = field(default_factory=set)
-
-    def enter(self, program: ProgramName) -> None:
-        """Note a program that is about to be compiled, or raise `PostponedError`."""
-        if self.postpones and program not in self.elsewhere:
-            raise PostponedError(program)
-        self.needed.add(program)
 
 
 class Variants:
@@ -74,8 +38,7 @@ class Variants:
         """The program with these switches; `PostponedError` if the context's ledger says so."""
         key = tuple(sorted((name, int(value)) for name, value in switches.items()))
         if key not in self._programs:
-            if isinstance(self._gl.extra, ProgramLedger):
-                self._gl.extra.enter((self._files, key))
+            before_making(self._gl, (self._files, key))
             self._programs[key] = build_program(self._gl, *self._files, dict(key), self._version, **self._samplers)
         return self._programs[key]
 

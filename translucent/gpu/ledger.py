@@ -1,0 +1,69 @@
+"""What the frames of a context make and keep, and what has to wait: a window must not stand still for it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import moderngl
+
+#: What names a program in every process: its files, and its switches.
+ProgramName: TypeAlias = tuple[tuple[str, str], tuple[tuple[str, int], ...]]
+
+
+class PostponedError(Exception):
+    """A frame is not drawn to its end.
+
+    Attributes
+    ----------
+    program : ProgramName, optional
+        What its context is not to compile yet; None if the frame has made enough for now, and the next one goes on.
+    """
+
+    def __init__(self, program: ProgramName | None) -> None:
+        super().__init__("the frame has made enough for now" if program is None else f"{program} has to wait")
+        self.program = program
+
+
+@dataclass(eq=False)
+class Ledger:
+    """What a context has made and may make. It is the context's ``extra``, if anything is.
+
+    Attributes
+    ----------
+    postpones : bool
+        Frames raise `PostponedError` rather than compile what `elsewhere` does not have, or make more than one thing
+        after the time that `begin_frame` gives them.
+    elsewhere : set of ProgramName
+        What another process has compiled: the driver finds it on disk.
+    needed : set of ProgramName
+        What this context has compiled.
+    """
+
+    postpones: bool = False
+    elsewhere: set[ProgramName] = field(default_factory=set)
+    needed: set[ProgramName] = field(default_factory=set)
+    _until: float = 0.0
+    _made: bool = False
+
+    def begin_frame(self, seconds: float) -> None:
+        """A frame begins, that has some seconds to make things."""
+        self._until, self._made = time.perf_counter() + seconds, False
+
+    def enter(self, program: ProgramName | None) -> None:
+        """Note what is about to be made, or raise `PostponedError`."""
+        if self.postpones and program is not None and program not in self.elsewhere:
+            raise PostponedError(program)
+        # Every frame makes something, or none would ever be done.
+        if self.postpones and self._made and time.perf_counter() > self._until:
+            raise PostponedError(None)
+        self._made = True
+        if program is not None:
+            self.needed.add(program)
+
+
+def before_making(gl: moderngl.Context, program: ProgramName | None = None) -> None:
+    """Ask the context's ledger whether a program, or something else that is kept and takes time, is to be made now."""
+    if isinstance(gl.extra, Ledger):
+        gl.extra.enter(program)

@@ -1,0 +1,34 @@
+"""In which order a picture is drawn, one sample of some pixels after the other."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.sampling import sample_shifts
+
+#: Strides of steps; the sides of pictures are multiples of the largest.
+STRIDES = (1, 2, 4, 8)
+
+
+@lru_cache(maxsize=4)
+def shifts(samples: int) -> npt.NDArray[np.float64]:
+    """(samples, 2): where in a pixel its later samples are."""
+    return sample_shifts(samples)
+
+
+@lru_cache(maxsize=4)
+def places(stride: int) -> list[tuple[tuple[int, int], int]]:
+    """Places within stride x stride pixels, in the order in which they are drawn, and how far each one's color goes."""
+    order: list[tuple[tuple[int, int], int]] = [((0, 0), stride)]
+    block = stride // 2
+    while block:
+        # Diagonals first: half of the new pixels already make the picture look sharper in both directions.
+        known = {place for place, _ in order}
+        fresh = [(x, y) for y in range(0, stride, block) for x in range(0, stride, block) if (x, y) not in known]
+        fresh.sort(key=lambda place: (place[0] % (2 * block) == 0) + (place[1] % (2 * block) == 0))
+        order += [(place, block) for place in fresh]
+        block //= 2
+    return order
