@@ -68,7 +68,8 @@ class Monkey:
 
     def __init__(self, seed: int, folder: Path) -> None:
         self.random = random.Random(seed)
-        self.work, self.stage, self.size = Workspace(Document(Model("knot"))), Stage(), (160, 96)
+        self.work, self.size = Workspace(Document(Model("knot"))), (160, 96)
+        self.stage = Stage(compiler=self.work.compiler)
         self.folder, self.bad = folder, bad_files(folder)
         self.refused = 0
         self.verbs = [self.change] * 8 + [self.bad_change, self.move, self.move, self.move, self.preset, self.resize]
@@ -89,6 +90,9 @@ class Monkey:
         self.work.size = self.size
         self.work.update()
         for _ in range(self.random.choice((1, 1, 2, 5))):
+            self.stage.draw(self.work, self.size)
+        if self.random.random() < 0.2:
+            self.settle(lambda: self.work.compiler.lane.task is None)
             self.stage.draw(self.work, self.size)
         with self.stage.current() as gl:
             if (error := gl.error) != "GL_NO_ERROR":
@@ -181,7 +185,7 @@ class Monkey:
 
         self.work.measure(scene, method, (64, 36), take)
         if self.random.random() < 0.7:
-            self.settle(lambda: self.work.lanes["draw"].task is None)
+            self.settle(lambda: self.work.lanes["draw"].task is None, 5.0)
 
     def open(self) -> None:
         self.work.open(Model(self.random.choice((*MODELS, *MODELS, *self.bad)), "m"))

@@ -29,6 +29,10 @@ Size = tuple[int, int]
 #: Height of the picture that is compared with the reference, in pixels.
 MEASURED_HEIGHT = 90
 
+#: The same where media scatter light of lamps, which the reference has to look for from every place: a pixel takes a
+#: hundred times as long.
+LIT_HEIGHT = 30
+
 #: Shares of the viewport's size at which the split's reference is drawn, one after the other.
 LEVELS = (8, 4, 2, 1)
 
@@ -104,7 +108,8 @@ def _renderer() -> Renderer:
 
 def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> Measured:
     """Compare a small picture of the scene with the reference, as straight rays see both."""
-    height = MEASURED_HEIGHT
+    lit = bool(scene.lights) and any(item.medium is not None and item.medium.scatters for item in scene.objects)
+    height = LIT_HEIGHT if lit else MEASURED_HEIGHT
     small = max(round(height * size[0] / size[1]), 1), height
     plain = straight(scene)
     report(None, "drawing")

@@ -281,7 +281,7 @@ class Stage:
         assert compiler is not None
         assert scene is not None
         self._postponed, self._shown = wanted, ()
-        if compiler.lane.task is None:
+        if compiler.lane.task is None or not compiler.lane.task.name:  # for which nobody waits
             then = partial(self._take_compiled, workspace, missing=program)
             compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, then)
 
