@@ -158,6 +158,13 @@ def test_a_preset_is_the_medium_that_it_names() -> None:
     assert (edited.source, edited.preset) == ("coefficients", "")
 
 
+def test_what_a_preset_scatters_is_not_lost() -> None:
+    """As ``translucent render --preset`` shows it."""
+    milk = apply(Document(), ChoosePreset("whole_milk"))
+    assert milk.material.multiple_scattering
+    assert not apply(milk, ChoosePreset("jade")).material.multiple_scattering
+
+
 def test_the_material_of_a_model_is_its_medium() -> None:
     mesh = tl.Mesh(np.eye(4, 3), [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
     medium = tl.Medium(absorption=(3, 2, 1), scattering=(0.5, 0, 0), anisotropy=0.2, ior=1.3)

@@ -179,8 +179,8 @@ def _inset(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     over.add_rect(low, high, WHITE)
     text = "reference, straight rays"
     if measured.errors:
-        text = f"reference; error {numbers.length_text(measured.errors[0].median, desk.get('display.unit'))}"
-    _label(over, ImVec2(low.x, low.y - em(1.5)), text)
+        text += f"; error {numbers.length_text(measured.errors[0].median, desk.get('display.unit'))}"
+    _label(over, ImVec2(min(low.x, high.x - imgui.calc_text_size(text).x - em(0.6)), low.y - em(1.5)), text)
 
 
 def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
