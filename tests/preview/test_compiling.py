@@ -163,11 +163,24 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
     scene, compiler, found = stand_in(showcase(BALL, GLASS)), Compiler(), list[Compiled]()
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
+        compiler.device = renderer.gpu.context.renderer
     compiler.ask("", scene, plans, 0.0, found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
     compiler.lane.close()
     assert found == [Compiled(frozenset(needed(scene, plans[0]) | needed(scene, plans[1])))]
+
+
+def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> None:
+    near.set()
+    scene, compiler, found = stand_in(showcase(BALL, GLASS)), Compiler(), list[Compiled]()
+    compiler.device = "a card from the future"
+    compiler.ask("", scene, [], 0.0, found.append)
+    while not found:
+        compiler.lane.poll(pytest.fail)
+    compiler.lane.close()
+    assert found[0].programs is None
+    assert "and the window with a card from the future" in found[0].problem
 
 
 def test_the_last_picture_stays_until_the_next_one_is_compiled(

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from translucent.corner_normals import corner_normals, has_drawn_normals, keep_drawn_normals
 from translucent.environment import Environment
 from translucent.environment_map import EnvironmentMap
-from translucent.errors import TranslucentError
+from translucent.errors import RenderError, TranslucentError
 from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
@@ -74,12 +74,15 @@ class Compiler:
         For the context that waits.
     lane : Lane
         One request after the other; a task that nobody waits for has no name.
+    device : str
+        What the context draws with, as in `GpuContext.renderer`: another one's code would be of no use to it.
     """
 
     def __init__(self) -> None:
         self._companion = Companion()
         self.ledger = Ledger()
         self.lane = Lane("compile")
+        self.device = ""
 
     def begin(
         self, scene: Scene, plans: Sequence[RenderPlan], written: float, then: Callable[[Compiled], None]
@@ -89,7 +92,7 @@ class Compiler:
         self.ledger.elsewhere |= self.ledger.needed
 
         def work(task: Task) -> Compiled:
-            self._call(task, show_frames, stand_in(scene), plans[0], written)
+            self._call(task, show_frames, stand_in(scene), plans[0], written, self.device)
             return self._make(task, scene, plans, written)
 
         self.lane.start("", work, then)
@@ -116,7 +119,7 @@ class Compiler:
             if isinstance(found, Compiled):
                 return found
             keep_drawn_normals(mesh, found)
-        compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), written)
+        compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), written, self.device)
         return compiled
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
@@ -162,9 +165,9 @@ def smoothed(
     return corner_normals(Mesh(vertices, faces)).astype(np.float32)
 
 
-def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], written: float) -> Compiled:
+def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], written: float, device: str) -> Compiled:
     """Draw a scene by plans, and tell which programs that took."""
-    engine, ledger = _engine(written)
+    engine, ledger = _engine(written, device)
     trouble = ""
     with engine.context.current() as gl:
         picture = gl.framebuffer([gl.texture(FRAME, 4)])
@@ -180,9 +183,9 @@ def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], wr
     return Compiled(frozenset(ledger.needed), trouble)
 
 
-def show_frames(report: Report, scene: Scene, plan: RenderPlan, written: float) -> None:
+def show_frames(report: Report, scene: Scene, plan: RenderPlan, written: float, device: str) -> None:
     """Show a frame in all ways that a window has, and two beside each other."""
-    engine, _ = _engine(written)
+    engine, _ = _engine(written, device)
     with engine.context.current():
         viewport = Viewport(engine)
         viewport.resize(FRAME)
@@ -195,9 +198,17 @@ def show_frames(report: Report, scene: Scene, plan: RenderPlan, written: float) 
 
 
 @lru_cache(maxsize=1)
-def _engine(written: float) -> tuple[GpuRenderer, Ledger]:
-    """Of the process, for shaders of a time."""
+def _engine(written: float, device: str) -> tuple[GpuRenderer, Ledger]:
+    """Of the process, for shaders of a time.
+
+    Raises
+    ------
+    RenderError
+        If it draws with another device than the window.
+    """
     engine, ledger = GpuRenderer(), Ledger()
+    if (own := engine.context.renderer) != device:
+        raise RenderError("another process", f"it draws with {own}, and the window with {device}", "mend the drivers")
     engine.context.gl.extra = ledger
     return engine, ledger
 

@@ -85,6 +85,8 @@ class Stage:
         with self.current():
             self.renderer = Renderer(context=self._gl)
             self.viewport = Viewport(self.renderer.gpu)
+        if compiler is not None:
+            compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
         self.problem = self.shader_problem = ""
