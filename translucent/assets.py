@@ -22,6 +22,17 @@ def shader_library() -> list[Path]:
     return sorted((_folder("shaders") / "lib").glob("*.glsl"))
 
 
+def newest_shader() -> float:
+    """When a shader file was written last, in seconds since 1970."""
+    newest = 0.0
+    for path in _folder("shaders").rglob("*.[gvf]*"):
+        try:
+            newest = max(newest, path.stat().st_mtime)
+        except OSError:
+            continue  # it is being written
+    return newest
+
+
 def mesh_path(name: str) -> Path:
     """Path of a mesh that comes with the toolkit, such as ``goblet``; raises `InputError` where there is none."""
     for path in _mesh_files():

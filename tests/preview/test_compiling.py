@@ -164,7 +164,7 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
-    compiler.ask("", scene, plans, 0.0, found.append)
+    compiler.ask("", scene, plans, found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
     compiler.lane.close()
@@ -175,7 +175,7 @@ def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> 
     near.set()
     scene, compiler, found = stand_in(showcase(BALL, GLASS)), Compiler(), list[Compiled]()
     compiler.device = "a card from the future"
-    compiler.ask("", scene, [], 0.0, found.append)
+    compiler.ask("", scene, [], found.append)
     while not found:
         compiler.lane.poll(pytest.fail)
     compiler.lane.close()
@@ -281,13 +281,11 @@ def test_a_shader_that_does_not_compile_is_told_by_the_process(
     broken = tmp_path / "shaders" / "thickness" / "signed_depth.frag"
     good = broken.read_text()
     broken.write_text(good + "\nvoid broken( {\n")
-    stage._newest += 1.0
     stage.reload(work)
     wait(work, lambda: work.compiler.lane.task is None)
     assert "shaders/thickness/signed_depth.frag:" in stage.shader_problem
     assert stage.renderer is before
     broken.write_text(good)
-    stage._newest += 1.0
     stage.reload(work)
     wait(work, lambda: work.compiler.lane.task is None)
     assert stage.shader_problem == ""

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.assets import newest_shader
 from translucent.corner_normals import corner_normals, has_drawn_normals, keep_drawn_normals
 from translucent.environment import Environment
 from translucent.environment_map import EnvironmentMap
@@ -84,16 +85,14 @@ class Compiler:
         self.lane = Lane("compile")
         self.device = ""
 
-    def begin(
-        self, scene: Scene, plans: Sequence[RenderPlan], written: float, then: Callable[[Compiled], None]
-    ) -> None:
+    def begin(self, scene: Scene, plans: Sequence[RenderPlan], then: Callable[[Compiled], None]) -> None:
         """Start the process, with a frame like the one that is on show; from now on, the context waits for it."""
         self.ledger.postpones = True
         self.ledger.elsewhere |= self.ledger.needed
 
         def work(task: Task) -> Compiled:
-            self._call(task, show_frames, stand_in(scene), plans[0], written, self.device)
-            return self._make(task, scene, plans, written)
+            self._call(task, show_frames, stand_in(scene), plans[0], self.device)
+            return self._make(task, scene, plans)
 
         self.lane.start("", work, then)
 
@@ -106,20 +105,19 @@ class Compiler:
         name: str,
         scene: Scene,
         plans: Sequence[RenderPlan],
-        written: float,
         then: Callable[[Compiled], None],
     ) -> None:
-        """Make what plans of a scene need, with the shaders that were `written` last at this time."""
-        self.lane.start(name, lambda task: self._make(task, scene, plans, written), then)
+        """Make what plans of a scene need."""
+        self.lane.start(name, lambda task: self._make(task, scene, plans), then)
 
-    def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan], written: float) -> Compiled:
+    def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan]) -> Compiled:
         for mesh in unsmoothed(scene, plans):
             task.report(None, "normals")
             found = self._call(task, smoothed, mesh.vertices, mesh.faces)
             if isinstance(found, Compiled):
                 return found
             keep_drawn_normals(mesh, found)
-        compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), written, self.device)
+        compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), self.device)
         return compiled
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
@@ -165,9 +163,9 @@ def smoothed(
     return corner_normals(Mesh(vertices, faces)).astype(np.float32)
 
 
-def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], written: float, device: str) -> Compiled:
+def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], device: str) -> Compiled:
     """Draw a scene by plans, and tell which programs that took."""
-    engine, ledger = _engine(written, device)
+    engine, ledger = _engine(newest_shader(), device)
     trouble = ""
     with engine.context.current() as gl:
         picture = gl.framebuffer([gl.texture(FRAME, 4)])
@@ -183,9 +181,9 @@ def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], wr
     return Compiled(frozenset(ledger.needed), trouble)
 
 
-def show_frames(report: Report, scene: Scene, plan: RenderPlan, written: float, device: str) -> None:
+def show_frames(report: Report, scene: Scene, plan: RenderPlan, device: str) -> None:
     """Show a frame in all ways that a window has, and two beside each other."""
-    engine, _ = _engine(written, device)
+    engine, _ = _engine(newest_shader(), device)
     with engine.context.current():
         viewport = Viewport(engine)
         viewport.resize(FRAME)

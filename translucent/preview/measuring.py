@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from translucent import reference
 from translucent.appearance import thickness_samples
+from translucent.assets import newest_shader
 from translucent.camera import Camera
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frame import Frame
@@ -101,8 +102,8 @@ class Crossing:
 
 
 @lru_cache(maxsize=1)
-def _renderer() -> Renderer:
-    """Of the process that measures."""
+def _renderer(written: float) -> Renderer:
+    """Of the process that measures, for shaders of a time."""
     return Renderer()
 
 
@@ -115,7 +116,7 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
     report(None, "drawing")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TranslucentWarning)  # invalid pixels are counted, below
-        frame = _renderer().render(plain, small, method)
+        frame = _renderer(newest_shader()).render(plain, small, method)
     report(None, "float64 reference")
     truth = reference.render(plain, small, method)
     errors: tuple[Errors, ...] = ()

@@ -6,10 +6,9 @@ import time
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, TypeVar
 
-from translucent.assets import shader_path
+from translucent.assets import newest_shader
 from translucent.errors import TranslucentError
 from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
@@ -99,7 +98,7 @@ class Stage:
         self._strides = [4, 4]
         self._truth: Truth | None = None
         self._watched = time.monotonic()
-        self._newest = _newest_shader()
+        self._newest = newest_shader()
 
     def current(self) -> AbstractContextManager[Any]:
         """The context is current within: a window's always is, and our own is made so."""
@@ -260,7 +259,7 @@ class Stage:
         if time.monotonic() - self._watched < WATCH:
             return
         self._watched = time.monotonic()
-        if (newest := _newest_shader()) != self._newest:
+        if (newest := newest_shader()) != self._newest:
             self._newest = newest
             self.reload(workspace)
 
@@ -271,7 +270,7 @@ class Stage:
         self._begun = True
         workspace.prepare()
         if self._compiler is not None:
-            self._compiler.begin(scene, self._drawn_plans, self._newest, partial(self._take_compiled, workspace))
+            self._compiler.begin(scene, self._drawn_plans, partial(self._take_compiled, workspace))
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
@@ -285,7 +284,7 @@ class Stage:
         self._postponed, self._shown = wanted, ()
         if compiler.lane.task is None or not compiler.lane.task.name:  # for which nobody waits
             then = partial(self._take_compiled, workspace, missing=program)
-            compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, then)
+            compiler.ask("preparing the picture", scene, self._drawn_plans, then)
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         assert self._compiler is not None
@@ -310,7 +309,7 @@ class Stage:
             compiler.ledger.postpones = True
             self._take_compiled(workspace, found)
 
-        return compiler.ask("preparing the picture", scene, self._drawn_plans, self._newest, take)
+        return compiler.ask("preparing the picture", scene, self._drawn_plans, take)
 
     def _rebuild(self, workspace: Workspace) -> None:
         scene = workspace.scene()
@@ -354,14 +353,3 @@ class Stage:
 def _kind(plan: RenderPlan) -> tuple[str, ...]:
     """Plans that take about the same time."""
     return (str(plan.method), *(step.name for step in plan.passes))
-
-
-def _newest_shader() -> float:
-    folder = shader_path("README.md").parent
-    newest = 0.0
-    for path in Path(folder).rglob("*.[gvf]*"):
-        try:
-            newest = max(newest, path.stat().st_mtime)
-        except OSError:
-            continue  # it is being written
-    return newest
