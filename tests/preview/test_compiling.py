@@ -195,8 +195,11 @@ def test_the_last_picture_stays_until_the_next_one_is_compiled(
     for _ in range(3):
         assert stage.draw(work, SIZE)
         work.update()
-    assert [task.name for task in work.busy] == ["preparing the picture"]
+    assert [task.name for task in work.busy if task.name] == ["preparing the picture"]
     np.testing.assert_array_equal(pixels(stage), before)
+    assert stage.draw(work, (320, 192))  # larger now, and still the last one
+    np.testing.assert_allclose(pixels(stage)[::2, ::2][1:-1, 1:-1], before[1:-1, 1:-1], atol=40)
+    assert np.abs(pixels(stage)[::2, ::2] - before).mean() < 3.0
     near.set()
     finish(stage, work)
     assert stage.problem == ""
@@ -238,6 +241,42 @@ def test_a_frame_that_takes_too_long_goes_on_in_the_next_one(
         np.testing.assert_allclose(pixels(stage), pixels(alone), atol=1)
     finally:
         alone.close()
+
+
+def test_who_does_not_wait_has_the_window_compile(stage: Stage, work: Workspace, near: threading.Event) -> None:
+    near.set()
+    finish(stage, work)
+    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    near.clear()
+    work.do(ChoosePreset("whole_milk"))
+    assert stage.draw(work, SIZE)
+    for _ in range(20):
+        for task in work.busy:
+            task.cancel()
+        near.set()
+        wait(work, lambda: work.compiler.lane.task is None)
+        near.clear()
+        if stage.draw(work, SIZE) and stage.viewport.steps(0):
+            break
+    else:
+        pytest.fail("it waits for ever")
+    near.set()
+
+
+def test_a_request_that_cannot_be_made_is_told_once(
+    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near.set()
+    finish(stage, work)
+
+    def fails(_: tl.Scene) -> tl.Scene:
+        raise MemoryError
+
+    monkeypatch.setattr(compiling, "stand_in", fails)
+    work.do(ChoosePreset("whole_milk"))
+    finish(stage, work)
+    assert stage.problem == ""
+    assert [m.text for m in work.messages if "in the window" in m.text]
 
 
 def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: threading.Event) -> None:

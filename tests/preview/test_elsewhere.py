@@ -131,3 +131,12 @@ def test_a_mesh_is_sent_once_and_kept_while_it_lives(task: Task, companion: Comp
     assert companion.call(task, alive) == 2
     del first
     assert companion.call(task, alive) == 1
+
+
+def test_a_companion_that_is_closed_begins_nothing(task: Task, companion: Companion) -> None:
+    first = companion.call(task, pid)
+    companion.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(first, 0)
+    with pytest.raises(CancelledError):
+        companion.call(task, pid)

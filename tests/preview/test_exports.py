@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +12,8 @@ import pytest
 from PIL import Image
 
 import translucent as tl
+from translucent.frame import write_atomically
+from translucent.preview import elsewhere
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture, write_turntable
 from translucent.preview.workspace import Workspace
@@ -109,3 +112,39 @@ def test_a_file_in_the_background_that_cannot_be_written_is_told(work: Workspace
     work.write(str(tmp_path / "map.exr"), fails)
     wait(work, lambda: work.lanes["write"].task is None)
     assert "the disk is full" in work.messages[-1].text
+
+
+def test_a_window_that_is_closed_finishes_its_file(tmp_path: Path) -> None:
+    work = Workspace(Document(Model("sphere")))
+    path = tmp_path / "map.npy"
+
+    def writes(to: str) -> None:
+        time.sleep(1.5)
+        Path(to).write_bytes(b"whole")
+
+    work.write(str(path), writes)
+    wait(work, lambda: work.loaded is not None)
+    work.close()
+    assert path.read_bytes() == b"whole"
+    assert work.ended
+
+
+def hard(report: Callable[[float | None, str], None], path: str) -> None:
+    """Writes, and is not to be stopped."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    write_atomically(Path(path), lambda temporary: (temporary.write_bytes(b"half"), report(0.5, ""), time.sleep(60.0)))
+
+
+def test_what_a_killed_process_has_left_is_removed(
+    work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(elsewhere, "PARTING", 0.3)
+    monkeypatch.setattr(elsewhere._Running, "stop", lambda _: False)
+    work.export(str(tmp_path / "a.png"), hard)
+    task = work.lanes["write"].task
+    assert task is not None
+    wait(work, lambda: task.share == 0.5)
+    assert list(tmp_path.iterdir())
+    task.cancel()
+    wait(work, lambda: task.finished)
+    assert not list(tmp_path.iterdir())

@@ -207,15 +207,18 @@ class Viewport:
             raise RenderError(
                 f"viewport of {size[0]}x{size[1]}", f"this OpenGL ends at {limit}", "make the window smaller"
             )
-        self._release_pictures()
         try:
-            screen = self._gl.texture(size, 4)
-            screen.filter = moderngl.NEAREST, moderngl.NEAREST
-            self._screen = self._gl.framebuffer([screen])
+            texture = self._gl.texture(size, 4)
+            texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            screen = self._gl.framebuffer([texture])
         except moderngl.Error as error:
             found = f"OpenGL has no room for it ({error})"
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
-        self.size = size
+        screen.clear()
+        if self._screen is not None:
+            self.place(screen, (0, 0, *size))  # until there is another picture
+        self._release_pictures()
+        self._screen, self.size = screen, size
 
     def restart(self) -> None:
         """Begin anew: something else is to be seen."""

@@ -91,10 +91,10 @@ class Compiler:
         self.ledger.elsewhere |= self.ledger.needed
 
         def work(task: Task) -> Compiled:
-            self._call(task, show_frames, stand_in(scene), plans[0], self.device)
+            self._companion.call(task, show_frames, stand_in(scene), plans[0], self.device)
             return self._make(task, scene, plans)
 
-        self.lane.start("", work, then)
+        self.lane.start("", _guarded(work), then)
 
     def lacks_normals(self, scene: Scene, plans: Sequence[RenderPlan]) -> bool:
         """Whether the context should wait for normals."""
@@ -106,19 +106,15 @@ class Compiler:
         scene: Scene,
         plans: Sequence[RenderPlan],
         then: Callable[[Compiled], None],
-    ) -> None:
+    ) -> Task:
         """Make what plans of a scene need."""
-        self.lane.start(name, lambda task: self._make(task, scene, plans), then)
+        return self.lane.start(name, _guarded(lambda task: self._make(task, scene, plans)), then)
 
     def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan]) -> Compiled:
         for mesh in unsmoothed(scene, plans):
             task.report(None, "normals")
-            found = self._call(task, smoothed, mesh.vertices, mesh.faces)
-            if isinstance(found, Compiled):
-                return found
-            keep_drawn_normals(mesh, found)
-        compiled: Compiled = self._call(task, compile_frames, stand_in(scene), tuple(plans), self.device)
-        return compiled
+            keep_drawn_normals(mesh, self._companion.call(task, smoothed, mesh.vertices, mesh.faces))
+        return self._companion.call(task, compile_frames, stand_in(scene), tuple(plans), self.device)
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build what there is, and what was `missing`: if it is not there, the window tells why."""
@@ -129,18 +125,23 @@ class Compiler:
         if missing is not None:
             self.ledger.elsewhere.add(missing)
 
-    def _call(self, task: Task, work: Callable[..., Any], *arguments: Any) -> Any:
-        """What the process answers; if it cannot, a `Compiled` that says why."""
+    def close(self, patience: float) -> None:
+        """End the process."""
+        self._companion.close(patience)
+
+
+def _guarded(work: Callable[[Task], Compiled]) -> Callable[[Task], Compiled]:
+    """Work that always has a result: if it fails, one that says why."""
+
+    def call(task: Task) -> Compiled:
         try:
-            return self._companion.call(task, work, *arguments)
+            return work(task)
         except CancelledError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever it is, the window can do the work itself
             return Compiled(None, problem(error))
 
-    def close(self) -> None:
-        """End the process."""
-        self._companion.close()
+    return call
 
 
 def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:

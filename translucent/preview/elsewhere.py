@@ -13,6 +13,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
@@ -55,6 +56,7 @@ class Companion:
     def __init__(self) -> None:
         self._running: _Running | None = None
         self._turn = threading.Lock()
+        self._closed = False
 
     def call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
         """The result of `work(report, *arguments)`, which calls ``report(share, detail)``; its warnings are given here.
@@ -86,13 +88,18 @@ class Companion:
             self._turn.release()
 
     def _call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
-        running = self._running = self._running or _Running()
+        running = self._running
+        if running is None and not self._closed:
+            running = self._running = _Running()
+        if running is None or self._closed:
+            self._end()
+            raise CancelledError
         try:
             running.ask(work, arguments)
             failed, content = running.answer(task)
         except (EOFError, ConnectionError):
             status = running.status()
-            self.close()
+            self._end()
             raise RenderError(
                 task.name,
                 f"its process ended with status {status}, as when the memory is full",
@@ -100,20 +107,24 @@ class Companion:
             ) from None
         except CancelledError:
             if not running.stop():
-                self.close()
+                self._end()
             raise
         except BaseException:
-            self.close()
+            self._end()
             raise
         if failed:
             raise content
         return content  # type: ignore[no-any-return]
 
-    def close(self) -> None:
-        """End the process, whatever it is at."""
-        if self._running is not None:
-            running, self._running = self._running, None
-            running.close()
+    def close(self, patience: float = PARTING) -> None:
+        """End the process, whatever it is at, and begin none again; it has `patience` seconds to tidy up."""
+        self._closed = True
+        self._end(patience)
+
+    def _end(self, patience: float = PARTING) -> None:
+        running, self._running = self._running, None
+        if running is not None:
+            running.close(patience)
 
 
 class _Running:
@@ -177,10 +188,10 @@ class _Running:
         self._process.join()
         return self._process.exitcode
 
-    def close(self) -> None:
-        """End the process; it has some time to remove what it has half written."""
+    def close(self, patience: float) -> None:
+        """End the process; it has some seconds to remove what it has half written."""
         self._process.terminate()
-        self._process.join(PARTING)
+        self._process.join(patience)
         self._process.kill()
         self._pipe.close()
 
@@ -226,7 +237,7 @@ def _run(pipe: Connection) -> None:
     while True:
         try:
             kind, content = pipe.recv()
-        except EOFError:
+        except (EOFError, OSError):
             return
         if kind == "keep":
             token, kept[token] = content
@@ -244,10 +255,13 @@ def _work(pipe: Connection, kept: dict[int, object], number: int, content: bytes
                 raise CancelledError
         pipe.send(("report", (share, detail)))
 
+    answer: tuple[str, object]
     try:
         work, arguments = _Unpickler(io.BytesIO(content), kept).load()
         result = work(report, *arguments)
     except Exception as error:  # noqa: BLE001 - raised where the result is waited for
-        pipe.send(("failed", error))
+        answer = "failed", error
     else:
-        pipe.send(("done", result))
+        answer = "done", result
+    with suppress(OSError):  # nobody is there any more
+        pipe.send(answer)

@@ -42,14 +42,11 @@ BENT_LEVELS = (16, 8)
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Compared:
     """A small picture of what the viewport shows, beside the truth.
 
     Attributes
     ----------
-    scene : Scene
-        What was measured.
-    method : Method, optional
     errors : tuple of Errors
         Of thickness and transmittance; empty if there is nothing to compare.
     doubt : str
@@ -59,8 +56,6 @@ class Measured:
         The reference as a picture, for a corner of the viewport.
     """
 
-    scene: Scene
-    method: Method | None
     errors: tuple[Errors, ...]
     doubt: str
     seen: Seen
@@ -68,13 +63,22 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
+class Measured(Compared):
+    """What was compared, too: a scene and a method."""
+
+    scene: Scene
+    method: Method | None
+
+
+@dataclass(frozen=True, eq=False)
 class Truth:
-    """The reference of a whole picture, at a share of its size."""
+    """The reference of a whole picture, at a share of its size; of straight rays, or of those that borders bend."""
 
     scene: Scene
     method: Method | None
     frame: Frame
     level: int
+    straight: bool = False
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,7 @@ def _renderer(written: float) -> Renderer:
     return Renderer()
 
 
-def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> Measured:
+def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> Compared:
     """Compare a small picture of the scene with the reference, as straight rays see both."""
     lit = bool(scene.lights) and any(item.medium is not None and item.medium.scatters for item in scene.objects)
     height = LIT_HEIGHT if lit else MEASURED_HEIGHT
@@ -131,7 +135,7 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
     except InputError:
         samples = np.zeros(0)
     seen = Seen.of(samples, covered, int(np.count_nonzero(~frame.valid)))
-    return Measured(scene, method, errors, doubt, seen, truth.to_srgb8())
+    return Compared(errors, doubt, seen, truth.to_srgb8())
 
 
 def straight(scene: Scene) -> Scene:

@@ -9,14 +9,16 @@ from functools import partial
 from typing import Any, TypeVar
 
 from translucent.assets import newest_shader
+from translucent.corner_normals import drawn_normals
 from translucent.errors import TranslucentError
 from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Shown, Viewport
-from translucent.preview.compiling import FRAME, Compiled, Compiler
+from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of
+from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.render_plan import RenderPlan
 from translucent.renderer import Renderer
@@ -93,6 +95,7 @@ class Stage:
         self._begun = False
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
+        self._asked: Task | None = None
         self._presented: tuple[object, ...] = ()
         self._costs: dict[tuple[str, ...], float] = {}
         self._strides = [4, 4]
@@ -172,8 +175,13 @@ class Stage:
         """While things move: the picture itself and nothing beside it."""
         look, begun = workspace.document.look, time.perf_counter()
         factor = self._factor(self.plans[0], FACTORS)
-        with self.viewport.at_once(factor) as framebuffer:
-            plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone)
+        try:
+            with self.viewport.at_once(factor) as framebuffer:
+                plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone)
+        except PostponedError as error:
+            if error.program is None:
+                self._shown = ()  # the same again: what has been made is for pictures of this size
+            raise
         self._finish(0, plan, factor, begun)
         self._presented = ()
         return True
@@ -207,9 +215,14 @@ class Stage:
 
     def _present(self, workspace: Workspace, scene: Scene, changed: bool) -> None:
         display, look = workspace.document.display, workspace.document.look
+        wanted_method = method_of(display.method, workspace.document.material)
         if display.compare in ("reference", "error"):
             truth = workspace.truth
-            if truth is not None and truth is not self._truth and truth.scene is scene:
+            straight = display.compare == "error"
+            if self._truth is not None and straight and not self._truth.straight:
+                self._truth = None
+            fits = truth is not None and truth.scene is scene and truth.method == wanted_method
+            if fits and truth is not None and truth is not self._truth and truth.straight >= straight:
                 self.viewport.put(truth.frame)
                 self._truth, changed = truth, True
         right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
@@ -282,9 +295,15 @@ class Stage:
         assert compiler is not None
         assert scene is not None
         self._postponed, self._shown = wanted, ()
-        if compiler.lane.task is None or not compiler.lane.task.name:  # for which nobody waits
+        if self._asked is not None and self._asked.cancelled:
+            # The user does not wait, so that the window does the work.
+            self._asked = None
+            compiler.take(Compiled(frozenset()), program)
+            for mesh in unsmoothed(scene, self._drawn_plans):
+                drawn_normals(mesh)
+        elif compiler.lane.task is None or not compiler.lane.task.name:  # for which nobody waits
             then = partial(self._take_compiled, workspace, missing=program)
-            compiler.ask("preparing the picture", scene, self._drawn_plans, then)
+            self._asked = compiler.ask("preparing the picture", scene, self._drawn_plans, then)
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         assert self._compiler is not None
@@ -309,7 +328,8 @@ class Stage:
             compiler.ledger.postpones = True
             self._take_compiled(workspace, found)
 
-        return compiler.ask("preparing the picture", scene, self._drawn_plans, take)
+        compiler.ask("preparing the picture", scene, self._drawn_plans, take)
+        return None
 
     def _rebuild(self, workspace: Workspace) -> None:
         scene = workspace.scene()

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from translucent.errors import InputError, TranslucentError
+from translucent.frame import remove_partial
 from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
 from translucent.preview.document import Document, Model, Orbit
-from translucent.preview.elsewhere import Companion, in_a_process
+from translucent.preview.elsewhere import PARTING, Companion, in_a_process
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
@@ -33,6 +34,9 @@ MAX_MESSAGES = 50
 
 #: Models that are kept for undo.
 KEPT_MODELS = 2
+
+#: Seconds for which a window that is closed waits for work: files are to be whole, and processes not left behind.
+PATIENCE = {"write": 60.0, "bake": 2.5 * PARTING}
 
 #: Files that were opened lately.
 MAX_RECENT = 8
@@ -213,7 +217,7 @@ class Workspace:
 
         def work(task: Task) -> Measured:
             found = self._measuring.call(task, measure, scene, method, size)
-            return dataclasses.replace(found, scene=scene, method=method)
+            return Measured(**vars(found), scene=scene, method=method)
 
         self.lanes["draw"].start("measuring", work, then)
 
@@ -234,7 +238,7 @@ class Workspace:
                 task.report(number / len(shares), f"at 1/{level}")
                 small = max(size[0] // level, 1), max(size[1] // level, 1)
                 frame = self._reference.call(task, truth_frame, seen, method, small)
-                self.truth = Truth(scene, method, frame, level)
+                self.truth = Truth(scene, method, frame, level, straight=levels is not None)
 
         self.lanes["truth"].start("float64 reference", work, lambda _: None)
 
@@ -256,7 +260,15 @@ class Workspace:
             check_export(path)
         except TranslucentError as error:
             return self.tell("error", str(error))
-        return self._write(path, lambda task: in_a_process(task, work, path, *arguments))
+
+        def write(task: Task) -> None:
+            try:
+                in_a_process(task, work, path, *arguments)
+            except Exception:
+                remove_partial(Path(path))  # of a process that had to be killed
+                raise
+
+        return self._write(path, write)
 
     def write(self, path: str, work: Callable[[str], object]) -> None:
         """Write a file in the background."""
@@ -276,10 +288,13 @@ class Workspace:
 
     def close(self) -> None:
         """End all work."""
-        for companion in (self._measuring, self._reference, self.compiler):
-            companion.close()  # nobody will see what they are at
         for lane in self.lanes.values():
-            lane.close()
+            if lane.task is not None:
+                lane.task.cancel()
+        for companion in (self._measuring, self._reference, self.compiler):
+            companion.close(0.5)  # nobody will see what they are at
+        for name, lane in self.lanes.items():
+            lane.close(PATIENCE.get(name, 0.5))
 
     @property
     def ended(self) -> bool:

@@ -70,6 +70,9 @@ class DepthPeelingPass:
     ) -> None:
         """Draw what a pass finds; after the first, only where it is not known already."""
         gl, target = job.gl, batch[-1]
+        # Before any state is set: the frame may be postponed here.
+        switches = {"FIRST": number == 0, "OPAQUE": job.has_opaque, **ends}
+        program = self._peel.program(WITH_NORMAL=0, WITH_POSITION=0, **switches)
         target.use()
         if number == 0:
             nothing = float(CONSTANTS["NOTHING"])
@@ -86,8 +89,7 @@ class DepthPeelingPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MIN, moderngl.FUNC_ADD
         job.bind_opaque(_OPAQUE)
-        switches = {"FIRST": number == 0, "OPAQUE": job.has_opaque, **ends}
-        job.draw(self._peel.program(WITH_NORMAL=0, WITH_POSITION=0, **switches), spec.objects)
+        job.draw(program, spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)
         target.depth_mask = True
