@@ -1,4 +1,4 @@
-"""A display for the tests that open the window: Xvfb, if it is there."""
+"""A workspace with a ball, and a display for the tests that open the window: Xvfb, if it is there."""
 
 from __future__ import annotations
 
@@ -10,6 +10,20 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.preview.waiting import SIZE, wait
+from translucent.preview.document import Document, Model
+from translucent.preview.workspace import Workspace
+
+
+@pytest.fixture
+def work() -> Iterator[Workspace]:
+    """A workspace that shows a ball."""
+    made = Workspace(Document(Model("sphere")))
+    made.size = SIZE
+    wait(made, lambda: made.loaded is not None)
+    yield made
+    made.close()
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 import translucent as tl
+from tests.preview.waiting import wait
 from translucent.frame import write_atomically
 from translucent.preview import elsewhere
 from translucent.preview.document import Document, Model
@@ -22,22 +23,6 @@ from translucent.solids import Box
 
 SIZE = (64, 40)
 SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), size=SIZE)
-
-
-def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "it takes too long"
-        work.update()
-        time.sleep(0.002)
-
-
-@pytest.fixture
-def work() -> Iterator[Workspace]:
-    made = Workspace(Document(Model("sphere")))
-    wait(made, lambda: made.loaded is not None)
-    yield made
-    made.close()
 
 
 def told(share: float | None, detail: str = "") -> None:

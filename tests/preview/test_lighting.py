@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.preview.waiting import wait
 from translucent.preview import scenes
 from translucent.preview.actions import Change, Turn
 from translucent.preview.document import Document, Model
@@ -21,7 +21,7 @@ from translucent.preview.workspace import Workspace
 @pytest.fixture
 def workspace() -> Iterator[Workspace]:
     found = Workspace(Document(Model("leaf")))
-    settle(found, lambda: found.scene() is not None)
+    wait(found, lambda: found.scene() is not None)
     yield found
     found.close()
 
@@ -31,14 +31,6 @@ def sky(tmp_path: Path) -> Path:
     path = tmp_path / "sky.png"
     Image.fromarray(np.tile(np.linspace(20, 250, 16, dtype=np.uint8)[None, :, None], (8, 1, 3))).save(path)
     return path
-
-
-def settle(workspace: Workspace, done: Callable[[], bool]) -> None:
-    end = time.monotonic() + 20.0
-    while not done() and time.monotonic() < end:
-        workspace.update()
-        time.sleep(0.002)
-    assert done()
 
 
 def kind(workspace: Workspace) -> str:
@@ -71,7 +63,7 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
     assert first is not None
     np.testing.assert_allclose(first.camera.eye, scenes.camera_of(workspace.document.orbit).eye)  # type: ignore[arg-type]
     read.set()
-    settle(workspace, lambda: kind(workspace) == "image")
+    wait(workspace, lambda: kind(workspace) == "image")
     for rotation in (10.0, 20.0):
         workspace.do(Change("look.rotation", rotation))
         scene = workspace.scene()
@@ -87,7 +79,7 @@ def test_a_file_that_cannot_be_read_is_told_once_and_the_one_before_stays(worksp
     workspace.do(Change("look.environment", str(tmp_path / "none.hdr")))
     for _ in range(3):
         kind(workspace)
-        settle(workspace, lambda: workspace.lanes["light"].task is None)
+        wait(workspace, lambda: workspace.lanes["light"].task is None)
     assert [m.text for m in workspace.messages if m.kind == "error"] == [
         f"environment {str(tmp_path / 'none.hdr')!r}; no such file; check the path"
     ]
@@ -98,6 +90,6 @@ def test_a_file_that_cannot_be_read_is_told_once_and_the_one_before_stays(worksp
 
 def test_a_file_that_changes_is_read_again(workspace: Workspace, sky: Path) -> None:
     workspace.do(Change("look.environment", str(sky)))
-    settle(workspace, lambda: kind(workspace) == "image")
+    wait(workspace, lambda: kind(workspace) == "image")
     Image.fromarray(np.full((4, 8, 3), 40, dtype=np.uint8)).save(sky)
     assert scenes.environment_of(str(sky)).light_map.size == (8, 4)

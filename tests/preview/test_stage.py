@@ -5,40 +5,22 @@ from __future__ import annotations
 import runpy
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import translucent as tl
+from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, Turn
-from translucent.preview.document import Document, Model
+from translucent.preview.document import Model
 from translucent.preview.measuring import crossing
 from translucent.preview.stage import Stage
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
-
-SIZE = (160, 96)
-
-
-def wait(work: Workspace, done: Callable[[], object], seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "it takes too long"
-        work.update()
-        time.sleep(0.002)
-
-
-@pytest.fixture
-def work() -> Iterator[Workspace]:
-    made = Workspace(Document(Model("sphere")))
-    made.size = SIZE
-    wait(made, lambda: made.loaded is not None)
-    yield made
-    made.close()
 
 
 @pytest.fixture
@@ -46,18 +28,6 @@ def stage() -> Iterator[Stage]:
     made = Stage()
     yield made
     made.close()
-
-
-def finish(stage: Stage, work: Workspace) -> None:
-    for _ in range(2000):
-        if not stage.draw(work, SIZE):
-            return
-    pytest.fail("the picture is never done")
-
-
-def pixels(stage: Stage) -> np.ndarray:
-    with stage.current():
-        return stage.viewport.pixels().astype(int)
 
 
 @pytest.mark.parametrize("budget", [1e9, 0.0])

@@ -1,0 +1,36 @@
+"""For tests of the previewer: what the background does is waited for, and pictures are drawn to their end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from translucent.preview.stage import Stage
+from translucent.preview.workspace import Workspace
+
+SIZE = (160, 96)
+
+
+def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> None:
+    """Until something is so, with the background's results taken over."""
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "it takes too long"
+        work.update()
+        time.sleep(0.002)
+
+
+def finish(stage: Stage, work: Workspace) -> None:
+    """Draw until nothing is left to draw, or to be compiled for it."""
+    end = time.monotonic() + 60.0
+    while stage.draw(work, SIZE) or work.compiler.lane.task is not None:
+        assert time.monotonic() < end, "the picture is never done"
+        work.update()
+
+
+def pixels(stage: Stage) -> np.ndarray:
+    """The picture on show."""
+    with stage.current():
+        return stage.viewport.pixels().astype(int)
