@@ -176,7 +176,7 @@ def test_a_folder_that_refuses_is_a_failure_in_one_line(
     [
         (b"glTF\2\0\0\0\xff\0\0\0", "cut short at 12 bytes"),
         (b"{", "its JSON is broken"),
-        (b"", "its JSON is broken"),
+        (b"", "it is empty"),
         (b"{}", "no asset"),
         (
             b'{"asset": {}, "materials": [{"extensions": {"KHR_materials_volume": {"thicknessFactor": "1"}}}]}',

@@ -188,7 +188,7 @@ def test_broken_files_are_refused_in_one_line(two_boxes: Path, tmp_path: Path) -
         "bytes.gltf": (b"\xff\xfe\xff", "its JSON is broken"),
         "list.gltf": (b"[]", "no asset"),
         "materials.gltf": (b'{"asset": {}, "materials": 3}', "materials is not a list"),
-        "empty.gltf": (b"", "its JSON is broken"),
+        "empty.gltf": (b"", "it is empty"),
         "model.obj": (b"v 0 0 0", "suffix '.obj'"),
     }
     for name, (content, message) in cases.items():

@@ -91,7 +91,7 @@ def read_gltf(path: str | Path) -> GltfFile:
     Raises
     ------
     InputError
-        If the file is missing, cut short, or its JSON is broken.
+        If the file is missing, empty, cut short, or its JSON is broken.
     """
     path = Path(path)
     asked = f"glTF {str(path)!r}"
@@ -102,6 +102,8 @@ def read_gltf(path: str | Path) -> GltfFile:
         raise InputError(asked, f"it cannot be read ({error.strerror})", "check its permissions") from error
     if path.suffix.lower() not in (".glb", ".gltf") and data[:4] != _MAGIC:
         raise InputError(asked, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
+    if not data:
+        raise InputError(asked, "it is empty", "copy or export the file again")
     text, chunks = _split(asked, data) if data[:4] == _MAGIC else (data, b"")
     try:
         tree = json.loads(text.decode("utf-8-sig"), parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
