@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.grouping import equal_rows, position_ids, shared_edges, side_ends, used_vertices
 from translucent.repair import spread_winding
+from translucent.sample_lines import winds_negatively
 from translucent.winding import inside_out_parts
 
 #: A dent not deeper than this share of the size leaves a body convex.
@@ -69,6 +70,9 @@ class Diagnosis:
         Closed and consistently wound: the thickness along every ray is defined.
     inside_out_parts : int
         Closed parts that look inwards and are no cavity, beside others that look outwards.
+    negative_winding : bool
+        Around some places the surface winds a negative number of times: a lobe or a part of it is inside out there.
+        Found on sample lines, so that what is smaller than a hundredth of the mesh can be missed.
     inverted : bool
         Solid, with all faces looking inwards.
     convex : bool
@@ -87,8 +91,19 @@ class Diagnosis:
     closed: bool
     solid: bool
     inside_out_parts: int
+    negative_winding: bool
     inverted: bool
     convex: bool
+
+    @property
+    def inside_out(self) -> bool:
+        """Whether a part, or a lobe of one, is inside out."""
+        return self.inside_out_parts > 0 or self.negative_winding
+
+    @property
+    def sound(self) -> bool:
+        """Solid, and nowhere inside out: exits minus entries is the thickness along every ray."""
+        return self.solid and not self.inside_out
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -111,6 +126,8 @@ class Diagnosis:
             lines.append("inverted: all faces look inwards")
         if self.inside_out_parts:
             lines.append(f"{self.inside_out_parts} closed parts inside out")
+        elif self.solid and self.negative_winding:
+            lines.append("inside out in places: the surface crosses itself, and a lobe of it looks inwards")
         return tuple(lines)
 
     def __str__(self) -> str:
@@ -144,7 +161,10 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
     volume = _signed_volume(corners)
     components = edges.components()
     inverted = solid and volume < 0
-    inside_out = _inside_out(vertices, edges.faces) if solid and components > 1 and not inverted else 0
+    whole = bool(finite[used].all()) and len(edges.total) > 0
+    inside_out = _inside_out(vertices, edges.faces) if whole and components > 1 and not inverted else 0
+    convex = solid and components == 1 and edges.all_convex(vertices, float(np.sign(volume)))
+    outwards = faces[:, ::-1] if inverted else faces
     return Diagnosis(
         nonfinite_vertices=_found(~finite),
         unreferenced_vertices=_found(~used),
@@ -158,8 +178,9 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
         closed=closed,
         solid=solid,
         inside_out_parts=inside_out,
+        negative_winding=whole and not convex and winds_negatively(vertices, outwards),
         inverted=inverted,
-        convex=solid and components == 1 and edges.all_convex(vertices, float(np.sign(volume))),
+        convex=convex,
     )
 
 

@@ -13,11 +13,13 @@ from translucent.scene import Object, Scene
 from translucent.thickness import (
     LEAST_SEEN,
     MAX_STEPS,
+    BackFaceDepth,
     DepthPeeling,
     FragmentLists,
     Method,
     OrderedMethod,
     RayMarched,
+    SignedDepth,
     ThinLayer,
 )
 
@@ -120,13 +122,22 @@ def marching_limits(scene: Scene, method: RayMarched) -> list[str]:
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[str]:
-    """What duplicated faces and parts inside out do to a thickness."""
+    """What duplicated faces, and parts or lobes inside out, do to a thickness."""
     limits = []
     for body in scene.bodies:
-        if found := body.mesh.diagnosis.duplicate_faces:
+        diagnosis = body.mesh.diagnosis
+        if found := diagnosis.duplicate_faces:
             limits.append(f"{body.mesh.name!r}: {found.count} duplicated faces, which count twice or cancel")
-        if (parts := body.mesh.diagnosis.inside_out_parts) and not _is_sheet(body, method):
-            limits.append(f"{body.mesh.name!r}: {parts} closed parts inside out: their pixels are marked invalid")
+        if diagnosis.inside_out and not _is_sheet(body, method):
+            parts = diagnosis.inside_out_parts
+            what = f"{parts} closed parts inside out" if parts else "inside out in places"
+            marked = (
+                f"{type(method).__name__} cannot tell which pixels show one, so all that it covers are marked invalid; "
+                "FragmentLists can"
+                if isinstance(method, SignedDepth | BackFaceDepth)
+                else "their pixels are marked invalid"
+            )
+            limits.append(f"{body.mesh.name!r}: {what}: {marked}")
     return limits
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from translucent.plan_borders import touching_borders
 from translucent.render_plan import Borders
 from translucent.scene import Scene
-from translucent.slots import may_overlap, same_medium
+from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, same_medium
 from translucent.thickness import BackFaceDepth, Method, ThinLayer
 
 
@@ -16,6 +16,8 @@ def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> 
         return "emission among several media: what is in front dims what is behind"
     if method is None and borders == "both" and (touching := touching_borders(scene)) is not None:
         return touching
+    if method is None and (why := _inside_out(scene)) is not None:
+        return why
     # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
     if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
         return None
@@ -30,6 +32,14 @@ def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> 
     for body in solids:
         if not body.mesh.diagnosis.convex:
             return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
+    return None
+
+
+def _inside_out(scene: Scene) -> str | None:
+    """Which body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals cannot."""
+    for body in scene.bodies:
+        if body.sheet_thickness is None and body.mesh.diagnosis.inside_out and len(medium_slots(scene)) <= MAX_SLOTS:
+            return f"{body.mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
     return None
 
 

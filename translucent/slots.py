@@ -96,7 +96,7 @@ def _share(scene: Scene, a: Object, b: Object) -> bool:
 
 
 def _never_negative(body: Object) -> bool:
-    return body.mesh.diagnosis.solid and not body.mesh.diagnosis.inside_out_parts
+    return body.mesh.diagnosis.sound
 
 
 def _fill_alike(scene: Scene, a: Object, b: Object) -> bool:

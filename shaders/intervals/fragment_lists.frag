@@ -7,12 +7,18 @@
 
 uniform int cell_offset;  // of the first pixel's head
 
+#if !GRADIENT
+layout(location = 0) out float misplaced;  // maximum blending keeps that of the steepest face
+#endif
+
 void main() {
     float place = fragment_place();
 #if GRADIENT
     vec2 slope = vec2(dFdx(place), dFdy(place));
+#else
+    misplaced = misplaced_places();
 #endif
-    if (place > last_place()) { return; }
+    if (place > last_place()) { discard; }
     uint node = atomicAdd(node_count, 1u);
     if (node < uint(nodes.length())) {
         uint pixel = uint(cell_offset) + pixel_index(gl_FragCoord.xy, frame_size.x);

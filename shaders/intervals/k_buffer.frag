@@ -5,9 +5,12 @@
 #include "intervals/place.glsl"
 #include "intervals/k_slots.glsl"
 
+layout(location = 0) out float misplaced;  // maximum blending keeps that of the steepest face
+
 void main() {
     float place = fragment_place();
-    if (place > last_place()) { return; }
+    misplaced = misplaced_places();
+    if (place > last_place()) { discard; }
     uint base = k_base(gl_FragCoord.xy, frame_size.x);
     atomicAdd(words[base], 1u);
     uint word = fragment_word(place);

@@ -4,6 +4,8 @@
 #include "intervals/k_slots.glsl"
 #include "intervals/resolve.glsl"
 
+uniform sampler2D steepest;
+
 void main() {
     uint base = k_base(gl_FragCoord.xy, frame_size.x);
     uint counted = words[base];
@@ -16,8 +18,9 @@ void main() {
             excess[slot] += slot == crossing_slot(word) ? (crossing_leaves(word) ? 1 : -1) : 0;
         }
     }
-    Walk walk = walk_from_start(excess);
-    float metres_per_step = metres_of_a_step(ray_advance());
+    float advance = ray_advance();
+    float metres_per_step = metres_of_a_step(advance);
+    Walk walk = walk_from_start(excess, misplaced_metres(texelFetch(steepest, ivec2(gl_FragCoord.xy), 0).r, advance));
     for (uint i = 1u; i <= kept; ++i) {
         cross_surface(walk, words[base + i], 1, false, metres_per_step);
 #if BORDERS

@@ -1,7 +1,8 @@
 // Depth peeling (Everitt 2001), from both ends at once (Bavoil & Myers 2008). Of the crossings strictly between those
 // that the previous pass found, minimum blending keeps the nearest (red) and, reversed, the farthest (green). Faces that
 // are alike have one word: alpha counts how many there were of the previous pass's two. The first pass has no previous
-// one; its alpha counts all crossings, and the excess of exits over entries for a body whose surface the eye is on.
+// one; its alpha counts all crossings, and the excess of exits over entries for a body whose surface the eye is on; its
+// blue keeps how far the rasterizer may have misplaced the steepest face, negative since the minimum is kept.
 
 #include "intervals/place.glsl"
 
@@ -18,7 +19,7 @@ void main() {
     float far = sortable(reversed_word(word));
 #if FIRST
     float excess = starts_unknown == 0 ? 0.0 : gl_FrontFacing ? -1.0 : 1.0;
-    found = vec4(near, far, NOTHING, 1.0 + PEEL_UNIT * excess);
+    found = vec4(near, far, -misplaced_places(), 1.0 + PEEL_UNIT * excess);
 #else
     vec2 peeled = texelFetch(previous, ivec2(gl_FragCoord.xy), 0).rg;
     bool between = true;

@@ -29,12 +29,13 @@ void main() {
     if (passes > 5) { found[5] = texelFetch(pass_5, texel, 0); }
     if (passes > 6) { found[6] = texelFetch(pass_6, texel, 0); }
     if (passes > 7) { found[7] = texelFetch(pass_7, texel, 0); }
+    float advance = ray_advance();
 #if BEGIN
-    Peel peel = begin_peel(found[0].a);
+    Peel peel = begin_peel(found[0].b, found[0].a, advance);
 #else
     Peel peel = read_peel(texel);
 #endif
-    float metres_per_step = metres_of_a_step(ray_advance());
+    float metres_per_step = metres_of_a_step(advance);
     for (int i = 0; i < walked; ++i) {
         if (min(found[i].r, found[i].g) >= NOTHING) { break; }
         uint near = word_of_sortable(found[i].r);

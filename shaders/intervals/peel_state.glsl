@@ -24,8 +24,8 @@ layout(location = 5) out uvec4 out_near_winding;
 layout(location = 6) out uvec4 out_far_winding;
 #endif
 
-// The walks before the first crossing; alpha of the first pass tells what is ahead.
-Peel begin_peel(float alpha) {
+// The walks before the first crossing; alpha of the first pass tells what is ahead, blue how steep it is at most.
+Peel begin_peel(float steepest, float alpha, float advance) {
     float excess = floor(alpha / PEEL_UNIT);
     int excesses[SLOTS];
     int none[SLOTS];
@@ -34,8 +34,9 @@ Peel begin_peel(float alpha) {
         none[slot] = 0;
     }
     Peel peel;
-    peel.near = walk_from_start(excesses);
+    peel.near = walk_from_start(excesses, misplaced_metres(max(-steepest, 0.0), advance));
     peel.far = peel.near;
+    peel.far.inside_out = 0.0;
     peel.far.winding = none;
     peel.far.place = place_steps() - 1u;
     peel.counted = alpha - PEEL_UNIT * excess;

@@ -2,6 +2,7 @@
 
 #include <Body>
 #include "intervals/crossing.glsl"
+#include "thickness/snapping.glsl"
 
 #if OPAQUE
 uniform sampler2D opaque_place;
@@ -12,6 +13,11 @@ in float axial;
 // Where the ray has come when it meets this fragment: 0 at the start of the media or of the ray, 1 at their end.
 float fragment_place() {
     return max(axial, axial_start) * place_scale + place_start;
+}
+
+// By how many places the rasterizer may have misplaced this fragment.
+float misplaced_places() {
+    return snapping(axial, subpixel) * place_scale;
 }
 
 // Where the ray ends.

@@ -22,7 +22,7 @@ struct Walk {
     vec3 optical_depth;
     vec3 emitted;            // radiance: towards the start for a walk that goes on, from the end for one that comes back
     float thickness;
-    float inside_out;        // metres with a negative winding number
+    float inside_out;        // metres with a negative winding number, beyond those that silhouettes explain
 };
 
 struct Contents {
@@ -92,14 +92,16 @@ void cross_surface(inout Walk walk, uint word, int times, bool backwards, float 
     }
 }
 
-// A walk that starts with the given excess of exits over entries ahead, from which an unknown start is found.
-Walk walk_from_start(int excess[SLOTS]) {
+// A walk that starts with the given excess of exits over entries ahead, from which an unknown start is found. As many
+// metres as the rasterizer may have misplaced a surface are no surface inside out: next to a silhouette, the two faces that
+// meet there change places.
+Walk walk_from_start(int excess[SLOTS], float misplaced) {
     Walk walk;
     walk.place = 0u;
     walk.optical_depth = vec3(0.0);
     walk.emitted = vec3(0.0);
     walk.thickness = 0.0;
-    walk.inside_out = 0.0;
+    walk.inside_out = -misplaced;
     for (int slot = 0; slot < SLOTS; ++slot) {
         walk.winding[slot] = clamp(excess[slot], int(slot_extinction[slot].w), int(slot_emission[slot].w));
     }
@@ -108,6 +110,11 @@ Walk walk_from_start(int excess[SLOTS]) {
 
 float metres_of_a_step(float advance) {
     return place_metres * advance / float(place_steps());
+}
+
+// How far two faces may have changed places, by how many places the steepest of the ray may be misplaced.
+float misplaced_metres(float places, float advance) {
+    return 2.0 * places * place_metres * advance;
 }
 
 bool is_outside(Walk walk) {

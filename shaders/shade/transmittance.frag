@@ -6,6 +6,7 @@
 #include <Environment>
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
+#include "thickness/snapping.glsl"
 #if !SURFACES
 #include "shade/background.glsl"
 #endif
@@ -78,12 +79,15 @@ void main() {
     emitted = emitted_and_thickness.rgb * transmittance(path.optical_depth);
     path.optical_depth += ordered.rgb;
     path.thickness += emitted_and_thickness.a;
-    bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= negative_tolerance;
+    bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= rounding;
+    float misplaced = 0.0;
 #else
-    bool balanced = path.count >= expected_count.x && path.count <= expected_count.y;
+    float count = whole_count(path.count);
+    bool balanced = count >= expected_count.x && count <= expected_count.y;
+    float misplaced = share_of_count(path.count) * count_share * advance;
 #endif
     // NaN fails every comparison, so this refuses it, too.
-    bool valid = balanced && path.thickness >= -negative_tolerance && path.thickness < NOTHING;
+    bool valid = balanced && path.thickness >= -(rounding + misplaced) && path.thickness < NOTHING;
     bool covered = path.thickness > coverage_floor || !valid;
     if (!valid) {
 #if FALLBACK

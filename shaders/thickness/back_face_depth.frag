@@ -1,7 +1,9 @@
-// Nearest front face and farthest back face: red and green keep their maximum, alpha counts the faces.
+// Nearest front face and farthest back face: red and green keep their maximum, as blue does of how far the rasterizer may
+// misplace a face; alpha counts the faces.
 
 #include <constants>
 #include <Body>
+#include "thickness/snapping.glsl"
 #if OPAQUE
 #include "intervals/last_axial.glsl"
 #endif
@@ -11,9 +13,13 @@ in float axial;
 layout(location = 0) out vec4 nearest_and_farthest;
 
 void main() {
+    float misplaced = snapping(axial, snapping_share);
     float reached = max(axial, axial_start);
 #if OPAQUE
     reached = min(reached, last_axial());
 #endif
-    nearest_and_farthest = gl_FrontFacing ? vec4(-reached, -NOTHING, 0.0, 1.0) : vec4(-NOTHING, reached, 0.0, 1.0);
+    float count = 1.0 + count_offset;
+    nearest_and_farthest = gl_FrontFacing
+        ? vec4(-reached, -NOTHING, misplaced, count)
+        : vec4(-NOTHING, reached, misplaced, count);
 }

@@ -2,6 +2,7 @@
 // The sum is the path inside the body; a count that does not balance betrays a hole or a flipped face.
 
 #include <Body>
+#include "thickness/snapping.glsl"
 #if OPAQUE
 #include "intervals/last_axial.glsl"
 #endif
@@ -17,15 +18,16 @@ layout(location = 0) out vec2 path_and_count;
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
+    float count = count_with_share(side * count_weight + count_offset, snapping(axial, snapping_share));
     float reached = max(axial, axial_start);
 #if OPAQUE
     reached = min(reached, last_axial());
 #endif
     float signed_path = side * reached;
 #if SPECTRAL
-    optical_depth_and_count = vec4(signed_path * extinction.rgb, side * count_weight);
+    optical_depth_and_count = vec4(signed_path * extinction.rgb, count);
     path = signed_path;
 #else
-    path_and_count = vec2(signed_path, side * count_weight);
+    path_and_count = vec2(signed_path, count);
 #endif
 }

@@ -41,7 +41,7 @@ void main() {
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
     float advance = length(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
     float metres_per_place = place_metres * advance;
-    Walk walk = walk_from_start(excess);
+    Walk walk = walk_from_start(excess, 0.0);
     heads[cell] = list;
     if (contents(walk.winding).count > 0.0) {
         // The light is inside: a crossing at the start tells so.

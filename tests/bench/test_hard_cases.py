@@ -15,7 +15,7 @@ ALL = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
 
 
 def test_there_is_one_of_each() -> None:
-    assert sorted(case.id for case in ALL) == [f"H{i:02}" for i in range(1, 25)]
+    assert sorted(case.id for case in ALL) == [f"H{i:02}" for i in range(1, 27)]
     assert all(case.title and case.promise for case in ALL)
 
 
@@ -28,7 +28,7 @@ def test_it_holds(renderer: tl.Renderer, case: Hard) -> None:
 
 def test_they_come_in_order(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Hard, "measure", lambda self, renderer: self)
-    assert [case.id for case in measure_hard_cases(renderer)] == [f"H{i:02}" for i in range(1, 25)]
+    assert [case.id for case in measure_hard_cases(renderer)] == [f"H{i:02}" for i in range(1, 27)]
 
 
 def test_distances_from_the_camera_would_fail(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -131,7 +131,7 @@ def _error_factor(case: CaseRecord, shortcut: str) -> float | None:
 
 
 def _hard(hard_cases: Sequence[HardCase]) -> Claim:
-    text = "All hard cases H01 to H24 hold"
+    text = "All hard cases H01 to H26 hold"
     if not hard_cases:
         return Claim(text, None, "none has been measured in this run")
     failed = [f"{case.id} {case.title}: {case.result}" for case in hard_cases if not case.passed]

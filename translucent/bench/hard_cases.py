@@ -1,4 +1,4 @@
-"""H01 to H24, the inputs that break renderers: each measured now, against what is promised for it."""
+"""H01 to H26, the inputs that break renderers: each measured now, against what is promised for it."""
 
 from __future__ import annotations
 

@@ -7,10 +7,18 @@ import numpy as np
 from translucent import reference
 from translucent.bench.hard_cases import SIZE, Checks, Hard
 from translucent.bench.hard_views import EXACTLY, GLASS
-from translucent.bench.shapes import joined, nested_shells, plates
+from translucent.bench.shapes import (
+    backward_window,
+    bow_tie,
+    inside_out_slab_beside_an_open_box,
+    joined,
+    nested_shells,
+    plates,
+)
 from translucent.camera import Camera
 from translucent.medium import Medium
 from translucent.mesh import Mesh
+from translucent.metrics import interior
 from translucent.scene import Object, Overlap, Scene
 from translucent.showcase import framing, showcase
 from translucent.solids import Box, Sphere, Torus
@@ -122,6 +130,36 @@ def _transforms(checks: Checks) -> None:
         checks.picture(name, Scene([body], framing([body], SIZE)))
 
 
+def _marks(checks: Checks, mesh: Mesh, camera: Camera, policies: tuple[Overlap, ...]) -> None:
+    """No pixel is valid that the reference marks; where surfaces are in order, no other is marked."""
+    for policy in policies:
+        scene = Scene([Object(mesh, GLASS)], camera, overlap=policy)
+        truth = reference.render(scene, SIZE)
+        inside = interior(reference.hit_counts(scene, SIZE))
+        defective = ~truth.valid & truth.coverage & inside
+        # A sum is refused where order decides.
+        methods = (None, FragmentLists(), DepthPeeling(), KBuffer(), *((SignedDepth(),) if policy == "add" else ()))
+        for method in methods:
+            frame = checks.render(scene, SIZE, method)
+            name = "planned" if method is None else type(method).__name__
+            what = f"{policy}, {name}: defective pixels not marked, of {int(defective.sum())}"
+            checks.error(what, (defective & frame.valid).sum())
+            if not isinstance(method, SignedDepth):
+                checks.holds("none too many", not (truth.valid & inside & ~frame.valid).any())
+
+
+def _lobe(checks: Checks) -> None:
+    checks.holds("the lobe is told", bow_tie().diagnosis.inside_out)
+    camera = Camera.look_at((1.5, 1.0, 3.5), (0, 0, 0), fov_y=45)
+    _marks(checks, bow_tie(), camera, ("add", "union"))
+
+
+def _window(checks: Checks) -> None:
+    for mesh in (backward_window(), inside_out_slab_beside_an_open_box()):
+        camera = Camera.look_at((0.2, 0.3, 2.0), (0.2, 0, 0), fov_y=60)
+        _marks(checks, mesh, camera, ("add",))
+
+
 CASES = (
     Hard(
         "H12",
@@ -147,4 +185,20 @@ CASES = (
     Hard("H16", "self-intersection, nested shells, overlaps in all three policies", EXACTLY, _overlaps),
     Hard("H17", "100 layers", f"{EXACTLY}; methods with fewer mark the pixels and count what they leave out", _layers),
     Hard("H18", "rotated, non-uniform and mirrored transforms", EXACTLY, _transforms),
+    Hard(
+        "H25",
+        "a closed body one lobe of which is inside out",
+        "marked by every method: no pixel of the lobe is valid",
+        _lobe,
+        0.0,
+        "pixels",
+    ),
+    Hard(
+        "H26",
+        "a thin plate with a window wound backwards, a thin box inside out beside an open one",
+        "marked by every method: no pixel of the window or of the box is valid",
+        _window,
+        0.0,
+        "pixels",
+    ),
 )

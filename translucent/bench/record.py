@@ -176,7 +176,7 @@ class Series:
 
 @dataclass(frozen=True)
 class HardCase:
-    """One of H01 to H24.
+    """One of H01 to H26.
 
     Attributes
     ----------

@@ -71,6 +71,37 @@ def plates(layers: int) -> Mesh:
     return joined([(plate.vertices - (0, 0, i * pitch), plate.faces) for i in range(count)], "plates")
 
 
+def bow_tie(segments: int = 1) -> Mesh:
+    """A box whose width is multiplied by -z: closed and consistently wound, and the lobe in front is inside out."""
+    box = Box((-1.0, -0.5, -1.0), (1.0, 0.5, 1.0)).tessellate(segments)
+    return Mesh(box.vertices * np.where([1, 0, 0], -box.vertices[:, 2:], 1.0), box.faces, name="bow tie")
+
+
+def backward_window(thickness: float = 0.006, cells: int = 8) -> Mesh:
+    """A plate, 1 by 1, with a window of its own tessellation on both sides, wound the wrong way.
+
+    Its vertices do not meet those of the frame around it, so that all edges between the two are open.
+    """
+    steps = np.linspace(-0.2, 0.2, cells + 1)
+    frame = [(-0.5, -0.5, 0.5, -0.2), (-0.5, 0.2, 0.5, 0.5), (-0.5, -0.2, -0.2, 0.2), (0.2, -0.2, 0.5, 0.2)]
+    window = [(x, y, u, v) for x, u in itertools.pairwise(steps) for y, v in itertools.pairwise(steps)]
+    rim = Box((-0.5, -0.5, -thickness / 2), (0.5, 0.5, thickness / 2)).tessellate()
+    parts = [(rim.vertices, rim.faces[rim.face_normals[:, 2] == 0])]
+    for rectangles, turned in ((frame, False), (window, True)):
+        for x, y, u, v in rectangles:
+            for z, upwards in ((thickness / 2, not turned), (-thickness / 2, turned)):
+                corners = np.array([(x, y, z), (u, y, z), (u, v, z), (x, v, z)])
+                faces = np.array([(0, 1, 2), (0, 2, 3)], dtype=np.int32)
+                parts.append((corners, faces if upwards else faces[:, ::-1]))
+    return joined(parts, "plate with a window")
+
+
+def inside_out_slab_beside_an_open_box() -> Mesh:
+    """A box of 1 x 1 x 0.02, inside out, in one mesh with a box that lacks a triangle."""
+    slab, box = Box.slab((1.0, 1.0), 0.02).tessellate(), Box((1.5, -0.5, -0.5), (2.5, 0.5, 0.5)).tessellate()
+    return joined([(slab.vertices, slab.faces[:, ::-1]), (box.vertices, box.faces[1:])], "slab and open box")
+
+
 def joined(parts: list[tuple[Vertices, Faces]], name: str) -> Mesh:
     """One mesh of several, each as vertices and faces."""
     offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])

@@ -14,6 +14,7 @@ from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SC
 from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.resources import Resources
+from translucent.gpu.shaders import CONSTANTS
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
     BodyRole,
@@ -34,6 +35,8 @@ from translucent.scene import Object, Scene
 from translucent.slots import medium_slots
 from translucent.thickness import FragmentLists, KBuffer, RayMarched, SignedDepth, ThinLayer
 
+_UNEXPECTED = float(CONSTANTS["UNEXPECTED"])
+
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
 
@@ -44,8 +47,9 @@ _COVERAGE_FLOOR = 2e-7
 #: so on, as far as float32 counts exactly. Beyond, they share the last weight.
 _OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
 
-#: Share of the diagonal that a path may be below 0; it then counts as 0.
-_NEGATIVE_TOLERANCE = 1e-2
+#: Share of the diagonal that a path may be below 0 by rounding; it then counts as 0. Steep faces have the largest
+#: errors, of some 1e-5.
+_ROUNDING = 1e-5
 
 
 class FrameJob:
@@ -86,9 +90,7 @@ class FrameJob:
         self._bodies = gl.buffer(reserve=self._stride * len(scene.objects))
         self._constant = {
             SHADE: gl.buffer(
-                shade_uniforms(
-                    scene, self._expected_counts(), self._negative_tolerance(), _COVERAGE_FLOOR * scene.diagonal
-                )
+                shade_uniforms(scene, self._expected_counts(), self._rounding(), _COVERAGE_FLOOR * scene.diagonal)
             ),
             MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self.media_range)),
             LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque or self.has_surfaces)),
@@ -230,8 +232,19 @@ class FrameJob:
         anchored = not (isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored)
         slot_of = {i: number for number, slot in enumerate(self.slots) for i in slot.objects}
         weights = _count_weights(self.scene)
+        subpixel = 0.5 ** int(self.gl.info["GL_SUBPIXEL_BITS"])
         return [
-            BodyRole(anchored, self._sheet_thickness(body), weights[i], slot_of.get(i, 0), i)
+            BodyRole(
+                anchored,
+                self._sheet_thickness(body),
+                weights[i],
+                _UNEXPECTED if body.medium is not None and body.mesh.diagnosis.inside_out else 0.0,
+                # Where a body is broken, negative paths are more likely to be real than swapped at a silhouette.
+                subpixel if body.mesh.diagnosis.sound else 0.0,
+                max(weights) == 1.0,
+                slot_of.get(i, 0),
+                i,
+            )
             for i, body in enumerate(self.scene.objects)
         ]
 
@@ -253,25 +266,17 @@ class FrameJob:
         low, high = zip(*pairs, strict=True)
         return sum(low), sum(high)
 
-    def _negative_tolerance(self) -> float:
-        """How far below 0 a thickness may be, in metres, before it betrays faces that look the wrong way.
+    def _rounding(self) -> float:
+        """How far below 0 a path may be, in metres, by the rounding of float32 alone.
 
-        A rasteriser decides coverage on a grid of 1/256 pixel, so at a silhouette a pixel center may lie that far off
-        both of its faces. Extended to it, they cross: by a pixel's size where they are steeper than 256, and by up to
-        a face's length where one is seen edge-on. Where a mesh has parts inside out, nothing is tolerated. Ordered
-        methods leave such a place out; that it is no flipped face, the diagnosis of the mesh has to tell.
+        Next to a silhouette a rasterizer may swap two faces, and a path is then below 0 by as much as it misplaces
+        them; that differs from pixel to pixel, and goes along with what they hold (``thickness/snapping.glsl``).
         """
-        bodies = [body.mesh.diagnosis for body in self.scene.bodies]
-        suspicious = any(found.inside_out_parts for found in bodies)
-        if self.plan.ordered and not suspicious and all(found.solid for found in bodies):
-            return self.scene.diagonal
-        camera, size = self.scene.camera, self.targets.size
-        distance = max(float(np.linalg.norm(placement.anchor)) for placement in self._placements) + self.scene.diagonal
-        pixel = 2.0 * camera.half_extent(size)[1] / size[1] * (1.0 if camera.fov_y is None else distance)
-        # Distances from the camera cancel with an error that grows with them: that is not a flipped face.
-        rounding = distance if isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored else 0.0
-        share = _COVERAGE_FLOOR if suspicious else _NEGATIVE_TOLERANCE
-        return share * (self.scene.diagonal + rounding) + (0.0 if suspicious else pixel)
+        reach = self.scene.diagonal
+        if isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored:
+            # Distances from the camera cancel with an error that grows with them.
+            reach += max(float(np.linalg.norm(placement.anchor)) for placement in self._placements)
+        return _ROUNDING * reach
 
 
 def _count_weights(scene: Scene) -> list[float]:

@@ -121,7 +121,14 @@ BODY = UniformBlock(
         ("sheet_ior", "f4", ()),
         ("sheet_tolerance", "f4", ()),  # metres that a sheet may be behind an opaque surface and still count
         ("axial_start", "f4", ()),  # rays start here: what is behind counts as if it were at the start
-        ("count_weight", "f4", ()),  # what one face adds to the count
+        ("count_weight", "f4", ()),  # what one face adds to the count, with the sign of its side
+        ("count_offset", "f4", ()),  # what it adds whatever its side: marks what a body covers
+        ("subpixel", "f4", ()),  # step of the grid onto which the rasterizer moves vertices, in pixels
+        (
+            "snapping_share",
+            "f4",
+            (),
+        ),  # the same, over the metres of a share of 1; 0 where counts have no room
         # The place of a point: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
         ("place_scale", "f4", ()),  # places per metre
         ("place_start", "f4", ()),  # place of the anchor
@@ -139,7 +146,8 @@ SHADE = UniformBlock(
         ("extinction", "f4", (4,)),
         ("emission", "f4", (4,)),
         ("expected_count", "f4", (2,)),  # least and greatest signed count of a trustworthy pixel
-        ("negative_tolerance", "f4", ()),
+        ("rounding", "f4", ()),  # metres that a path may be below 0, besides what silhouettes explain
+        ("count_share", "f4", ()),  # metres along the forward axis that a share of 1 in a count stands for
         ("coverage_floor", "f4", ()),  # a path not longer than this is rounding
     ),
 )

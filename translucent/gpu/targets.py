@@ -64,6 +64,10 @@ class Targets:
         """Something to draw into for passes that write to buffers only."""
         return self._get("nothing", (-1,))
 
+    def steepest(self) -> moderngl.Framebuffer:
+        """R32F: how far the rasterizer may misplace the steepest face of a pixel, in places."""
+        return self._get("steepest", (1,))
+
     def result(self) -> moderngl.Framebuffer:
         """What a frame holds: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
         return self._get("result", (4, 4, 4, 1, -1))

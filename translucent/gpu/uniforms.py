@@ -73,7 +73,13 @@ class BodyRole:
     sheet_thickness : float
         In metres, for passes that draw the body as a sheet.
     count_weight : float
-        What one face adds to the count.
+        What one face adds to the count, with the sign of its side.
+    count_offset : float
+        What it adds whatever its side: not 0 marks all pixels that the body covers.
+    subpixel : float
+        Step of the grid onto which the rasterizer moves vertices, in pixels; 0 where nothing is put down to it.
+    counts_share : bool
+        The fraction of a count has room for how far the rasterizer may misplace a face.
     slot : int
         Whose winding number its crossings change.
     number : int
@@ -83,6 +89,9 @@ class BodyRole:
     anchored: bool
     sheet_thickness: float
     count_weight: float
+    count_offset: float
+    subpixel: float
+    counts_share: bool
     slot: int
     number: int
 
@@ -118,6 +127,9 @@ def body_uniforms(placement: Placement, view: View, role: BodyRole, media: Axial
         sheet_tolerance=SHEET_ON_OPAQUE * diagonal,
         axial_start=0.0 if camera.fov_y is None and placement.cut else -float(CONSTANTS["NOTHING"]),
         count_weight=role.count_weight,
+        count_offset=role.count_offset,
+        subpixel=role.subpixel,
+        snapping_share=role.subpixel / diagonal if role.counts_share else 0.0,
         place_scale=1.0 / media.length,
         place_start=(anchor - media.near) / media.length,
         slot=role.slot,
@@ -293,9 +305,7 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
     return LIGHTS.pack(light_place=place, light_power=power, light_count=len(lights))
 
 
-def shade_uniforms(
-    scene: Scene, expected_count: tuple[float, float], negative_tolerance: float, coverage_floor: float
-) -> bytes:
+def shade_uniforms(scene: Scene, expected_count: tuple[float, float], rounding: float, coverage_floor: float) -> bytes:
     """Contents of the Shade block; the first body's medium stands for all where they are alike."""
     medium = scene.bodies[0].medium
     assert medium is not None
@@ -303,7 +313,8 @@ def shade_uniforms(
         extinction=[*bounded_extinction(medium, scene.diagonal), 0.0],
         emission=[*np.asarray(medium.emission), 0.0],
         expected_count=expected_count,
-        negative_tolerance=negative_tolerance,
+        rounding=rounding,
+        count_share=scene.diagonal,
         coverage_floor=coverage_floor,
     )
 

@@ -36,6 +36,7 @@ class FragmentListsPass:
             430,
             opaque_place=0,
             density_grids=1,
+            steepest=2,
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -43,7 +44,7 @@ class FragmentListsPass:
         try:
             self._run_bands(job, spec)
         finally:
-            for framebuffer in (job.targets.nothing(), job.targets.ordered()):
+            for framebuffer in (job.targets.steepest(), job.targets.ordered()):
                 framebuffer.scissor = None
 
     def _run_bands(self, job: FrameJob, spec: PassSpec) -> None:
@@ -83,12 +84,17 @@ class FragmentListsPass:
         heads.clear()
         for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, self._nodes(job))):
             buffer.bind_to_storage_buffer(binding)
-        _use_rows(job.targets.nothing(), first, last)
-        gl.enable_only(moderngl.NOTHING)
+        _use_rows(job.targets.steepest(), first, last)
+        job.targets.steepest().clear()
+        gl.enable_only(moderngl.BLEND)
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        gl.blend_equation = moderngl.MAX
         job.bind_opaque(0)
         program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, GRADIENT=0, OPAQUE=job.has_opaque)
         set_uniform(program, "cell_offset", 0)
         job.draw(program, spec.objects)
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.enable_only(moderngl.NOTHING)
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
         return int(np.frombuffer(count.read(), np.uint32)[0])
 
@@ -96,6 +102,7 @@ class FragmentListsPass:
         _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
         job.bind_grids(1)
+        job.targets.steepest().color_attachments[0].use(2)
         switches = {"OPAQUE": job.has_opaque, "BORDERS": job.finds_exits}
         program = self._resolve.program(**walk_switches(job), GRADIENT=0, **switches)
         if isinstance(method := job.plan.method, RayMarched):

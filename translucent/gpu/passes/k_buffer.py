@@ -17,7 +17,9 @@ class KBufferPass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", 430, opaque_place=0)
-        self._resolve = Variants(gl, "geometry/fullscreen.vert", "intervals/k_buffer_resolve.frag", 430, opaque_place=0)
+        self._resolve = Variants(
+            gl, "geometry/fullscreen.vert", "intervals/k_buffer_resolve.frag", 430, opaque_place=0, steepest=1
+        )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies, then walk along what is kept."""
@@ -28,14 +30,21 @@ class KBufferPass:
         # A count of 0, and k times no crossing.
         words.clear(chunk=np.array([0] + [0xFFFFFFFF] * k, np.uint32).tobytes(), size=4 * (k + 1) * width * height)
         words.bind_to_storage_buffer(0)
-        job.targets.nothing().use()
-        gl.enable_only(moderngl.NOTHING)
+        steepest = job.targets.steepest()
+        steepest.use()
+        steepest.clear()
+        gl.enable_only(moderngl.BLEND)
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        gl.blend_equation = moderngl.MAX
         job.bind_opaque(0)
         program = self._insert.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
         set_uniform(program, "k", k)
         job.draw(program, spec.objects)
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.enable_only(moderngl.NOTHING)
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT)
         job.targets.ordered().use()
+        steepest.color_attachments[0].use(1)
         program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque, BORDERS=job.finds_exits)
         set_uniform(program, "k", k)
         self._resolve.draw_fullscreen(program)

@@ -1,0 +1,83 @@
+"""Whether a surface is inside out somewhere, by winding numbers along sample lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.bench.shapes import backward_window, bow_tie, inside_out_slab_beside_an_open_box, nested_shells
+from translucent.plan import plan
+from translucent.sample_lines import winds_negatively
+from translucent.solids import Box, Sphere, Torus
+
+CAMERA = tl.Camera.look_at((0, 0, 4), (0, 0, 0))
+
+
+def joined(*meshes: tl.Mesh) -> tl.Mesh:
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)])
+    return tl.Mesh(np.concatenate([mesh.vertices for mesh in meshes]), faces)
+
+
+def turned(mesh: tl.Mesh) -> tl.Mesh:
+    return tl.Mesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+BOX = Box((-1, -1, -1), (1, 1, 1)).tessellate()
+SOUND = {
+    "box": BOX,
+    "torus": Torus().tessellate(24),
+    "hollow balls": nested_shells(3, 16),
+    "two that overlap": joined(Sphere().tessellate(16), Sphere((0.5, 0.2, 0.1)).tessellate(16)),
+    "one that lacks a face": tl.Mesh(BOX.vertices, BOX.faces[1:]),
+    "a doubled wall": joined(BOX, turned(BOX)),
+}
+INSIDE_OUT = {
+    "a lobe": bow_tie(),
+    "the other lobe": turned(bow_tie()),
+    "a window": backward_window(),
+    "a part beside an open one": inside_out_slab_beside_an_open_box(),
+}
+
+
+@pytest.mark.parametrize("mesh", SOUND.values(), ids=SOUND)
+def test_a_sound_surface_never_winds_negatively(mesh: tl.Mesh) -> None:
+    assert not winds_negatively(mesh.vertices, mesh.faces)
+    assert not mesh.diagnosis.inside_out
+
+
+@pytest.mark.parametrize("mesh", INSIDE_OUT.values(), ids=INSIDE_OUT)
+def test_what_is_inside_out_is_found(mesh: tl.Mesh) -> None:
+    assert winds_negatively(mesh.vertices, mesh.faces)
+    assert mesh.diagnosis.inside_out
+    assert not mesh.diagnosis.sound
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("shift", [0.0, 1e5])
+def test_size_and_place_make_no_difference(scale: float, shift: float) -> None:
+    for mesh, found in ((bow_tie(), True), (SOUND["torus"], False)):
+        assert winds_negatively((mesh.vertices + shift) * scale, mesh.faces) is found
+
+
+def test_a_body_that_is_inverted_as_a_whole_is_judged_as_it_is_drawn() -> None:
+    ball = turned(Torus().tessellate(24))
+    assert ball.diagnosis.inverted
+    assert ball.diagnosis.sound
+
+
+def test_the_diagnosis_names_a_lobe() -> None:
+    assert str(bow_tie().diagnosis) == (
+        "closed, 1 component; inside out in places: the surface crosses itself, and a lobe of it looks inwards"
+    )
+
+
+def test_where_a_lobe_is_inside_out_the_order_of_surfaces_has_to_be_found() -> None:
+    scene = tl.Scene([tl.Object(bow_tie(), tl.Medium(absorption=1.0))], CAMERA)
+    assert plan(scene).ordered
+    assert "'bow tie' is inside out in places" in plan(scene).passes[0].reason
+    assert plan(scene, tl.SignedDepth()).limits == (
+        "'bow tie': inside out in places: SignedDepth cannot tell which pixels show one, so all that it covers are "
+        "marked invalid; FragmentLists can",
+    )
