@@ -5,7 +5,7 @@ from __future__ import annotations
 from translucent.plan_borders import touching_borders
 from translucent.render_plan import Borders
 from translucent.scene import Scene
-from translucent.slots import may_overlap, same_medium
+from translucent.slots import overlapping_pair, same_medium
 from translucent.thickness import BackFaceDepth, Method, ThinLayer
 
 
@@ -20,13 +20,12 @@ def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> 
     if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
         return None
     solids = [body for body in bodies if body.sheet_thickness is None]
-    for j, later in enumerate(solids):
-        for earlier in solids[:j]:
-            if may_overlap(earlier, later):
-                return (
-                    f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
-                    "would count both"
-                )
+    if (found := overlapping_pair(solids)) is not None:
+        earlier, later = (solids[place] for place in found)
+        return (
+            f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
+            "would count both"
+        )
     for body in solids:
         if not body.mesh.diagnosis.convex:
             return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
