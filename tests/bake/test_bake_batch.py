@@ -78,7 +78,7 @@ def test_what_a_killed_process_left_is_removed(make_jobs: Any) -> None:
     output.parent.mkdir(exist_ok=True)
     for written in (output, sidecar_of(output)):
         code = (
-            "import os, signal, sys, pathlib; from translucent.frame import write_atomically\n"
+            "import os, signal, sys, pathlib; from translucent.paths import write_atomically\n"
             "write_atomically(pathlib.Path(sys.argv[1]), lambda path: os.kill(os.getpid(), signal.SIGKILL))\n"
         )
         assert subprocess.run([sys.executable, "-c", code, str(written)], check=False).returncode == -signal.SIGKILL

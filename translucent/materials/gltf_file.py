@@ -18,9 +18,8 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 from translucent.errors import InputError
-from translucent.frame import write_atomically
 from translucent.materials.gltf_pack import gather
-from translucent.paths import require_file, require_place
+from translucent.paths import require_file, require_place, write_atomically
 
 Json = dict[str, Any]
 
