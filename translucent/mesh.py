@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from translucent.diagnosis import Diagnosis, diagnose
 from translucent.errors import InputError, TranslucentWarning
+from translucent.frozen import Frozen
 from translucent.grouping import equal_rows, used_vertices
 from translucent.paths import require_file
 from translucent.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
@@ -31,7 +32,7 @@ MIN_DIAGONAL = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Frozen):
     """Triangles with shared vertices. Compared by identity; its arrays are read-only.
 
     Parameters

@@ -15,6 +15,7 @@ from translucent.color import ColorLike, parse_color
 from translucent.density import Density
 from translucent.environment import Environment, parse_radiance
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import MAX_EMISSION, Medium
 from translucent.mesh import MAX_COORDINATE, Mesh
@@ -32,7 +33,7 @@ MOST_NAMES = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Object:
+class Object(Frozen):
     """A mesh in the scene, filled with a medium.
 
     Parameters
@@ -155,7 +156,7 @@ class Object:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Frozen):
     """Everything that a picture needs.
 
     Parameters
