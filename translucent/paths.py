@@ -83,6 +83,14 @@ def require_folder(path: Path, asked: str) -> None:
         raise InputError(asked, f"{str(there)!r} is no folder", "choose another one")
 
 
+def same_file(one: Path, other: Path) -> bool:
+    """Whether both are names of one file that is there: directly, or through links of either kind."""
+    try:
+        return os.path.samefile(one, other)
+    except (OSError, ValueError):
+        return False
+
+
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was.
 
