@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-Value = TypeVar("Value", bound="Frozen")
-
 
 class Frozen:
-    """Base of values with read-only arrays: what is derived from the arrays is kept, and must stay true.
-
-    A copy is the value itself, as of a tuple of numbers: NumPy's copies of its arrays could be written to.
-    """
-
-    def __copy__(self: Value) -> Value:
-        return self
-
-    def __deepcopy__(self: Value, memo: dict[int, Any]) -> Value:
-        return self
+    """Base of values with read-only arrays: what is derived from the arrays is kept, and must stay true."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over what a copy or a pickle holds; NumPy makes arrays in it that can be written to."""
         for value in state.values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)

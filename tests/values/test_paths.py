@@ -113,6 +113,7 @@ def test_what_somebody_is_writing_now_is_not_removed(tmp_path: Path) -> None:
     def slow(temporary: Path) -> None:
         write_text_atomically(path, "the first to finish")
         assert path.read_text() == "the first to finish"
+        assert temporary.exists()
         temporary.write_text("the last to finish")
 
     write_atomically(path, slow)
