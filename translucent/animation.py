@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -13,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError, RenderError
-from translucent.frame import make_folder, write_atomically, write_png
-from translucent.paths import require_folder, require_place
+from translucent.film import write_film
+from translucent.frame import make_folder, write_png
+from translucent.paths import require_folder, require_place, write_atomically
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -119,24 +119,4 @@ def _write_with_pillow(path: Path, pictures: Iterator[Pixels], fps: float, **opt
         first.save(stream, save_all=True, append_images=images, duration=round(1000.0 / fps), loop=0, **options)
 
 
-def _write_mp4(path: Path, pictures: Iterator[Pixels], fps: float) -> None:
-    import imageio_ffmpeg
-
-    first = _even(next(pictures))
-    size = first.shape[1], first.shape[0]
-    writer = imageio_ffmpeg.write_frames(
-        str(path), size, fps=fps, codec="libx264", quality=8, macro_block_size=2, ffmpeg_log_level="error"
-    )
-    with closing(writer):
-        writer.send(None)  # starts it
-        for picture in chain([first], pictures):
-            writer.send(np.ascontiguousarray(_even(picture)))
-
-
-def _even(picture: Pixels) -> Pixels:
-    """The picture with its last row and column twice where their number is odd: color is stored for 2 by 2 pixels."""
-    height, width = picture.shape[:2]
-    return np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-
-
-WRITERS: dict[str, Callable[..., None]] = {".webp": _write_webp, ".gif": _write_gif, ".mp4": _write_mp4}
+WRITERS: dict[str, Callable[..., None]] = {".webp": _write_webp, ".gif": _write_gif, ".mp4": write_film}

@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 from translucent.lights import MAX_RADIANCE
 
 
 @dataclass(frozen=True, eq=False)
-class Backdrop:
+class Backdrop(Frozen):
     """What is opaque in a frame: rays through the media end at its depth, and its radiance is seen there.
 
     The camera is that of the scene, and each pixel belongs to the ray through its center. Row 0 is the top row.

@@ -12,9 +12,8 @@ from typing import Any
 
 from translucent.conversion import CLAMP, clamp_colors, summary
 from translucent.errors import InputError
-from translucent.frame import write_atomically
 from translucent.medium import Medium
-from translucent.paths import require_place
+from translucent.paths import require_place, write_atomically
 from translucent.swatches import html_strip
 from translucent.tables import Row, check_cells, read_table
 from translucent.units import metres_per_unit

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 
 Array = npt.NDArray[np.float64]
 
@@ -19,7 +20,7 @@ MAX_COORDINATE = 1e18
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(Frozen):
     """A perspective or orthographic view.
 
     Parameters

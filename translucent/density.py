@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent import optics
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -29,7 +30,7 @@ _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 
 @dataclass(frozen=True, eq=False)
-class DensityGrid:
+class DensityGrid(Frozen):
     """Density from samples: trilinear between the centers of the voxels, constant from there to the border.
 
     Parameters

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from translucent.color import ColorLike, parse_color
 from translucent.environment_map import EnvironmentMap
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 from translucent.lights import positive_triple
 
 Array = npt.NDArray[np.float64]
@@ -30,7 +31,7 @@ _WHAT = "environment radiance"
 
 
 @dataclass(frozen=True, eq=False)
-class Environment:
+class Environment(Frozen):
     """Radiance from far behind everything. Made by `constant`, `gradient`, `checkerboard`, `image` or `studio`.
 
     It lights, it is reflected, and it is seen behind everything, unless `with_background` gives it something else to

@@ -13,13 +13,14 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from translucent.errors import InputError, TranslucentWarning
+from translucent.frozen import Frozen
 from translucent.lights import MAX_RADIANCE
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class EnvironmentMap:
+class EnvironmentMap(Frozen):
     """Linear radiance from all directions.
 
     Row 0 is straight up (+Y), the center of the picture is -Z, and +X is to the right of it. Pixels are samples at

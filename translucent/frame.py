@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -16,7 +13,7 @@ import numpy.typing as npt
 
 from translucent.color import exposure_scale, linear_to_srgb
 from translucent.errors import InputError, RenderError
-from translucent.paths import require_folder, require_place
+from translucent.paths import require_folder, require_place, write_atomically
 from translucent.render_plan import RenderPlan
 from translucent.tone import tone_curve
 
@@ -285,50 +282,3 @@ def check_output(path: Path) -> None:
                 "the OpenEXR package is not installed",
                 "pip install openexr",
             ) from None
-
-
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was."""
-    path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
-    try:
-        handle, name = tempfile.mkstemp(prefix=_partial(path), suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise RenderError(
-            f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder"
-        ) from error
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        # mkstemp makes private files; a result has the permissions of any other new file.
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        write(temporary)
-        temporary.replace(path)
-    except OSError as error:
-        raise RenderError(
-            f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", "check the disk"
-        ) from error
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def remove_partial(path: Path) -> None:
-    """Remove what a process that was killed while it wrote `path` may have left beside it."""
-    path = Path(os.path.realpath(path))
-    for left in path.parent.glob(f"{_partial(path)}*"):
-        left.unlink(missing_ok=True)
-
-
-def _partial(path: Path) -> str:
-    """How the names of temporary files for `path` begin."""
-    return f".partial-{zlib.crc32(os.fsencode(path.name)):08x}-"
-
-
-def write_text_atomically(path: Path, text: str) -> None:
-    """Write a text in UTF-8, as `write_atomically` does."""
-
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)

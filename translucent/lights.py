@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from translucent.camera import MAX_COORDINATE
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 
 Array = npt.NDArray[np.float64]
 
@@ -17,7 +18,7 @@ MAX_RADIANCE = 1e18
 
 
 @dataclass(frozen=True, eq=False)
-class PointLight:
+class PointLight(Frozen):
     """Light that shines alike in all directions and falls off with the inverse square (KHR_lights_punctual).
 
     Parameters
@@ -61,7 +62,7 @@ class PointLight:
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionalLight:
+class DirectionalLight(Frozen):
     """Light from infinitely far away (KHR_lights_punctual).
 
     Parameters

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from translucent import conversion, optics
 from translucent.color import parse_color
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 
 Array = npt.NDArray[np.float64]
 Channels = npt.ArrayLike
@@ -25,7 +26,7 @@ MAX_IOR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class Medium:
+class Medium(Frozen):
     """A homogeneous participating medium. Triples are linear Rec.709 channels; a single number stands for all three.
 
     Parameters

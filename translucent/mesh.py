@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from translucent.diagnosis import Diagnosis, diagnose
 from translucent.errors import InputError, TranslucentWarning
+from translucent.frozen import Frozen
 from translucent.grouping import equal_rows, used_vertices
 from translucent.paths import require_file
 from translucent.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
@@ -31,7 +32,7 @@ MIN_DIAGONAL = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Frozen):
     """Triangles with shared vertices. Compared by identity; its arrays are read-only.
 
     Parameters
@@ -186,21 +187,21 @@ class Mesh:
 
     def require_finite(self) -> None:
         """Raise `InputError` where coordinates are not finite, or the mesh is too large or small for float32."""
+        if self._refusal is not None:
+            raise InputError(f"mesh {self.name!r}", *self._refusal)
+
+    @cached_property
+    def _refusal(self) -> tuple[str, str] | None:
+        """Why coordinates cannot be used, and what to do; found once for all objects that share the mesh."""
         bad = np.flatnonzero(~np.isfinite(self.vertices).all(axis=1))
         if len(bad):
-            raise InputError(
-                f"mesh {self.name!r}",
-                f"{len(bad)} vertices are not finite (first: {bad[0]})",
-                "export the mesh again",
-            )
+            return f"{len(bad)} vertices are not finite (first: {bad[0]})", "export the mesh again"
         if (largest := float(np.abs(self.vertices).max())) > MAX_COORDINATE:
-            raise InputError(
-                f"mesh {self.name!r}",
-                f"a coordinate of {largest:.3g} m, beyond {MAX_COORDINATE:g} m",
-                "give the file's unit (--unit), or scale the mesh",
-            )
+            found = f"a coordinate of {largest:.3g} m, beyond {MAX_COORDINATE:g} m"
+            return found, "give the file's unit (--unit), or scale the mesh"
         if self.diagonal < MIN_DIAGONAL:
-            raise InputError(f"mesh {self.name!r}", "all its vertices are at one point", "export the mesh again")
+            return "all its vertices are at one point", "export the mesh again"
+        return None
 
 
 def load_mesh(path: str | Path, unit: str = "m") -> Mesh:

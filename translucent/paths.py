@@ -1,11 +1,21 @@
-"""Files and folders that a user names: whether they are what they have to be, told before any work is done."""
+"""Files and folders that a user names: whether they are what they have to be, told before any work is done; and the one
+way in which files are written, complete or not at all."""
 
 from __future__ import annotations
 
 import os
+import secrets
+import sys
+import zlib
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
-from translucent.errors import InputError
+from translucent.errors import InputError, RenderError
+
+if sys.platform != "win32":
+    import fcntl
 
 # os.path says False of a name that no file can have, where pathlib may raise.
 
@@ -71,3 +81,98 @@ def require_folder(path: Path, asked: str) -> None:
     there = next((folder for folder in (path, *path.parents) if os.path.lexists(folder)), None)
     if there is not None and not os.path.isdir(there):
         raise InputError(asked, f"{str(there)!r} is no folder", "choose another one")
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Whether both are names of one file that is there: directly, or through links of either kind."""
+    try:
+        return os.path.samefile(one, other)
+    except (OSError, ValueError):
+        return False
+
+
+def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was.
+
+    What a process that was killed while it wrote `path` has left beside it is removed.
+
+    Raises
+    ------
+    RenderError
+        If the file cannot be written.
+    """
+    path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
+    try:
+        remove_partial(path)
+        temporary, held = _temporary_file(path)
+    except OSError as error:
+        raise RenderError(
+            f"output {str(path)!r}", f"it cannot be written ({error.strerror})", "check the folder"
+        ) from error
+    try:
+        write(temporary)
+        if sys.platform == "win32":  # where nothing that is open can be renamed
+            held.close()
+        temporary.replace(path)
+    except OSError as error:
+        raise RenderError(
+            f"output {str(path)!r}", f"it cannot be written ({error.strerror or error})", "check the disk"
+        ) from error
+    finally:
+        held.close()
+        temporary.unlink(missing_ok=True)
+
+
+def remove_partial(path: Path) -> None:
+    """Remove what others have left that were killed while they wrote `path`; not what somebody is writing now."""
+    path = Path(os.path.realpath(path))
+    for left in path.parent.glob(f"{_partial(path)}*"):
+        # It may be gone meanwhile, not be ours, or be where there are no locks to tell.
+        with suppress(OSError), left.open("r+b") as file:
+            if _lock(file):
+                left.unlink()
+
+
+def write_text_atomically(path: Path, text: str) -> None:
+    """Write a text in UTF-8, as `write_atomically` does."""
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8")
+
+    write_atomically(path, write)
+
+
+def _temporary_file(path: Path) -> tuple[Path, BinaryIO]:
+    """A new file beside `path`, locked for as long as it is open: a process that is killed lets go of it."""
+    while True:
+        temporary = path.with_name(f"{_partial(path)}{secrets.token_hex(4)}{path.suffix}")
+        try:
+            # Made as any other file is, it has the permissions of any other new file, too.
+            file = temporary.open("x+b")
+        except FileExistsError:
+            continue
+        try:
+            locked = _lock(file)
+        except OSError:  # a file system without locks, on which nothing is removed, either
+            return temporary, file
+        # Between being made and being locked it looks like one that was left, and may have been removed.
+        if locked and os.fstat(file.fileno()).st_nlink:
+            return temporary, file
+        file.close()
+        temporary.unlink(missing_ok=True)
+
+
+def _lock(file: BinaryIO) -> bool:
+    """Whether nobody else holds the file; then it is held until it is closed, or this process ends."""
+    if sys.platform == "win32":
+        return True  # no file that somebody has open can be removed there
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _partial(path: Path) -> str:
+    """How the names of temporary files for `path` begin."""
+    return f".partial-{zlib.crc32(os.fsencode(path.name)):08x}-"

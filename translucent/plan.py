@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from translucent.errors import InputError
 from translucent.plan_borders import border_passes, check_borders, with_one_border
@@ -22,7 +22,7 @@ from translucent.plan_limits import (
 )
 from translucent.plan_order import media_differ, why_order_matters
 from translucent.render_plan import Borders, Capabilities, PassSpec, RenderPlan
-from translucent.scene import Object, Scene
+from translucent.scene import Object, Scene, object_names
 from translucent.slots import MAX_SLOTS, medium_slots, require_clear_priorities
 from translucent.thickness import (
     MAX_LIGHT_POINTS,
@@ -95,7 +95,7 @@ def plan(
         return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities, borders=borders))
     if not scene.bodies:
         raise InputError(
-            f"rendering {_names(scene.objects)}",
+            f"rendering {object_names(scene.objects)}",
             "nothing there has a medium",
             "give an object one: medium=tl.Medium(...)",
         )
@@ -145,7 +145,7 @@ def plan_over_backdrop(
     if scene.opaque:
         raise InputError(
             "a backdrop",
-            f"the scene has opaque objects of its own: {_names(scene.opaque)}",
+            f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
             "leave them out, or to whoever draws the backdrop",
         )
     chosen = plan(scene, method, capabilities, borders=borders)
@@ -197,7 +197,7 @@ def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilit
     """The plan of a scene that only ordered intervals can tell; refuses any other method that was asked for."""
     if not _solids(scene):
         raise InputError(
-            f"rendering {_names(scene.bodies)}",
+            f"rendering {object_names(scene.bodies)}",
             f"{why}, and sheets have no place in the order",
             "give all sheets one medium, or none that emits",
         )
@@ -302,7 +302,7 @@ def _fallback_passes(scene: Scene, spectral: bool) -> list[PassSpec]:
     if not leaky:
         return []
     reason = (
-        f"{_names([scene.objects[i] for i in leaky])} not closed: pixels that enter and leave unequally often "
+        f"{object_names([scene.objects[i] for i in leaky])} not closed: pixels that enter and leave unequally often "
         f"get sheets of {FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid"
     )
     sheets = leaky + _sheets(scene)
@@ -322,7 +322,7 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
     if media_differ(scene):
         raise InputError("BackFaceDepth", "bodies with different media", "use SignedDepth, which tells them apart")
     if sheets := [scene.objects[i] for i in _sheets(scene)]:
-        raise InputError("BackFaceDepth", f"{_names(sheets)} declared a sheet", "use SignedDepth or ThinLayer")
+        raise InputError("BackFaceDepth", f"{object_names(sheets)} declared a sheet", "use SignedDepth or ThinLayer")
     bodies = _solids(scene)
     reason = "asked for: nearest front face, then farthest back face"
     passes = [PassSpec("back_face_depth", reason, bodies, 2, cost=COSTS["back_face_depth"])]
@@ -331,7 +331,7 @@ def _plan_back_face_depth(scene: Scene, method: BackFaceDepth) -> RenderPlan:
     if len(bodies) > 1:
         limits.append("several bodies: pixels that cross more than one are marked invalid")
     if concave := [body for body in scene.bodies if not body.mesh.diagnosis.convex]:
-        limits.append(f"{_names(concave)} not convex: pixels with more than one entry are marked invalid")
+        limits.append(f"{object_names(concave)} not convex: pixels with more than one entry are marked invalid")
     return _finished(scene, method, passes, limits, spectral=False)
 
 
@@ -384,10 +384,6 @@ def _sheets(scene: Scene) -> tuple[int, ...]:
 
 def _indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
     return tuple(i for i, body in enumerate(scene.objects) if keep(body))
-
-
-def _names(items: Iterable[Object]) -> str:
-    return ", ".join(repr(item.mesh.name) for item in items)
 
 
 def _count(items: tuple[int, ...], one: str, many: str) -> str:

@@ -10,8 +10,8 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.render_plan import Borders, PassSpec, RenderPlan
-from translucent.scene import Object, Scene
-from translucent.slots import may_overlap
+from translucent.scene import Object, Scene, object_names
+from translucent.slots import overlapping_pair
 from translucent.thickness import Method, ThinLayer
 
 #: What a plan says in which rays bend at the front border alone.
@@ -114,18 +114,17 @@ def picture_cuts(scene: Scene, body: Object) -> bool:
 def touching_borders(scene: Scene) -> str | None:
     """Why the order of surfaces tells more where bodies with borders may touch; None if none do."""
     solids = [body for body in scene.bodies if body.sheet_thickness is None]
-    for j, later in enumerate(solids):
-        for earlier in solids[:j]:
-            if (earlier.has_interface or later.has_interface) and may_overlap(earlier, later):
-                return (
-                    f"borders of {earlier.mesh.name!r} and {later.mesh.name!r} may touch: the order tells where a ray "
-                    "leaves both"
-                )
-    return None
+    bends = np.array([body.has_interface for body in solids])
+    if not bends.any() or (found := overlapping_pair(solids, lambda one, other: bends[one] | bends[other])) is None:
+        return None
+    earlier, later = (solids[place] for place in found)
+    return (
+        f"borders of {earlier.mesh.name!r} and {later.mesh.name!r} may touch: the order tells where a ray leaves both"
+    )
 
 
 def _names(scene: Scene, objects: Iterable[int]) -> str:
-    return ", ".join(repr(scene.objects[i].mesh.name) for i in objects)
+    return object_names(scene.objects[i] for i in objects)
 
 
 def _effects(scene: Scene, *, bends: bool = True) -> str:

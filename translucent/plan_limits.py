@@ -9,7 +9,7 @@ import numpy as np
 from translucent.density import DensityGrid
 from translucent.errors import InputError
 from translucent.render_plan import Capabilities, RenderPlan
-from translucent.scene import Object, Scene
+from translucent.scene import Object, Scene, object_names
 from translucent.thickness import (
     LEAST_SEEN,
     MAX_STEPS,
@@ -52,21 +52,17 @@ def open_bodies(scene: Scene) -> tuple[int, ...]:
 
 def open_limits(scene: Scene) -> list[str]:
     """For each open body, what is wrong with it and what to do."""
-    limits = []
-    for i in open_bodies(scene):
-        mesh = scene.objects[i].mesh
-        limits.append(
-            f"{mesh.name!r}: {'; '.join(mesh.diagnosis.problems)}: close it, or declare it a sheet "
-            "(sheet_thickness=..., --method thin-layer)"
-        )
-    return limits
+    return [
+        f"{mesh.name!r}: {'; '.join(mesh.diagnosis.problems)}: close it, or declare it a sheet "
+        "(sheet_thickness=..., --method thin-layer)"
+        for mesh in dict.fromkeys(scene.objects[i].mesh for i in open_bodies(scene))
+    ]
 
 
 def closed_sheet_limits(scene: Scene, method: ThinLayer) -> list[str]:
     """What `ThinLayer` leaves out of closed bodies."""
     solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
-    names = ", ".join(repr(body.mesh.name) for body in solid)
-    return [f"{names} closed, but drawn as sheets: what is inside is left out"] if solid else []
+    return [f"{object_names(solid)} closed, but drawn as sheets: what is inside is left out"] if solid else []
 
 
 def layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
@@ -88,7 +84,7 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
     InputError
         If another method is asked for, or the machine cannot march.
     """
-    names = ", ".join(repr(body.mesh.name) for body in scene.bodies if body.density is not None)
+    names = object_names(body for body in scene.bodies if body.density is not None)
     if not capabilities.shader_storage:
         raise InputError(
             f"rendering {names} with a density that varies",
@@ -138,18 +134,19 @@ def mesh_limits(scene: Scene, method: Method) -> list[str]:
                 else "their pixels are marked invalid"
             )
             limits.append(f"{body.mesh.name!r}: {what}: {marked}")
-    return limits
+    return list(dict.fromkeys(limits))
 
 
 def scattering_limits(scene: Scene) -> list[str]:
     """Where float32 cannot tell how far light gets into a medium that scatters it."""
     dense = [
-        body.mesh.name
+        body
         for body in scene.bodies
         if body.medium is not None and body.medium.extinction.max() * scene.diagonal > DENSE
     ]
-    names = ", ".join(map(repr, dense))
-    return [f"{names}: scattered light is not exact beyond an optical depth of {DENSE:g}"] if dense else []
+    return (
+        [f"{object_names(dense)}: scattered light is not exact beyond an optical depth of {DENSE:g}"] if dense else []
+    )
 
 
 def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -> tuple[str, ...]:
@@ -190,11 +187,10 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
         )
     elif bent:
         effects.append("refraction and reflection: rays go straight, though borders bend and mirror them")
-    if clear := [body.mesh.name for body in scene.bodies if _is_invisible(body)]:
-        effects.append(f"{', '.join(map(repr, clear))}: invisible, since nothing in it absorbs, scatters or emits")
-    if not borders and (finished := [item.mesh.name for item in scene.opaque if item.surface is not None]):
-        names = ", ".join(map(repr, finished))
-        effects.append(f"surfaces of opaque objects: {names} reflect diffusely, in one color each")
+    if clear := [body for body in scene.bodies if _is_invisible(body)]:
+        effects.append(f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits")
+    if not borders and (finished := [item for item in scene.opaque if item.surface is not None]):
+        effects.append(f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each")
     if scene.opaque:
         effects.append("shadows: light reaches opaque objects through everything")
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from translucent.plan_borders import touching_borders
 from translucent.render_plan import Borders
 from translucent.scene import Scene
-from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, same_medium
+from translucent.slots import MAX_SLOTS, medium_slots, overlapping_pair, same_medium
 from translucent.thickness import BackFaceDepth, Method, ThinLayer
 
 
@@ -22,13 +22,12 @@ def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> 
     if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
         return None
     solids = [body for body in bodies if body.sheet_thickness is None]
-    for j, later in enumerate(solids):
-        for earlier in solids[:j]:
-            if may_overlap(earlier, later):
-                return (
-                    f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
-                    "would count both"
-                )
+    if (found := overlapping_pair(solids)) is not None:
+        earlier, later = (solids[place] for place in found)
+        return (
+            f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
+            "would count both"
+        )
     for body in solids:
         if not body.mesh.diagnosis.convex:
             return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
@@ -37,10 +36,10 @@ def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> 
 
 def _inside_out(scene: Scene) -> str | None:
     """Which body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals cannot."""
-    for body in scene.bodies:
-        if body.sheet_thickness is None and body.mesh.diagnosis.inside_out and len(medium_slots(scene)) <= MAX_SLOTS:
-            return f"{body.mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
-    return None
+    broken = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.inside_out]
+    if not broken or len(medium_slots(scene)) > MAX_SLOTS:
+        return None
+    return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
 
 
 def media_differ(scene: Scene) -> bool:

@@ -66,7 +66,8 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
         self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool, str], RenderPlan]] = WeakKeyDictionary()
         self._closed = False
-        self._engine: GpuRenderer | CpuRenderer = _engine(backend, context)
+        self._asked = backend, context
+        self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
 
     def __enter__(self) -> Renderer:
         return self
@@ -75,6 +76,13 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
+
+    @property
+    def _engine(self) -> GpuRenderer | CpuRenderer:
+        """What draws: another one after a frame that was interrupted, since nobody knows what that has left."""
+        if not self._closed and isinstance(self._made, GpuRenderer) and self._made.interrupted:
+            self._made = _engine(*self._asked)
+        return self._made
 
     @property
     def gpu(self) -> GpuRenderer:
@@ -161,18 +169,33 @@ class Renderer:
             raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
         self._require_open()
         size = check_size(size)
-        if transparent:
-            frame = self._render_transparent(scene, size, self.plan(scene, method, borders=borders), samples, backdrop)
-        elif backdrop is None:
-            frame = self._engine.render(scene, size, self.plan(scene, method, borders=borders), samples)
-        else:
-            _check_backdrop(backdrop, size)
-            frame = self._gpu("a backdrop").render(
-                scene, size, self.plan(scene, method, over_backdrop=True, borders=borders), samples, backdrop
-            )
+        try:
+            frame = self._render(scene, size, method, samples, backdrop, transparent=transparent, borders=borders)
+        except BaseException as error:
+            self._note_interruption(error)
+            raise
         frame.provenance.update(self.provenance)
         _warn(frame)
         return frame
+
+    def _render(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        method: Method | None,
+        samples: int,
+        backdrop: Backdrop | TextureBackdrop | None,
+        *,
+        transparent: bool,
+        borders: Borders,
+    ) -> Frame:
+        if transparent:
+            return self._render_transparent(scene, size, self.plan(scene, method, borders=borders), samples, backdrop)
+        if backdrop is None:
+            return self._engine.render(scene, size, self.plan(scene, method, borders=borders), samples)
+        _check_backdrop(backdrop, size)
+        chosen = self.plan(scene, method, over_backdrop=True, borders=borders)
+        return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _render_transparent(
         self, scene: Scene, size: tuple[int, int], chosen: RenderPlan, samples: int, backdrop: object
@@ -229,14 +252,23 @@ class Renderer:
         tone_curve(tone)
         check_exposure(exposure)
         chosen = self.plan(scene, method, borders=borders)
-        self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
+        try:
+            self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
+        except BaseException as error:
+            self._note_interruption(error)
+            raise
         return chosen
 
     def close(self) -> None:
         """Free everything. Closing twice is fine."""
         if not self._closed:
             self._closed = True
-            self._engine.close()
+            self._made.close()
+
+    def _note_interruption(self, error: BaseException) -> None:
+        """Draw no more with what an exception has ended that comes at any point, such as Ctrl-C."""
+        if not isinstance(error, Exception) and isinstance(self._made, GpuRenderer):
+            self._made.interrupt()
 
     def _gpu(self, what: str) -> GpuRenderer:
         if not isinstance(self._engine, GpuRenderer):

@@ -44,6 +44,8 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
     places = equal_rows(vertices)
     points = vertices[places.first]
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    if len(pairs) == 0:
+        return np.asarray(places.first[places.of])
     count = len(points)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     groups, label = connected_components(graph, directed=False)

@@ -15,6 +15,7 @@ from translucent.color import ColorLike, parse_color
 from translucent.density import Density
 from translucent.environment import Environment, parse_radiance
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 from translucent.lights import DirectionalLight, PointLight
 from translucent.medium import MAX_EMISSION, Medium
 from translucent.mesh import MAX_COORDINATE, Mesh
@@ -27,9 +28,12 @@ Light = PointLight | DirectionalLight
 #: What opaque objects reflect unless told otherwise: a light grey, as of clay.
 OPAQUE_COLOR = (0.6, 0.6, 0.6)
 
+#: Names that a message lists.
+MOST_NAMES = 8
+
 
 @dataclass(frozen=True, eq=False)
-class Object:
+class Object(Frozen):
     """A mesh in the scene, filled with a medium.
 
     Parameters
@@ -124,7 +128,7 @@ class Object:
         """(4, 4): object to world."""
         return np.asarray(self.transform)
 
-    @property
+    @cached_property
     def mirrored(self) -> bool:
         """Whether the transform turns the winding around."""
         return bool(np.linalg.det(self.matrix[:3, :3]) < 0)
@@ -152,7 +156,7 @@ class Object:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Frozen):
     """Everything that a picture needs.
 
     Parameters
@@ -208,12 +212,12 @@ class Scene:
     def __repr__(self) -> str:
         return f"Scene of {len(self.objects)} objects, {len(self.lights)} lights, {self.environment.kind} environment"
 
-    @property
+    @cached_property
     def bodies(self) -> tuple[Object, ...]:
         """Objects that are filled with a medium."""
         return tuple(body for body in self.objects if body.medium is not None)
 
-    @property
+    @cached_property
     def opaque(self) -> tuple[Object, ...]:
         """Objects that nothing is seen through."""
         return tuple(item for item in self.objects if item.medium is None)
@@ -235,12 +239,12 @@ class Scene:
             scattered = np.asarray(body.medium.scattering) * np.asarray(self.ambient)
             return np.asarray(body.medium.emission + scattered, dtype=np.float64)
 
-    @property
+    @cached_property
     def varies(self) -> bool:
         """Whether the density of any body varies in space."""
         return any(body.density is not None for body in self.bodies)
 
-    @property
+    @cached_property
     def scatters_ambient(self) -> bool:
         """Whether any medium scatters ambient radiance."""
         media = [body.medium for body in self.bodies if body.medium is not None]
@@ -261,6 +265,13 @@ class Scene:
     def diagonal(self) -> float:
         """Length of the diagonal of the bounds in metres."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def object_names(items: Iterable[Object]) -> str:
+    """What messages call objects: the names of their meshes, each once, and of many the first ones."""
+    names = list(dict.fromkeys(repr(item.mesh.name) for item in items))
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES + 1 else ""
+    return ", ".join(names[:MOST_NAMES] if more else names) + more
 
 
 def _reflectance(color: ColorLike, name: str) -> Array:

@@ -120,9 +120,11 @@ def filled(scene: AnyScene, medium: Medium) -> AnyScene:
 
     Thin sheets become bodies: they had no inside that a medium could fill.
     """
-    chosen = scene.bodies or scene.objects
+    everything = not scene.bodies
     objects = [
-        dataclasses.replace(item, medium=medium, sheet_thickness=None) if item in chosen else item
+        dataclasses.replace(item, medium=medium, sheet_thickness=None)
+        if everything or item.medium is not None
+        else item
         for item in scene.objects
     ]
     return dataclasses.replace(scene, objects=objects)

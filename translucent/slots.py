@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.medium import Medium
+from translucent.overlaps import first_overlap
 from translucent.scene import Object, Scene
 
 #: Winding numbers that a ray keeps apart.
@@ -39,18 +42,15 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
     those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority
     share one.
     """
-    groups: list[list[int]] = []
+    groups: dict[Hashable, list[int]] = {}
     for i, body in enumerate(scene.objects):
         if body.medium is None or body.sheet_thickness is not None:
             continue
-        home = next((group for group in groups if _share(scene, scene.objects[group[0]], body)), None)
-        if home is None:
-            groups.append([i])
-        else:
-            home.append(i)
-    groups.sort(key=lambda group: -scene.objects[group[0]].priority)
+        own = i if not _never_negative(body) else None
+        priority = body.priority if scene.overlap == "priority" else 0
+        groups.setdefault((own, priority, _filling(scene, i)), []).append(i)
     slots = []
-    for group in groups:
+    for group in sorted(groups.values(), key=lambda group: -scene.objects[group[0]].priority):
         first = scene.objects[group[0]]
         assert first.medium is not None
         slots.append(Slot(tuple(group), first.medium, first.priority))
@@ -59,53 +59,57 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
 
 def require_clear_priorities(scene: Scene) -> None:
     """Raise where two bodies of different media and equal priority may claim the same place."""
-    bodies = [
-        (i, body) for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None
-    ]
-    for place, (j, later) in enumerate(bodies):
-        for i, earlier in bodies[:place]:
-            if later.priority != earlier.priority or _fill_alike(scene, later, earlier):
-                continue
-            if may_overlap(later, earlier):
-                raise InputError(
-                    'overlap="priority"',
-                    f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap with different "
-                    f"media, and both have priority {later.priority}",
-                    "give the one that displaces the other a higher priority",
-                )
+    bodies = [i for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None]
+    priorities = np.unique([scene.objects[i].priority for i in bodies], return_inverse=True)[1]
+    known: dict[Hashable, int] = {}
+    fillings = np.array([known.setdefault(_filling(scene, i), len(known)) for i in bodies])
+    found = overlapping_pair(
+        [scene.objects[i] for i in bodies],
+        lambda one, other: (priorities[one] == priorities[other]) & (fillings[one] != fillings[other]),
+    )
+    if found is not None:
+        i, j = (bodies[place] for place in found)
+        earlier, later = scene.objects[i], scene.objects[j]
+        raise InputError(
+            'overlap="priority"',
+            f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap with different "
+            f"media, and both have priority {later.priority}",
+            "give the one that displaces the other a higher priority",
+        )
 
 
 def same_medium(a: Object, b: Object) -> bool:
     """Whether two bodies are filled alike, as far as thickness, absorption and emission go."""
-    if a.medium is None or b.medium is None:
+    if a.medium is None or b.medium is None or a.medium is b.medium:
         return a.medium is b.medium
     return np.array_equal(a.medium.extinction, b.medium.extinction) and np.array_equal(
         a.medium.emission, b.medium.emission
     )
 
 
-def may_overlap(a: Object, b: Object) -> bool:
-    """Whether the bounds of two bodies share more than their border; bodies that touch there share no volume."""
-    return bool((a.bounds[0] < b.bounds[1]).all() and (a.bounds[1] > b.bounds[0]).all())
+def overlapping_pair(
+    bodies: Sequence[Object],
+    matters: Callable[[npt.NDArray[np.intp], npt.NDArray[np.intp]], npt.NDArray[np.bool_]] | None = None,
+) -> tuple[int, int] | None:
+    """Places of two bodies whose bounds share more than their border; bodies that touch there share no volume.
 
-
-def _share(scene: Scene, a: Object, b: Object) -> bool:
-    if not (_never_negative(a) and _never_negative(b) and _fill_alike(scene, a, b)):
-        return False
-    return scene.overlap != "priority" or a.priority == b.priority
+    `matters` gets the places of many pairs, and says which of them count; default: all.
+    """
+    if len(bodies) < 2:
+        return None
+    return first_overlap(np.stack([body.bounds for body in bodies]), matters)
 
 
 def _never_negative(body: Object) -> bool:
     return body.mesh.diagnosis.sound
 
 
-def _fill_alike(scene: Scene, a: Object, b: Object) -> bool:
-    """Whether it makes no difference which of two bodies fills a place."""
-    if a.medium is None or b.medium is None or not same_medium(a, b):
-        return False
-    if a.density is not None or b.density is not None:
-        return False
-    if not scene.lights:
-        return True
-    same = np.array_equal(a.medium.scattering, b.medium.scattering)
-    return same and a.medium.anisotropy == b.medium.anisotropy
+def _filling(scene: Scene, i: int) -> Hashable:
+    """What an object fills a place with: equal for two of them where it makes no difference which of the two does."""
+    medium, varies = scene.objects[i].medium, scene.objects[i].density is not None
+    if medium is None or varies:
+        return i
+    told = [*medium.extinction, *np.asarray(medium.emission)]
+    if scene.lights:
+        told += [*np.asarray(medium.scattering), medium.anisotropy]
+    return tuple(map(float, told))

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from translucent.color import ColorLike, parse_color
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 from translucent.lights import MAX_RADIANCE
 from translucent.medium import MAX_IOR
 from translucent.texture import Texture
@@ -30,7 +31,7 @@ _RANGES = (
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Frozen):
     """The border between a medium and the air around it; or what an opaque object shows instead of a plain grey.
 
     What does not pass the border by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.frozen import Frozen
 
 Wrap = Literal["repeat", "clamp"]
 
 
 @dataclass(frozen=True, eq=False)
-class Texture:
+class Texture(Frozen):
     """Numbers over texture coordinates 0 to 1, with bilinear interpolation.
 
     The coordinates of the mesh are multiplied by `scale`, turned by `rotation` about (0, 0), then moved by `offset`.

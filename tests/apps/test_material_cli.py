@@ -81,7 +81,7 @@ def test_show_tells_where_a_thickness_texture_is_read(run: Run, model: Path) -> 
 
 
 def test_an_infinite_distance_is_null(run: Run, model: Path) -> None:
-    run("material", "apply", model, "--color", "white", "--distance", "1m", "-o", model)
+    run("material", "apply", model, "--color", "white", "--distance", "1m", "-o", model, "--overwrite")
     (entry,) = strict_json(run("material", "show", model, "--json")[1])["materials"]
     assert entry["attenuation_distance"] is None
     assert entry["extinction"] == [0, 0, 0]
@@ -103,11 +103,11 @@ def test_apply_writes_the_color_and_leaves_the_rest(run: Run, model: Path, tmp_p
 
 
 def test_apply_without_an_object_fills_what_light_enters(run: Run, model: Path) -> None:
-    code, out, _ = run("material", "apply", model, *WINE, "-o", model, "--json")
+    code, out, _ = run("material", "apply", model, *WINE, "-o", model, "--overwrite", "--json")
     assert code == 0
     assert strict_json(out) == {"output": str(model), "materials": [0]}
     assert len(read_materials(model)) == 1
-    code, out, _ = run("material", "apply", model, *WINE, "--object", "Table", "-o", model, "--json")
+    code, out, _ = run("material", "apply", model, *WINE, "--object", "Table", "-o", model, "--overwrite", "--json")
     assert strict_json(out) == {"output": str(model), "materials": [1]}
 
 
@@ -164,7 +164,7 @@ def test_a_folder_that_refuses_is_a_failure_in_one_line(
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    monkeypatch.setattr("translucent.paths._temporary_file", refuse)
     line = one_error_line(run("material", "apply", model, *WINE, "-o", tmp_path / "out.glb"), code=1)
     assert "it cannot be written (Permission denied)" in line
     assert not (tmp_path / "out.glb").exists()

@@ -13,7 +13,7 @@ from PIL import Image
 
 import translucent as tl
 from tests.preview.waiting import wait
-from translucent.frame import write_atomically
+from translucent.paths import write_atomically
 from translucent.preview import elsewhere
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture, write_turntable

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,3 +89,60 @@ def test_refusals(tmp_path: Path) -> None:
         with pytest.raises(tl.InputError, match=message):
             write_animation(tmp_path / name, pictures, fps)
     assert not list(tmp_path.iterdir())
+
+
+def fake_ffmpeg(folder: Path, script: str) -> str:
+    program = folder / "ffmpeg"
+    program.write_text(f"#!/bin/sh\nfor output; do :; done\n{script}\n")
+    program.chmod(0o755)
+    return str(program)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the programs are shell scripts")
+@pytest.mark.parametrize(
+    ("script", "found"),
+    [
+        ('cat > /dev/null; echo half > "$output"; echo no space >&2; exit 3', "ffmpeg ended with status 3: no space"),
+        ('exec 0<&-; echo "no encoder" >&2; exit 1', "ffmpeg ended with status 1: no encoder"),
+        # As some versions do where the disk is full when they end.
+        ('cat > /dev/null; echo half > "$output"; exit 0', "the film has 0 of 5 pictures"),
+        # What is said without end must not be waited for.
+        ("cat > /dev/null; yes | head -c 300000 >&2; exit 2", "ffmpeg ended with status 2: y"),
+        ("kill -9 $$", "ffmpeg ended with status -9"),
+    ],
+)
+def test_a_film_that_ffmpeg_does_not_finish_replaces_nothing(
+    script: str, found: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="films need the imageio-ffmpeg package")
+    real = ffmpeg.get_ffmpeg_exe()
+    program = fake_ffmpeg(tmp_path, f'[ "$1" = -y ] || exec {real} "$@"\n{script}')
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", program)
+    output = tmp_path / "out" / "spin.mp4"
+    output.parent.mkdir()
+    output.write_text("the old one")
+    with pytest.raises(tl.RenderError, match=r"spin\.mp4'; it cannot be written") as caught:
+        write_animation(output, frames())
+    assert found in str(caught.value)
+    assert output.read_text() == "the old one"
+    assert os.listdir(output.parent) == ["spin.mp4"]
+
+
+def test_a_film_that_is_given_up_leaves_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason="films need the imageio-ffmpeg package")
+    started = []
+
+    class Noted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            started.append(self)
+
+    def interrupted() -> Iterator[np.ndarray]:
+        yield from frames(2)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(subprocess, "Popen", Noted)
+    with pytest.raises(KeyboardInterrupt):
+        write_animation(tmp_path / "spin.mp4", interrupted())
+    assert [process.returncode for process in started] == [-9]
+    assert os.listdir(tmp_path) == []

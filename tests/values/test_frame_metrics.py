@@ -14,8 +14,9 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.frame import ARRAYS, Frame, check_output, write_atomically
+from translucent.frame import ARRAYS, Frame, check_output
 from translucent.metrics import interior
+from translucent.paths import write_atomically
 from translucent.render_plan import PassSpec, RenderPlan
 
 PLAN = RenderPlan(tl.SignedDepth(), (PassSpec("signed_depth", "a test", (0,), 1),))

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import stat
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.paths import require_file, require_folder, require_place
+from translucent.frame import write_png
+from translucent.paths import require_file, require_folder, require_place, write_atomically, write_text_atomically
 
 
 @pytest.fixture
@@ -59,3 +66,56 @@ def test_a_name_that_cannot_be_used_is_refused(
 )
 def test_a_name_that_can_be_used_is_let_through(place: Path, check: Callable[[Path, str], None], name: str) -> None:
     check(place / name, "what was asked")
+
+
+# Writing
+
+
+def test_a_file_is_written_as_any_new_file_is_without_touching_the_umask(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = os.umask(0o027)
+    try:
+        # What other threads write meanwhile would have that umask, too.
+        monkeypatch.setattr(os, "umask", lambda _: pytest.fail("the umask belongs to all threads"))
+        write_text_atomically(tmp_path / "a.txt", "text")
+    finally:
+        monkeypatch.undo()
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == 0o640
+
+
+def partial_files(folder: Path) -> list[str]:
+    return [name for name in os.listdir(folder) if name.startswith(".partial-")]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_what_a_killed_process_left_is_removed_by_the_next_write_of_that_file(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, sys, pathlib; from translucent.paths import write_atomically\n"
+        "write_atomically(pathlib.Path(sys.argv[1]), lambda path: os.kill(os.getpid(), signal.SIGKILL))\n"
+    )
+    for name in ("a.png", "b.png"):
+        killed = subprocess.run([sys.executable, "-c", code, str(tmp_path / name)], check=False)
+        assert killed.returncode == -signal.SIGKILL
+    assert len(partial_files(tmp_path)) == 2
+    pixels = np.zeros((2, 2, 3), dtype=np.uint8)
+    write_atomically(tmp_path / "a.png", lambda path: write_png(path, pixels))
+    assert len(partial_files(tmp_path)) == 1
+    write_atomically(tmp_path / "b.png", lambda path: write_png(path, pixels))
+    assert sorted(os.listdir(tmp_path)) == ["a.png", "b.png"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks")
+def test_what_somebody_is_writing_now_is_not_removed(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+
+    def slow(temporary: Path) -> None:
+        write_text_atomically(path, "the first to finish")
+        assert path.read_text() == "the first to finish"
+        assert temporary.exists()
+        temporary.write_text("the last to finish")
+
+    write_atomically(path, slow)
+    assert path.read_text() == "the last to finish"
+    assert os.listdir(tmp_path) == ["a.txt"]

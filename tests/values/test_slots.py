@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 import translucent as tl
-from translucent.slots import MAX_SLOTS, may_overlap, medium_slots, require_clear_priorities, same_medium
+from translucent.slots import MAX_SLOTS, medium_slots, overlapping_pair, require_clear_priorities, same_medium
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")
@@ -29,6 +29,10 @@ LIKE_GLASS = [tl.Medium(absorption=1.0), tl.Medium(scattering=1.0), tl.Medium(0.
 
 def body(medium: tl.Medium | None = GLASS, mesh: tl.Mesh = BOX, at: Any = (0, 0, 0), **options: Any) -> tl.Object:
     return tl.Object(mesh, medium, trimesh.transformations.translation_matrix(at), **options)
+
+
+def may_overlap(*bodies: tl.Object) -> bool:
+    return overlapping_pair(bodies) is not None
 
 
 def slots(*objects: tl.Object, **options: Any) -> list[tuple[int, ...]]:

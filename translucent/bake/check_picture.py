@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.color import linear_to_srgb
-from translucent.frame import write_atomically
+from translucent.paths import write_atomically
 
 if TYPE_CHECKING:
     from PIL import Image

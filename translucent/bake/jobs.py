@@ -29,11 +29,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from translucent.bake.record import Record, file_hash, read_record, sidecar_of
+from translucent.bake.record import Record, file_hash, read_record
 from translucent.bake.thickness_map import ThicknessMap, VertexThickness
 from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output, save_map, save_vertices
 from translucent.errors import InputError
-from translucent.frame import remove_partial
 from translucent.gltf.load import SUFFIXES
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
@@ -186,8 +185,6 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     """
     check_job(job)
     output = Path(job["output"])
-    for path in (output, sidecar_of(output)):
-        remove_partial(path)
     about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
     if stays_gltf(job):
         from translucent.bake.gltf_bake import bake_gltf

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import sys
+import threading
+import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -26,7 +29,7 @@ def in_processes(
 
     Processes are spawned, not forked: OpenGL and threads do not survive a fork. When one dies (out of memory, or a
     crash in a library), what was running is done again, one item at a time; `lost` makes the result of an item whose
-    process dies even then. Where the iteration is ended early, the processes end, too.
+    process dies even then. Where the iteration is ended early, or its process is killed, the processes end, too.
 
     Parameters
     ----------
@@ -51,7 +54,7 @@ def in_processes(
                 while source and len(running) < workers and not broken:
                     item = source.popleft()
                     try:
-                        running[pool.submit(task, item)] = item
+                        running[pool.submit(_do, task, item)] = item
                     except BrokenProcessPool:  # a process died of something else while it waited
                         broken += [item, *running.values()]
                         running.clear()
@@ -85,14 +88,34 @@ class _Pool(ProcessPoolExecutor):
             for process in processes:
                 process.join(PATIENCE)
                 process.kill()  # one that was asked while it started may not have heard
+                process.join()
         self.shutdown(wait=True, cancel_futures=True)
+
+
+def _do(task: Callable[[Item], Result], item: Item) -> Result:
+    """In each process: a task. Where it has tidied up since the process is to end, that ends; a pool would go on."""
+    try:
+        return task(item)
+    except SystemExit:
+        os._exit(143)
 
 
 def _begin() -> None:
     """In each process: the parent answers Ctrl-C, and ends this process so that its temporary files go."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
+    threading.Thread(target=_follow_parent, daemon=True).start()
     warnings.simplefilter("ignore")  # results tell their warnings
+
+
+def _follow_parent() -> None:
+    """End this process when its parent is gone: it waits at a pipe whose other end it holds, too, and hears nothing."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(PATIENCE)
+    os._exit(143)  # what was running did not hear
 
 
 def _end(*_: Any) -> None:

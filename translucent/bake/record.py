@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from translucent.frame import write_text_atomically
+from translucent.paths import write_text_atomically
 from translucent.version import VERSION
 
 if TYPE_CHECKING:

@@ -30,8 +30,7 @@ import numpy as np
 from translucent.bake.encoding import Encoding
 from translucent.bake.record import DEFINITIONS, Record, describe, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
-from translucent.frame import write_atomically
-from translucent.paths import require_place
+from translucent.paths import require_place, write_atomically
 
 if TYPE_CHECKING:
     from translucent.bake.thickness_map import ThicknessMap, VertexThickness

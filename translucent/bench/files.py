@@ -11,7 +11,7 @@ from typing import Any, get_args, get_type_hints
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
 from translucent.errors import InputError
-from translucent.frame import write_text_atomically
+from translucent.paths import write_text_atomically
 
 #: Fields of a row that are dataclasses, one column for each of their fields.
 _GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmittance", "radiance")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.bake_options import FORMATS, bake_options, read_job
-from translucent.commands.common import common_options
+from translucent.commands.common import common_options, overwrite_option
 from translucent.errors import InputError, RenderError, TranslucentError
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ STEPS = 1000
 )
 @click.option("--jobs", type=int, metavar="N", help="Of --out-dir: processes. Default: one per processor.")
 @click.option("--dask", metavar="ADDRESS", help="Of --out-dir: a Dask scheduler, such as tcp://farm:8786.")
+@overwrite_option
 @common_options
 def bake(
     models: tuple[str, ...],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import F, medium_options, read_medium, unit_option
+from translucent.commands.common import F, medium_options, read_medium, refuse_overwriting, unit_option
 from translucent.commands.model import mesh_file
 from translucent.errors import InputError
 
@@ -109,6 +109,7 @@ def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
         "medium": None if medium is None else medium.extinction.tolist(),
     }
     job |= {name: mesh_file(given[name], unit) for name in ("high", "cage") if given[name] is not None}
+    refuse_overwriting(output, job["model"], job.get("high"), job.get("cage"))
     return job | {name: True for name in _FLAGS if given[name]}
 
 

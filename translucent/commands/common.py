@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+from urllib.parse import unquote
 
 import click
 
@@ -23,6 +25,9 @@ TONE_NAMES = ("none", "neutral", "agx")
 NEARLY_BLACK = 0.02
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+#: Under which a verb finds whether it may replace what it reads.
+_OVERWRITE = "translucent.overwrite"
 
 
 def common_options(command: F) -> F:
@@ -47,6 +52,63 @@ def unit_option(command: F) -> F:
     return click.option(
         "--unit", default="m", show_default=True, metavar="U", help="Unit of the file's coordinates: mm, cm, in, ..."
     )(command)
+
+
+def overwrite_option(command: F) -> F:
+    """Option of verbs that read files and write one, which `refuse_overwriting` looks at."""
+
+    def note(context: click.Context, _: click.Parameter, given: bool) -> None:
+        context.meta[_OVERWRITE] = given
+
+    return click.option(
+        "--overwrite",
+        is_flag=True,
+        expose_value=False,
+        callback=note,
+        help="Write the output even where that replaces a file that is read.",
+    )(command)
+
+
+def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
+    """Raise where a verb would replace a file that it reads, under whatever name, unless it is told to.
+
+    Parameters
+    ----------
+    output : Path
+    *inputs : str or Path, optional
+        What the verb was given to read: files, also with what an option adds, as in ``sky.hdr,90``, or other names. The
+        files that a glTF file links to are read, too.
+    """
+    from translucent.paths import same_file
+
+    # What is not there yet can be none of them.
+    if click.get_current_context().meta.get(_OVERWRITE) or not os.path.exists(output):
+        return
+    for name in [str(given) for given in inputs if given is not None]:
+        for file in (Path(name), Path(name.rpartition(",")[0]), *_linked_files(name)):
+            if same_file(file, output):
+                raise InputError(
+                    f"output {str(output)!r}",
+                    f"it is read, as {str(file)!r}",
+                    "choose another name, or add --overwrite to replace it",
+                )
+
+
+def _linked_files(name: str) -> list[Path]:
+    """The files that a glTF file links to."""
+    from translucent.gltf.load import SUFFIXES
+    from translucent.materials.gltf_file import read_gltf
+
+    if Path(name).suffix.lower() not in SUFFIXES or not os.path.isfile(name):
+        return []
+    try:
+        file = read_gltf(name)
+        links = [holder.get("uri") for holder in (*file.items("buffers"), *file.items("images"))]
+    except InputError:
+        return []  # whoever reads it says what is wrong with it
+    return [
+        file.path.parent / unquote(link) for link in links if isinstance(link, str) and not link.startswith("data:")
+    ]
 
 
 def borders_option(command: F) -> F:

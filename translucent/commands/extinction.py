@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, read_medium, triple_text
+from translucent.commands.common import (
+    common_options,
+    overwrite_option,
+    read_medium,
+    refuse_overwriting,
+    triple_text,
+)
 from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
 
@@ -38,6 +44,7 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx, .usda or .json material instead.")
 @click.option("--on", "model", metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above.")
 @click.option("--eye", metavar="X,Y,Z", help="Of --on: where it is seen from, in metres. Default: as render shows it.")
+@overwrite_option
 @common_options
 @click.pass_context
 def extinction(
@@ -205,6 +212,7 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
 
     if output is not None:
         check_batch_output(output)
+        refuse_overwriting(output, table)
     done = convert_table(table, unit, unit_out, clamp)
     if output is None:
         click.echo(done.to_json(), nl=False)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from translucent.commands.common import common_options, medium_options, read_medium, triple_text
+from translucent.commands.common import (
+    common_options,
+    medium_options,
+    overwrite_option,
+    read_medium,
+    refuse_overwriting,
+    triple_text,
+)
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,6 +79,7 @@ def _texture_text(entry: GltfMaterial) -> str:
     help="Only the objects of this name. Default: all that light enters, or all.",
 )
 @click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
+@overwrite_option
 @common_options
 def apply(
     model: str,
@@ -90,6 +98,7 @@ def apply(
     medium = read_medium(color, distance, preset_name)
     if medium is None:
         raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
+    refuse_overwriting(output, model)
     changed = write_medium(
         model,
         output,

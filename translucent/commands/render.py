@@ -14,10 +14,12 @@ from translucent.commands.common import (
     common_options,
     look_options,
     medium_options,
+    overwrite_option,
     read_environment,
     read_medium,
     read_method,
     read_size,
+    refuse_overwriting,
     unit_option,
     warn_if_black,
 )
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
 )
 @click.option("--transparent", is_flag=True, help="Leave out the environment behind: a picture with alpha.")
 @picture_options
+@overwrite_option
 @click.option("--backend", metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
 @common_options
 def render(
@@ -108,6 +111,7 @@ def render(
         raise InputError("--borders front", "--opaque-with, where rays bend at both", "leave out one of the two")
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
+    refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
     medium = read_medium(color, distance, preset_name)
     method = read_method(method_name, thickness)

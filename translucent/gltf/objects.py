@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -103,6 +104,7 @@ def _placed_meshes(
     nodes = file.items("nodes")
     accessors = Accessors(file)
     placed = {node: nodes[node]["mesh"] for node in transforms if "mesh" in nodes[node]}
+    users = Counter(index for index in placed.values() if isinstance(index, int))
     known: dict[tuple[int, int], Mesh | None] = {}
     for node, index in placed.items():
         entry = file.item("meshes", index)
@@ -112,18 +114,19 @@ def _placed_meshes(
             continue
         for i, primitive in enumerate(listed := primitives(file, entry)):
             if (index, i) not in known:
-                users = [user for user, used in placed.items() if used == index]
-                name = _mesh_name(file, entry, index, users) + (f"[{i}]" if len(listed) > 1 else "")
+                name = _mesh_name(nodes[node], entry, index, shared=users[index] > 1) + (
+                    f"[{i}]" if len(listed) > 1 else ""
+                )
                 known[index, i] = primitive_mesh(accessors, primitive, name)
                 _note_losses(primitive, name, known[index, i], left_out)
             if (mesh := known[index, i]) is not None:
                 yield mesh, primitive.get("material"), node
 
 
-def _mesh_name(file: GltfFile, entry: Json, index: int, users: list[int]) -> str:
-    """The name of the only node that uses a mesh, or of the mesh."""
-    names = [file.items("nodes")[users[0]].get("name"), entry.get("name")]
-    for name in names if len(users) == 1 else names[::-1]:
+def _mesh_name(node: Json, entry: Json, index: int, *, shared: bool) -> str:
+    """The name of the only node that uses a mesh, or of the mesh; without one, of its first node."""
+    names = [node.get("name"), entry.get("name")]
+    for name in names[::-1] if shared else names:
         if isinstance(name, str) and name:
             return name
     return f"mesh {index}"

@@ -9,8 +9,8 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Literal, get_args
@@ -37,6 +37,9 @@ class _Entered(threading.local):
 
 
 _entered = _Entered()
+
+#: The process that has opened OpenGL: none that is forked from it can use or open any.
+_opened_in: int | None = None
 
 
 @dataclass(frozen=True)
@@ -106,25 +109,18 @@ class GpuContext:
             "moderngl": MODERNGL,
         }
 
-    @contextmanager
-    def current(self) -> Iterator[moderngl.Context]:
+    def current(self) -> AbstractContextManager[moderngl.Context]:
         """Make the context current, and afterwards what was current before; may be nested.
 
         An adopted context is current already, by contract.
         """
         if not self.owned or _entered.stack[-1:] == [self]:
-            yield self.gl
-            return
-        # glcontext remembers one predecessor per context, which nesting would overwrite, so we keep the stack.
-        _entered.stack.append(self)
-        self.gl.__enter__()
-        try:
-            yield self.gl
-        finally:
-            _entered.stack.pop()
-            self.gl.__exit__(None, None, None)
-            if _entered.stack:
-                _entered.stack[-1].gl.__enter__()
+            return nullcontext(self.gl)
+        return _Current(self)
+
+    def forget(self) -> None:
+        """Have this thread make the context current again when it is asked to, whatever was interrupted."""
+        _entered.stack[:] = [context for context in _entered.stack if context is not self]
 
     def drain(self) -> None:
         """Free what has been dropped since the last call; at a safe moment, with the context current."""
@@ -133,6 +129,49 @@ class GpuContext:
             # moderngl's own gc() trips over objects that were released before they were dropped.
             if (release := getattr(queue.popleft(), "release", None)) is not None:
                 release()
+
+
+class _Current:
+    """A context that is current within.
+
+    Ctrl-C may end any of this between two lines: a context may stay current, which harms nothing, or listed, until
+    `GpuContext.forget`. A generator would be resumed when it is collected, and leave what is current then.
+    """
+
+    def __init__(self, context: GpuContext) -> None:
+        self._context = context
+        self._depth = len(_entered.stack)
+
+    def __enter__(self) -> moderngl.Context:
+        self._context.gl.__enter__()
+        # glcontext remembers one predecessor per context, which nesting would overwrite, so we keep the stack.
+        _entered.stack.append(self._context)
+        return self._context.gl
+
+    def __exit__(self, *error: object) -> None:
+        del _entered.stack[self._depth :]
+        self._context.gl.__exit__(None, None, None)
+        if _entered.stack:
+            _entered.stack[-1].gl.__enter__()
+
+
+def require_own_process() -> None:
+    """Raise `RenderError` in a process that is forked from one that has opened OpenGL: it would wait forever.
+
+    The driver's threads are not forked along.
+    """
+    if _opened_in not in (None, os.getpid()):
+        raise RenderError(
+            "OpenGL in a forked process",
+            f"process {_opened_in} has opened it before the fork, which its driver does not survive",
+            'start processes with multiprocessing.get_context("spawn")',
+        )
+
+
+def _note_process() -> None:
+    global _opened_in
+    require_own_process()
+    _opened_in = os.getpid()
 
 
 def open_context(backend: str | None = None) -> GpuContext:
@@ -149,9 +188,12 @@ def open_context(backend: str | None = None) -> GpuContext:
         If the backend is not known.
     NoContextError
         If none of the backends works.
+    RenderError
+        In a process that is forked from one that has opened OpenGL.
     """
     if backend is not None and backend not in get_args(Backend):
         raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(get_args(Backend))}")
+    _note_process()
     attempts: list[Attempt] = []
     for name in (backend,) if backend else ("egl", "osmesa"):
         try:
@@ -170,6 +212,7 @@ def adopt_context(gl: moderngl.Context) -> GpuContext:
 
     Where it has no ``gc_mode`` it gets ``"context_gc"``, or what we drop would stay in its memory.
     """
+    _note_process()
     if gl.gc_mode is None:
         gl.gc_mode = "context_gc"
     return GpuContext(gl, "adopted", gl.info)

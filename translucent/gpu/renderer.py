@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import threading
 import time
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import moderngl
 import numpy as np
@@ -13,7 +17,7 @@ from translucent.backdrop import Backdrop
 from translucent.errors import RenderError
 from translucent.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.context import GpuContext, adopt_context, open_context
+from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
@@ -61,9 +65,12 @@ class GpuRenderer:
         self._targets: Targets | None = None
         self._passes: dict[type[Pass], Pass] = {}
         self._present: PresentPass | None = None
+        self._pid = os.getpid()
         self._closed = False
+        self._interrupted = False
+        self._turn = threading.RLock()
         # A renderer that nobody closed must not keep its memory; the context takes all its objects along.
-        self._abandoned = weakref.finalize(self, self.context.gl.release) if self.context.owned else None
+        self._abandoned = weakref.finalize(self, _release, self.context.gl, os.getpid()) if self.context.owned else None
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -87,7 +94,7 @@ class GpuRenderer:
 
         A plan over a backdrop needs it, in the size of the frame.
         """
-        with self.context.current():
+        with self._alone(), self.context.current():
             job = self.prepare(scene, size, plan, backdrop)
             try:
                 self._timer.begin_frame()
@@ -103,7 +110,7 @@ class GpuRenderer:
         self, scene: Scene, framebuffer: moderngl.Framebuffer, plan: RenderPlan, exposure: float, tone: str
     ) -> None:
         """Run a plan of the scene and show its radiance, `exposure` stops brighter, in a framebuffer of the context."""
-        with self.context.current():
+        with self._alone(), self.context.current():
             job = self.prepare(scene, framebuffer.size, plan)
             try:
                 self.run(job)
@@ -122,8 +129,7 @@ class GpuRenderer:
         backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> FrameJob:
         """Everything that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
-        if self._closed:
-            raise RenderError("rendering", "the renderer is closed", "make a new one")
+        self._require_open()
         if self._targets is None or self._targets.size != size:
             old, self._targets = self._targets, None
             targets = Targets(self.context.gl, size)
@@ -191,15 +197,46 @@ class GpuRenderer:
         if self._closed:
             return
         self._closed = True
-        with self.context.current():
-            self._resources.release()
-            if self._targets is not None:
-                self._targets.release()
-            self._passes.clear()
-            self._present = None
-            self.context.drain()
+        if self._pid != os.getpid():
+            return  # they are those of another process
+        if not self._interrupted:
+            with self.context.current():
+                self._resources.release()
+                if self._targets is not None:
+                    self._targets.release()
+                self._passes.clear()
+                self._present = None
+                self.context.drain()
         if self._abandoned is not None:
             self._abandoned()
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether a frame was ended at a place where nobody knows what is half done, as by Ctrl-C."""
+        return self._interrupted
+
+    def interrupt(self) -> None:
+        """Draw nothing any more: what is half done may be anywhere, and would be in the next frames, too."""
+        self._interrupted = True
+        self.context.forget()
+        if not self.context.owned and self._pid == os.getpid():
+            self._timer.stop()
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Within, no other thread uses this renderer, whose context can be current in one thread only."""
+        require_own_process()
+        if not self._turn.acquire(blocking=False):
+            raise RenderError("rendering", "another thread uses this renderer", "give each thread one of its own")
+        try:
+            yield
+        finally:
+            self._turn.release()
+
+    def _require_open(self) -> None:
+        if self._closed or self._interrupted:
+            how = "it was interrupted" if self._interrupted and not self._closed else "the renderer is closed"
+            raise RenderError("rendering", how, "make a new one")
 
     def _pass(self, kind: type[Pass]) -> Pass:
         if kind not in self._passes:
@@ -215,6 +252,12 @@ class GpuRenderer:
             self._run_passes(job)
         job.averaging = False
         job.place((0.0, 0.0))
+
+
+def _release(gl: moderngl.Context, pid: int) -> None:
+    """Release a context, but not in a process that is forked from the one that it belongs to."""
+    if pid == os.getpid():
+        gl.release()
 
 
 def _read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components: int) -> npt.NDArray[np.float32]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
 
 import moderngl
 
@@ -29,16 +28,19 @@ class PassTimer:
         """Forget the previous frame's times."""
         self._seconds.clear()
 
-    @contextmanager
-    def measure(self, name: str) -> Iterator[None]:
-        """Time what is drawn inside; what a name is given to more than once in a frame adds up."""
+    def measure(self, name: str) -> moderngl.Query:
+        """A query that times what is drawn within; what a name is given to more than once in a frame adds up."""
         if name not in self._queries:
             self._queries[name] = self._gl.query(time=True)
         query = self._queries[name]
-        before = self._seconds[name] + query.elapsed * 1e-9 if name in self._seconds else 0.0
-        with query:
-            yield
-        self._seconds[name] = before
+        self._seconds[name] = self._seconds[name] + query.elapsed * 1e-9 if name in self._seconds else 0.0
+        return query
+
+    def stop(self) -> None:
+        """End what is being measured, where it is not known whether anything is."""
+        for query in self._queries.values():
+            with suppress(moderngl.Error):  # it was not begun
+                query.mglo.end()
 
     def seconds(self) -> dict[str, float]:
         """Seconds per name, in the order of the frame; waits for the GPU."""

@@ -12,15 +12,14 @@ import json
 import math
 import os
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
 from translucent.errors import InputError
-from translucent.frame import write_atomically
 from translucent.materials.gltf_pack import gather
-from translucent.paths import require_file, require_place
+from translucent.paths import require_file, require_place, write_atomically
 
 Json = dict[str, Any]
 
@@ -39,12 +38,17 @@ class GltfFile:
     path: Path
     tree: Json
     chunks: bytes = b""
+    #: The lists that have been looked through, with their lengths: once is enough, and there are many look-ups.
+    _checked: dict[str, tuple[list[Json], int]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def items(self, key: str) -> list[Json]:
         """The objects of a top-level list such as ``"materials"``; raises `InputError` if it is none."""
-        found = self.tree.get(key, [])
+        found: list[Json] = self.tree.get(key, [])
+        if (known := self._checked.get(key)) is not None and known[0] is found and known[1] == len(found):
+            return known[0]
         if not (isinstance(found, list) and all(isinstance(item, dict) for item in found)):
             raise InputError(f"glTF {str(self.path)!r}", f"{key} is not a list of objects", "export the file again")
+        self._checked[key] = found, len(found)
         return found
 
     def item(self, key: str, index: object) -> Json:

@@ -93,7 +93,8 @@ def run(
     if window.failure is not None:
         raise window.failure
     if screenshot is not None:
-        from translucent.frame import write_atomically, write_png
+        from translucent.frame import write_png
+        from translucent.paths import write_atomically
 
         pixels = hello_imgui.final_app_window_screenshot()
         write_atomically(Path(screenshot), partial(write_png, pixels=pixels))

@@ -127,8 +127,10 @@ def _objects(material: Material, scene: Scene) -> tuple[Object, ...]:
     """The scene's objects with the material in its bodies; kept, so that turning the camera makes none anew."""
     if material.source == "file" and scene.bodies:
         return tuple(scene.objects)
-    medium, chosen = medium_of(material), scene.bodies or tuple(scene.objects)
-    return tuple(_filled(item, material, medium) if item in chosen else item for item in scene.objects)
+    medium, everything = medium_of(material), not scene.bodies
+    return tuple(
+        _filled(item, material, medium) if everything or item.medium is not None else item for item in scene.objects
+    )
 
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError, RenderError
-from translucent.frame import write_atomically
+from translucent.paths import write_atomically
 from translucent.preview.document import Document, Orbit, checked
 
 #: Of the format; a later one that this cannot read would raise it.

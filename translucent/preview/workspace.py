@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from translucent.errors import InputError, TranslucentError
-from translucent.frame import remove_partial
+from translucent.paths import remove_partial
 from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map

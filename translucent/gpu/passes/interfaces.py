@@ -27,8 +27,9 @@ class InterfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies for each border, with the depth test on; sheets have one, seen from either side."""
         nothing = float(CONSTANTS["NOTHING"])
-        sheets = tuple(i for i in spec.objects if i in job.sheets)
-        solids = tuple(i for i in spec.objects if i not in sheets)
+        thin = job.sheets
+        sheets = tuple(i for i in spec.objects if i in thin)
+        solids = tuple(i for i in spec.objects if i not in thin)
         starts_inside = job.starts_inside or any(picture_cuts(job.scene, job.scene.objects[i]) for i in solids)
         for back in (False,) if job.one_border else (False, True):
             framebuffer = job.targets.left() if back else job.targets.entered()
