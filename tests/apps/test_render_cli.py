@@ -13,8 +13,14 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.thickness import METHODS
 
 GREEN = "linear(0.18,0.62,0.35)"
+
+
+def test_help_names_every_method(run: Run) -> None:
+    told = " ".join(run("render", "--help").out.split())
+    assert [name for name in METHODS if f" {name}" not in told.partition("--method NAME")[2]] == []
 
 
 @pytest.fixture

@@ -49,7 +49,8 @@ if TYPE_CHECKING:
     "--method",
     "method_name",
     metavar="NAME",
-    help="signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists or k-buffer. Default: by plan.",
+    help="signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists, k-buffer or ray-marched. "
+    "Default: by plan. Without OpenGL all but thin-layer give way to all surfaces on each ray.",
 )
 @borders_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
