@@ -77,9 +77,14 @@ def test_changes_are_told(run: Run, new: Path, tmp_path: Path) -> None:
     old = tmp_path / "old.json"
     old.write_text(record(ratio=0.6, rms=1e-9).to_json())
     result = run("--from", new, "--compare", old)
-    assert result.code == 0
+    assert result.code == 1, "what calls it wants to know without reading"
     assert "slower: knot / SignedDepth: 0.60 -> 1.10" in result.out
-    assert "nothing got slower" in run("--from", new, "--compare", new).out
+    assert "1 thing got worse; slower: knot / SignedDepth" in result.err
+    assert result.err.count("\n") == 1
+    assert run("--from", old, "--compare", new)[0] == 0, "faster is no failure"
+    same = run("--from", new, "--compare", new)
+    assert same.code == 0
+    assert "nothing got slower" in same.out
     changes = json.loads(run("--from", new, "--compare", old, "--json").out)["changes"]
     assert [change["kind"] for change in changes] == ["slower"]
 

@@ -29,7 +29,7 @@ PATH = click.Path(path_type=Path)
 @click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
 @click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
 @click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
-@click.option("--compare", "old", type=PATH, metavar="JSON", help="Tell what got slower or less accurate since this.")
+@click.option("--compare", "old", type=PATH, metavar="JSON", help="Tell what got slower or less accurate since this: exit code 1 if anything did.")
 @unit_option
 @click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
 @common_options
@@ -77,9 +77,14 @@ def report(
         click.echo(table(made))
     if not made.complete and source is None:
         raise click.exceptions.Abort
+    worse = [change for change in changes or () if change.worse]
     if made.failures:
         raise RenderError(
             f"report: {len(made.failures)} of its measurements", f"they failed: {'; '.join(made.failures)}", "see above"
+        )
+    if worse:
+        raise RenderError(
+            f"report --compare {old}", f"{len(worse)} {'thing' if len(worse) == 1 else 'things'} got worse", str(worse[0])
         )
 
 
@@ -180,8 +185,9 @@ def _tell(made: Report, files: list[Path], changes: Any) -> None:
             f"{answer['case']:<20} {answer['method']:<30} {ratio:>8.2f} {error:>10.1e} {answer['quantity']}{mark}"
         )
     for claim in made.claims:
-        if claim.held is False:
-            click.echo(f"does not hold: {claim.text}; {claim.measured}")
+        if claim.held is False or claim.undecided:
+            verdict = "undecided" if claim.undecided else "does not hold"
+            click.echo(f"{verdict}: {claim.text}; {claim.measured}")
     if changes is not None:
         for change in changes:
             click.echo(str(change))
