@@ -20,6 +20,9 @@ from translucent.commands.render import render
 from translucent.commands.report import report
 from translucent.errors import InputError, TranslucentError
 
+#: Options after which a shell drops a color that is not quoted.
+TAKE_COLORS = ("--color", "--background", "--environment")
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed at run time, 2 bad usage or input."""
@@ -35,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "translucent"
-        return _failed(f"{error.format_message().rstrip('.')}; see '{command} --help'", 2)
+        return _failed(f"{error.format_message().rstrip('.')}{_quoting(error)}; see '{command} --help'", 2)
     except TranslucentError as error:
         if "--debug" in given:
             raise
@@ -47,6 +50,15 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows where", 1)
     return 0
+
+
+def _quoting(error: click.ClickException) -> str:
+    """What may have become of the color after an option at the end of the line."""
+    if not (isinstance(error, click.BadOptionUsage) and error.option_name in TAKE_COLORS):
+        return ""
+    from translucent.color import QUOTE_HINT
+
+    return f"; {QUOTE_HINT}"
 
 
 def _failed(message: str, code: int) -> int:

@@ -28,6 +28,15 @@ def glass_box(tmp_path: Path) -> Path:
     return write_scene(tmp_path / "scene.glb", {"extensions": GLASS})
 
 
+@pytest.mark.parametrize("color", ["teal", "ff0000", "#000"])
+def test_a_channel_of_0_is_clamped_and_told(run: Run, cube: Path, tmp_path: Path, color: str) -> None:
+    options = ["-o", tmp_path / "a.png", "--color", color, "--distance", "10m", "--size", "8x6", "--samples", "1"]
+    result = run("render", cube, *options)
+    assert result.code == 0
+    assert result.err == "warning: color clamped to 0.0001 where it was below\n"
+    assert "0 is not in 0 < t <= 1" in one_error_line(run("render", cube, *options, "--no-clamp"))
+
+
 # Bad input
 
 
@@ -38,7 +47,7 @@ BAD_RENDER_OPTIONS = [
     (["--size", "64"], "--size '64'; not WxH"),
     (["--size", "1.5x2"], "--size '1.5x2'; not WxH"),
     (["--size", "1x2x3"], "--size '1x2x3'; not WxH"),
-    (["--color", "linear(0,0.5,0.5)", "--distance", "1cm"], "red = 0 is not in 0 < t <= 1"),
+    (["--color", "linear(0,0.5,0.5)", "--distance", "1cm", "--no-clamp"], "red = 0 is not in 0 < t <= 1"),
     (["--color", "linear(1.1,0.5,0.5)", "--distance", "1cm"], "red = 1.1 is not in 0 < t <= 1"),
     (["--color", "linear(nan,0.5,0.5)", "--distance", "1cm"], "a channel is not finite"),
     (["--color", "reddish", "--distance", "1cm"], "color 'reddish'; neither a hex color"),

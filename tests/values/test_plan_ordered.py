@@ -220,7 +220,11 @@ def test_without_opengl_rays_find_all_intervals_whatever_the_method(method: Any)
     ("method", "runs", "reason"),
     [
         (None, "all surfaces on each ray, in float64", "no OpenGL: all surfaces on each ray, in float64"),
-        (tl.KBuffer(k=2), "all surfaces on each ray, in float64", "in place of KBuffer(k=2, light_points=8), which was"),
+        (
+            tl.KBuffer(k=2),
+            "all surfaces on each ray, in float64",
+            "in place of KBuffer(k=2, light_points=8), ",
+        ),
         (tl.ThinLayer(0.01), "all surfaces on each ray, in float64, as sheets of 0.01 m", "no OpenGL"),
     ],
     ids=str,

@@ -11,6 +11,8 @@ import click
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from translucent.environment import Environment
     from translucent.frame import Frame
     from translucent.medium import Medium
@@ -33,6 +35,7 @@ def common_options(command: F) -> F:
 
 def medium_options(command: F) -> F:
     """Options that choose a medium."""
+    command = clamp_option(command)
     command = click.option("--preset", "preset_name", metavar="NAME", help="A named medium, such as merlot.")(command)
     command = click.option("--distance", metavar="D", help="Distance at which light has the color: 2cm, 0.8in.")(
         command
@@ -40,6 +43,15 @@ def medium_options(command: F) -> F:
     return click.option("--color", metavar="C", help="Transmitted color: '#7b1e3a', salmon, 'linear(.18,.62,.35)'.")(
         command
     )
+
+
+def clamp_option(command: F) -> F:
+    """Option for colors with a channel of 0, which no finite extinction makes."""
+    return click.option(
+        "--clamp/--no-clamp",
+        default=None,
+        help="Take channels below 1e-4 for 1e-4 and say so, or refuse those of 0. Default: --clamp.",
+    )(command)
 
 
 def unit_option(command: F) -> F:
@@ -60,7 +72,9 @@ def borders_option(command: F) -> F:
     )(command)
 
 
-def read_medium(color: str | None, distance: str | None, preset_name: str | None) -> Medium | None:
+def read_medium(
+    color: str | None, distance: str | None, preset_name: str | None, clamp: bool | None = None
+) -> Medium | None:
     """The medium that the options choose, if they do."""
     from translucent.medium import Medium
     from translucent.presets import preset
@@ -76,7 +90,23 @@ def read_medium(color: str | None, distance: str | None, preset_name: str | None
     if (color is None) != (distance is None):
         given, missing = ("--color", "--distance") if distance is None else ("--distance", "--color")
         raise InputError(given, f"{missing} is missing", "give both: a color has a meaning only at a distance")
-    return None if color is None or distance is None else Medium.from_color(color, parse_length(distance))
+    if color is None or distance is None:
+        return None
+    wanted, told = clamped(color) if clamp is not False else (color, [])
+    medium = Medium.from_color(wanted, parse_length(distance))
+    for line in told:
+        click.echo(f"warning: {line}", err=True)
+    return medium
+
+
+def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
+    """The color without channels that are too dark, and a line for the user where there were any."""
+    from translucent.color import parse_color
+    from translucent.conversion import CLAMP, clamp_colors
+
+    triple, changed = clamp_colors(parse_color(color))
+    # As it was written, if nothing is to be done: errors tell it so.
+    return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
 
 
 def read_method(name: str | None, thickness: str | None) -> Method | None:

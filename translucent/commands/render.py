@@ -70,6 +70,7 @@ def render(
     color: str | None,
     distance: str | None,
     preset_name: str | None,
+    clamp: bool | None,
     unit: str,
     size: str,
     camera: int | None,
@@ -110,7 +111,7 @@ def render(
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     pixels = read_size(size)
-    medium = read_medium(color, distance, preset_name)
+    medium = read_medium(color, distance, preset_name, clamp)
     method = read_method(method_name, thickness)
     view = View(camera, eye, target, up, fov)
     scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background), roughness)

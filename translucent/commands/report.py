@@ -29,7 +29,13 @@ PATH = click.Path(path_type=Path)
 @click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
 @click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
 @click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
-@click.option("--compare", "old", type=PATH, metavar="JSON", help="Tell what got slower or less accurate since this: exit code 1 if anything did.")
+@click.option(
+    "--compare",
+    "old",
+    type=PATH,
+    metavar="JSON",
+    help="Tell what got worse since this; exit code 1 if so.",
+)
 @unit_option
 @click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
 @common_options
@@ -83,9 +89,8 @@ def report(
             f"report: {len(made.failures)} of its measurements", f"they failed: {'; '.join(made.failures)}", "see above"
         )
     if worse:
-        raise RenderError(
-            f"report --compare {old}", f"{len(worse)} {'thing' if len(worse) == 1 else 'things'} got worse", str(worse[0])
-        )
+        count = f"{len(worse)} {'thing' if len(worse) == 1 else 'things'} got worse"
+        raise RenderError(f"report --compare {old}", count, str(worse[0]))
 
 
 def _measured(
