@@ -14,15 +14,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from translucent.environment import Environment
-    from translucent.frame import Frame
     from translucent.medium import Medium
     from translucent.thickness import Method
 
 #: Of tone curves, as in `translucent.tone.TONES`, which only rendering imports.
 TONE_NAMES = ("none", "neutral", "agx")
-
-#: Below this mean share of light a picture shows little but black.
-NEARLY_BLACK = 0.02
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -188,15 +184,3 @@ def read_size(text: str) -> tuple[int, int]:
 def triple_text(values: Any) -> str:
     """Three numbers, aligned."""
     return " ".join(f"{value:10.5g}" for value in values)
-
-
-def warn_if_black(frame: Frame) -> None:
-    """Say so where hardly any light passes: most often the file's unit is not what it was taken for."""
-    seen = frame.coverage & frame.valid
-    if seen.any() and (passed := float(frame.transmittance[seen].mean())) < NEARLY_BLACK:
-        metres = float(frame.summary()["thickness"]["median"])
-        click.echo(
-            f"warning: only {passed:.2%} of the light passes, at a median thickness of {metres:.3g} m; "
-            "check --unit, or take a longer --distance",
-            err=True,
-        )

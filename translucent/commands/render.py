@@ -19,9 +19,17 @@ from translucent.commands.common import (
     read_method,
     read_size,
     unit_option,
-    warn_if_black,
 )
-from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lines, read_scene, require_translucent
+from translucent.commands.darkness import warn_if_black
+from translucent.commands.model import (
+    DEFAULT_FOV,
+    DEFAULT_UP,
+    View,
+    is_own,
+    medium_lines,
+    read_scene,
+    require_translucent,
+)
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
 
@@ -127,9 +135,7 @@ def render(
 
             draw = partial(render_scene, size=pixels, method=method, samples=samples, renderer=renderer)
         frame = pictures.write(scene, draw)
-    # What scatters many times is bright though no light passes straight.
-    if not any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
-        warn_if_black(frame)
+    warn_if_black(scene, frame, unit, own=is_own(model))
     media = medium_lines(scene)
     if as_json:
         click.echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))
