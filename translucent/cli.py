@@ -18,6 +18,7 @@ from translucent.commands.presets import presets
 from translucent.commands.preview import preview
 from translucent.commands.render import render
 from translucent.commands.report import report
+from translucent.commands.shader import shader
 from translucent.errors import InputError, TranslucentError
 
 #: Options after which a shell drops a color that is not quoted.
@@ -72,7 +73,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, preview, bake, explain, extinction, presets, material, report, doctor):
+for command in (render, preview, bake, explain, extinction, presets, material, report, shader, doctor):
     cli.add_command(command)
 
 
