@@ -33,6 +33,7 @@ def srgb_to_linear(encoded: npt.ArrayLike) -> Array:
     return np.copysign(np.where(a <= 0.04045, a / 12.92, ((a + 0.055) / 1.055) ** 2.4), v)
 
 
+@np.errstate(under="ignore")  # of what is all but black
 def linear_to_srgb(linear: npt.ArrayLike) -> Array:
     """sRGB-encoded value of a linear one; the exact piecewise curve, mirrored below 0."""
     v = np.asarray(linear, dtype=np.float64)

@@ -33,6 +33,11 @@ def test_what_a_screen_cannot_show_is_no_difference() -> None:
     assert color_difference(np.full((4, 3), 3.0), np.ones((4, 3))) == ColorDifference(0.0, 0.0, 0.0)
 
 
+def test_what_is_left_behind_ink_underflows_to_black() -> None:
+    assert color_difference(np.full((4, 3), 1e-300), np.zeros((4, 3))).max < 1e-30
+    assert color_difference(np.full((4, 3), 5e-324), np.full((4, 3), 1e-320)).max < 1e-30
+
+
 def test_a_step_of_8_bits_is_not_seen_and_eight_are() -> None:
     """Of the gray of 18 %, which is about half of the way in lightness."""
     near, far = (parse_color(f"srgb({v},{v},{v})") for v in ((119 + 1) / 255, (119 + 8) / 255))

@@ -46,6 +46,11 @@ def test_srgb_curve_rises_across_its_border() -> None:
         assert values[-1] > values[0]
 
 
+def test_what_is_all_but_black_is_encoded() -> None:
+    """The float64 reference leaves such numbers behind a dense medium."""
+    assert color.linear_to_srgb([5e-324, 1e-310, 0.0]).max() < 1e-300
+
+
 def test_every_byte_survives_the_way_to_linear_and_back() -> None:
     bytes_ = np.arange(256)
     assert np.rint(color.linear_to_srgb(color.srgb_to_linear(bytes_ / 255)) * 255).astype(int).tolist() == [*bytes_]

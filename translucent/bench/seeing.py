@@ -20,6 +20,7 @@ _XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.
 _KNEE = 6.0 / 29.0
 
 
+@np.errstate(under="ignore")  # what is left behind a dense medium
 def lab(linear: npt.ArrayLike) -> Array:
     """(..., 3): CIELAB 1976 of linear Rec.709 colors (..., 3) in 0..1, with white as L* = 100."""
     share = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0) @ (_XYZ / _XYZ.sum(axis=1, keepdims=True)).T
@@ -28,6 +29,7 @@ def lab(linear: npt.ArrayLike) -> Array:
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
 
 
+@np.errstate(under="ignore")
 def color_difference(shown: npt.ArrayLike, right: npt.ArrayLike) -> ColorDifference:
     """Of linear colors (n, 3), one or more: Euclidean distances in CIELAB, as the CIE had them in 1976."""
     distance = np.linalg.norm(lab(shown) - lab(right), axis=-1)

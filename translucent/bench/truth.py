@@ -30,6 +30,10 @@ BOUNCES = 12
 INVISIBLE = 5e-8
 
 
+#: Radiance below which a picture is black, and errors are no shares of it.
+DARK = 1e-6
+
+
 @dataclass(frozen=True)
 class Truth:
     """What all are held against.
@@ -76,7 +80,9 @@ class Truth:
     def scale(self, quantity: Quantity) -> float:
         """What errors in that quantity are shares of."""
         if quantity == "radiance":
-            return float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2))) or 1.0
+            with np.errstate(under="ignore"):
+                rms = float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2)))
+            return rms if rms > DARK else 1.0
         return self.diagonal if quantity == "thickness" else 1.0
 
     def errors(self, frame: Frame, quantity: Quantity) -> tuple[Errors, float, float] | None:
