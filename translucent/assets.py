@@ -22,6 +22,13 @@ def shader_library() -> list[Path]:
     return sorted((_folder("shaders") / "lib").glob("*.glsl"))
 
 
+def shader_names() -> list[str]:
+    """All shader files, as `shader_path` takes them: stages, and what they include."""
+    folder = _folder("shaders")
+    files = (path for path in folder.rglob("*.*") if path.suffix in (".vert", ".frag", ".glsl"))
+    return sorted(path.relative_to(folder).as_posix() for path in files)
+
+
 def newest_shader() -> float:
     """When a shader file was written last, in seconds since 1970."""
     newest = 0.0

@@ -34,10 +34,13 @@ class Batch:
         Per good row its name, and what `conversion.summary` says.
     errors : list of str
         Per bad row its place and what is wrong.
+    clamped : int
+        Records whose color was clamped.
     """
 
     records: list[dict[str, Any]]
     errors: list[str]
+    clamped: int = 0
 
     def write(self, path: Path) -> None:
         """Write the records to a ``.json`` or ``.csv`` file, which appears complete or not at all."""
@@ -102,12 +105,16 @@ def convert_table(path: str | Path, unit: str = "m", unit_out: str = "m", clamp:
     metres_per_unit(unit), metres_per_unit(unit_out)
     records: list[dict[str, Any]] = []
     errors: list[str] = []
+    clamped = 0
     for row in read_table(path, needs=[("name",), ("color",), ("distance",)]):
         try:
-            records.append(_record(row, unit, unit_out, clamp))
+            record, changed = _record(row, unit, unit_out, clamp)
         except InputError as error:
             errors.append(f"{row.place}: {error}")
-    return Batch(records, errors)
+        else:
+            records.append(record)
+            clamped += changed
+    return Batch(records, errors, clamped)
 
 
 def check_batch_output(path: Path) -> None:
@@ -117,13 +124,16 @@ def check_batch_output(path: Path) -> None:
     require_place(path, f"output {str(path)!r}")
 
 
-def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> dict[str, Any]:
+def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> tuple[dict[str, Any], bool]:
+    """The record of a row, and whether its color was clamped."""
     check_cells(row)
     name, color = str(row.need("name")), row.color()
     distance = row.length("distance", str(row.cells.get("unit", unit)))
-    clamped, changed = clamp_colors(color) if clamp else (color, None)
-    medium = Medium.from_color(clamped, distance)
-    told = summary(clamped, distance, medium.extinction, unit_out)
-    if changed is not None and changed.any():
+    lighter, channels = clamp_colors(color)
+    changed = clamp and bool(channels.any())
+    wanted = lighter if changed else color
+    medium = Medium.from_color(wanted, distance)
+    told = summary(wanted, distance, medium.extinction, unit_out)
+    if changed:
         told["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
-    return {"name": name, **told}
+    return {"name": name, **told}, changed

@@ -18,7 +18,11 @@ from translucent.commands.presets import presets
 from translucent.commands.preview import preview
 from translucent.commands.render import render
 from translucent.commands.report import report
+from translucent.commands.shader import shader
 from translucent.errors import InputError, TranslucentError
+
+#: Options after which a shell drops a color that is not quoted.
+TAKE_COLORS = ("--color", "--background", "--environment")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -35,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "translucent"
-        return _failed(f"{error.format_message().rstrip('.')}; see '{command} --help'", 2)
+        return _failed(f"{error.format_message().rstrip('.')}{_quoting(error)}; see '{command} --help'", 2)
     except TranslucentError as error:
         if "--debug" in given:
             raise
@@ -49,6 +53,15 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
+def _quoting(error: click.ClickException) -> str:
+    """What may have become of the color after an option at the end of the line."""
+    if not (isinstance(error, click.BadOptionUsage) and error.option_name in TAKE_COLORS):
+        return ""
+    from translucent.color import QUOTE_HINT
+
+    return f"; {QUOTE_HINT}"
+
+
 def _failed(message: str, code: int) -> int:
     click.echo(f"error: {message}", err=True)
     return code
@@ -60,7 +73,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, preview, bake, explain, extinction, presets, material, report, doctor):
+for command in (render, preview, bake, explain, extinction, presets, material, report, shader, doctor):
     cli.add_command(command)
 
 

@@ -18,6 +18,10 @@ ColorLike = str | npt.ArrayLike
 
 LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
 
+#: What to do about a color that a shell has dropped.
+QUOTE_HINT = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"
+
+_BARE_HEX = re.compile(r"\s*[0-9a-fA-F]{6}\s*")
 _FUNCTION = re.compile(r"\s*(srgb|linear)\s*\(([^()]*)\)\s*", re.IGNORECASE)
 _PIXEL = re.compile(r"(.+)@\s*(\d+)\s*,\s*(\d+)\s*")
 
@@ -29,6 +33,7 @@ def srgb_to_linear(encoded: npt.ArrayLike) -> Array:
     return np.copysign(np.where(a <= 0.04045, a / 12.92, ((a + 0.055) / 1.055) ** 2.4), v)
 
 
+@np.errstate(under="ignore")  # of what is all but black
 def linear_to_srgb(linear: npt.ArrayLike) -> Array:
     """sRGB-encoded value of a linear one; the exact piecewise curve, mirrored below 0."""
     v = np.asarray(linear, dtype=np.float64)
@@ -52,9 +57,9 @@ def parse_color(color: str | npt.ArrayLike) -> Array:
     Parameters
     ----------
     color : str or array_like (3,)
-        ``"#7b1e3a"`` and CSS names are sRGB-encoded; ``"srgb(r, g, b)"`` and ``"linear(r, g, b)"`` take numbers
-        0..1; ``"photo.png@120,45"`` is a pixel of an image (column, row, from the top left; sRGB-encoded); a bare
-        triple is linear. Nothing is guessed.
+        ``"#7b1e3a"``, ``"7b1e3a"`` and CSS names are sRGB-encoded; ``"srgb(r, g, b)"`` and ``"linear(r, g, b)"`` take
+        numbers 0..1; ``"photo.png@120,45"`` is a pixel of an image (column, row, from the top left; sRGB-encoded); a
+        bare triple is linear. Nothing is guessed.
 
     Returns
     -------
@@ -94,8 +99,10 @@ def _parse_text(text: str) -> Array:
         from translucent.pixel import pixel_color
 
         return pixel_color(match[1], int(match[2]), int(match[3]))
+    if not text.strip():
+        raise InputError(f"color {text!r}", "empty", QUOTE_HINT)
     try:
-        rgb = ImageColor.getrgb(text.strip())
+        rgb = ImageColor.getrgb(f"#{text.strip()}" if _BARE_HEX.fullmatch(text) else text.strip())
     except ValueError:
         raise InputError(
             f"color {text!r}",

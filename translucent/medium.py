@@ -78,7 +78,8 @@ class Medium(Frozen):
         Raises
         ------
         InputError
-            If a channel is 0 (no finite extinction makes it), above 1 or not finite, or the distance is not positive.
+            If a channel is 0 (no finite extinction makes it: see `clamp_colors`), above 1 or not finite, or the
+            distance is not positive.
         """
         triple = parse_color(color)
         for channel, value in zip(("red", "green", "blue"), triple, strict=True):

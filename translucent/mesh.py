@@ -233,15 +233,33 @@ def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
     return mended(raw)
 
 
+#: Files of programs that can all write a .glb.
+_SCENES_OF_PROGRAMS = (
+    ".blend",
+    ".fbx",
+    ".max",
+    ".ma",
+    ".mb",
+    ".c4d",
+    ".skp",
+    ".usd",
+    ".usda",
+    ".usdc",
+    ".usdz",
+    ".abc",
+)
+
+
 def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
     import trimesh
 
     asked = f"mesh {str(path)!r}"
     require_file(path, asked)
     if path.suffix[1:].lower() not in trimesh.available_formats():
-        raise InputError(
-            asked, f"format {path.suffix or 'without suffix'!r} is not known", "use obj, stl, ply, off or glb"
+        do = (
+            "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
+        raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", do)
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")

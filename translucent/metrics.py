@@ -56,6 +56,7 @@ class Errors:
         )
 
 
+@np.errstate(under="ignore")  # of squares of what a dense medium leaves
 def compare(
     frame: Frame, truth: Frame, quantity: Quantity = "thickness", mask: npt.NDArray[np.bool_] | None = None
 ) -> Errors:

@@ -184,13 +184,17 @@ def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities
     chosen = method or FragmentLists()
     sheets = isinstance(method, ThinLayer)
     limits = [*(closed_sheet_limits(scene, method) if isinstance(method, ThinLayer) else open_limits(scene))]
+    reason = "no OpenGL: all surfaces on each ray, in float64"
+    if method is not None and not sheets:
+        reason += f", in place of {method}, which was asked for"
     passes = (
-        PassSpec("intersect", "no OpenGL: all surfaces on each ray, in float64", tuple(range(len(scene.objects))), 1),
+        PassSpec("intersect", reason, tuple(range(len(scene.objects))), 1),
         PassSpec("shade", "sheets in order" if sheets else "the intervals between them in order, exactly"),
     )
     limits += mesh_limits(scene, chosen)
     scatters = capabilities.scattering and _scatters(scene)
-    return RenderPlan(chosen, passes, True, tuple(limits), unmodelled_effects(scene, scatters=scatters))
+    unmodelled = unmodelled_effects(scene, scatters=scatters)
+    return RenderPlan(chosen, passes, True, tuple(limits), unmodelled, traced=True)
 
 
 def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilities, why: str) -> RenderPlan:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from translucent.color import to_hex
 from translucent.errors import InputError
 from translucent.medium import Medium
+from translucent.suggestions import LEAST_PART, close_names, did_you_mean
 from translucent.units import metres_per_unit, parse_length
 
 Array = npt.NDArray[np.float64]
@@ -206,10 +207,11 @@ def preset(name: str) -> Preset:
     key = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     if key in known:
         return known[key]
-    close = get_close_matches(key, known, n=3, cutoff=0.7)
+    speaking = [one.name for one in _all().values() if _speaks_of(one, key)]
+    close = close_names(key, _all()) or close_names(key, known) or speaking
     number = len(_all())
     do = (
-        f"did you mean {' or '.join(close)}? 'translucent presets' lists all {number}"
+        f"{did_you_mean(close)} 'translucent presets' lists all {number}"
         if close
         else f"use one of {', '.join(_WELL_KNOWN)} and {number - len(_WELL_KNOWN)} more, see 'translucent presets'"
     )
@@ -344,6 +346,11 @@ def _all() -> dict[str, Preset]:
 @cache
 def _names() -> dict[str, Preset]:
     return {name: one for one in _all().values() for name in (one.name, *one.aliases)}
+
+
+def _speaks_of(one: Preset, word: str) -> bool:
+    """Whether the note has the word, as that of merlot speaks of wine."""
+    return len(word) >= LEAST_PART and word in re.findall(r"[a-z]+", one.note.lower())
 
 
 def _reciprocal(values: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from translucent.thickness import Method, OrderedMethod
+from translucent.thickness import Method, OrderedMethod, ThinLayer
 
 #: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
 Borders: TypeAlias = Literal["both", "front"]
@@ -77,6 +77,9 @@ class RenderPlan:
         What the scene asks for and no pass renders.
     borders : {"both", "front"}
         Where rays bend, if anything in the scene bends them.
+    traced : bool
+        Rays are traced on the processors, which finds all surfaces on each. Of the `method` only one thing counts
+        then: whether bodies are sheets.
     """
 
     method: Method
@@ -85,6 +88,15 @@ class RenderPlan:
     limits: tuple[str, ...] = ()
     unmodelled: tuple[str, ...] = ()
     borders: Borders = "both"
+    traced: bool = False
+
+    @property
+    def runs(self) -> str:
+        """What finds the thickness, in words: the method, or what is traced in place of it."""
+        if not self.traced:
+            return str(self.method)
+        what = "all surfaces on each ray, in float64"
+        return f"{what}, as sheets of {self.method.thickness:g} m" if isinstance(self.method, ThinLayer) else what
 
     @property
     def exact(self) -> bool:
@@ -109,7 +121,7 @@ class RenderPlan:
     def summary(self) -> dict[str, object]:
         """The plan in values that JSON can hold."""
         return {
-            "method": str(self.method),
+            "method": self.runs,
             "exact": self.exact,
             "borders": self.borders,
             "cost": round(self.cost, 2),
@@ -128,7 +140,7 @@ class RenderPlan:
 
     def __str__(self) -> str:
         cost = f", at about the cost of {self.cost:.1f} depth-only draws" if self.cost else ""
-        lines = [f"{self.method}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
+        lines = [f"{self.runs}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
         lines += [f"  limit: {limit}" for limit in self.limits]
         lines += [f"  not modelled: {effect}" for effect in self.unmodelled]

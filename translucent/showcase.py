@@ -12,10 +12,12 @@ import numpy.typing as npt
 
 from translucent.camera import Camera
 from translucent.environment import Environment
+from translucent.errors import InputError
 from translucent.grouping import used_vertices
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 from translucent.scene import Light, Object, Scene
+from translucent.suggestions import close_names, did_you_mean
 from translucent.surface import Surface
 
 #: Linear color that the default medium keeps of white light after `DEFAULT_REACH` of the mesh's diagonal.
@@ -24,6 +26,9 @@ DEFAULT_REACH = 0.15
 
 #: The default environment: white above and light grey below.
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
+
+#: What `named_environment` calls environments that are neither a color nor a picture.
+ENVIRONMENT_NAMES = ("light-table", "studio", "checkerboard")
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
@@ -80,7 +85,13 @@ def named_environment(name: str, rotation: float = 0.0) -> Environment:
         return LIGHT_TABLE
     if name in ("checkerboard", "checker"):
         return Environment.checkerboard(tiles=12)
-    return Environment.constant(name)
+    try:
+        return Environment.constant(name)
+    except InputError:
+        if not (close := close_names(name.partition(",")[0].strip().lower(), ENVIRONMENT_NAMES)):
+            raise
+        found = f"neither one of {', '.join(ENVIRONMENT_NAMES)} nor a color or a picture"
+        raise InputError(f"environment {name!r}", found, did_you_mean(close)) from None
 
 
 def framing(

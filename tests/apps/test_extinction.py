@@ -56,13 +56,32 @@ def test_swatches_are_for_terminals_that_want_them(run: Run, monkeypatch: pytest
 
 
 def test_json_has_all_numbers(run: Run) -> None:
-    code, out, err = run("#800000", "1cm", "--clamp", "--unit-out", "cm", "--json")
+    code, out, err = run("#800000", "1cm", "--unit-out", "cm", "--json")
     told = json.loads(out)
     assert (code, err) == (0, "")
     assert told["color"][1:] == [1e-4, 1e-4]
     assert told["extinction_per_unit"][1] == pytest.approx(-math.log(1e-4), rel=1e-14)
     assert told["half_value_thickness"][1] == pytest.approx(told["mean_free_path"][1] * math.log(2), rel=1e-14)
     assert told["warnings"][0] == "color clamped to 0.0001 where it was below"
+
+
+@pytest.mark.parametrize("color", ["teal", "#ff0000", "#000", "000000", "linear(0,.5,1)"])
+def test_a_channel_of_0_is_clamped_and_told_unless_that_is_refused(run: Run, color: str) -> None:
+    code, out, err = run(color, "2cm")
+    assert (code, err) == (0, "")
+    assert "warning         color clamped to 0.0001 where it was below" in out.splitlines()
+    assert "is not in 0 < t <= 1; no finite extinction gives 0" in one_error_line(run(color, "2cm", "--no-clamp"))
+
+
+def test_a_bright_color_is_not_touched_by_clamping(run: Run) -> None:
+    assert run("7b1e3a", "1cm") == run("#7b1e3a", "1cm", "--no-clamp")
+    assert "clamped" not in run("#7b1e3a", "1cm").out
+
+
+def test_a_color_that_the_shell_took_for_a_comment_is_told(run: Run) -> None:
+    hint = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"
+    assert f"Missing argument 'COLOR'. {hint[:1].upper()}{hint[1:]}" in one_error_line(run())
+    assert f"color ''; empty; {hint}" in one_error_line(run("", "1cm"))
 
 
 def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +145,7 @@ mist,gray,far,m
 
 def test_a_bad_row_does_not_stop_the_others(run: Run, here: Path) -> None:
     (here / "in.csv").write_text(TABLE)
-    code, out, err = run("--batch", "in.csv", "-o", "out.json")
+    code, out, err = run("--batch", "in.csv", "-o", "out.json", "--no-clamp")
     assert (code, out) == (1, "")
     lines = err.splitlines()
     assert lines[0].startswith("error: in.csv line 3: color (1.0, 0.0, 0.0); green = 0 is not in 0 < t <= 1")
@@ -140,7 +159,8 @@ def test_a_bad_row_does_not_stop_the_others(run: Run, here: Path) -> None:
 
 def test_a_table_to_csv_with_clamping(run: Run, here: Path) -> None:
     (here / "in.json").write_text('[{"name": "red", "color": [1, 0, 0], "distance": 1}]')
-    assert run("--batch", "in.json", "-o", "out.csv", "--clamp", "--unit", "cm")[0] == 0
+    told = run("--batch", "in.json", "-o", "out.csv", "--unit", "cm")
+    assert told == (0, "", "warning: 1 of 1 colors clamped to 0.0001 where they were below; their warnings say so\n")
     with (here / "out.csv").open(newline="") as stream:
         (row,) = csv.DictReader(stream)
     assert (row["mean_free_path_r"], row["extinction_r"]) == ("inf", "0.0")
@@ -255,8 +275,8 @@ def test_for_an_engine_a_dark_color_is_stated_nearer_and_the_thickness_stays(run
     assert extinction == pytest.approx(told["extinction"], rel=1e-12)
 
 
-def test_a_black_channel_is_clamped_on_request(run: Run, plate: Path) -> None:
-    told = json.loads(run("#ff0000", "--clamp", *PLATE, "--json")[1])
+def test_a_black_channel_is_clamped_on_a_model_too(run: Run, plate: Path) -> None:
+    told = json.loads(run("#ff0000", *PLATE, "--json")[1])
     assert told["on"]["average_color"] == pytest.approx([1.0, 1e-4, 1e-4], rel=1e-9)
     assert told["warnings"][0] == "color clamped to 0.0001 where it was below"
 
@@ -264,7 +284,7 @@ def test_a_black_channel_is_clamped_on_request(run: Run, plate: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["black", *PLATE], "average color with red = 0; not in 0.0001 <= t <= 1; give 0.0001 or more"),
+        (["black", "--no-clamp", *PLATE], "average color with red = 0; not in 0.0001 <= t <= 1; give 0.0001 or more"),
         (["linear(1.5,1,1)", *PLATE], "red = 1.5; not in 0.0001 <= t <= 1; a medium cannot add light"),
         (["gray", "--on", "none.obj"], "none.obj"),
         (["gray", "--on", "bear", "--unit", "cm"], "--unit cm; bear comes with the toolkit, in metres"),

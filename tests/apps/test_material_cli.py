@@ -132,7 +132,7 @@ def test_a_preset_brings_its_index_of_refraction_and_tells_what_is_lost(run: Run
         ([*WINE, "--object", "Beer"], "object 'Beer'; "),
         ([*WINE, "--thickness", "0"], "length '0'; not positive"),
         ([*WINE, "--thickness", "thick"], "length 'thick'; not a number"),
-        (["--color", "linear(0,1,1)", "--distance", "1cm"], "red = 0 is not in 0 < t <= 1"),
+        (["--color", "linear(0,1,1)", "--distance", "1cm", "--no-clamp"], "red = 0 is not in 0 < t <= 1"),
     ],
 )
 def test_a_bad_option_writes_nothing(run: Run, model: Path, tmp_path: Path, options: list[str], message: str) -> None:

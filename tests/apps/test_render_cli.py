@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,28 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.thickness import METHODS
 
 GREEN = "linear(0.18,0.62,0.35)"
+
+
+def test_help_names_every_method(run: Run) -> None:
+    told = "".join(run("render", "--help").out.split())  # lines are broken at hyphens, too
+    assert [name for name in METHODS if name not in told] == []
 
 
 @pytest.fixture
 def glass_box(tmp_path: Path) -> Path:
     return write_scene(tmp_path / "scene.glb", {"extensions": GLASS})
+
+
+@pytest.mark.parametrize("color", ["teal", "ff0000", "#000"])
+def test_a_channel_of_0_is_clamped_and_told(run: Run, cube: Path, tmp_path: Path, color: str) -> None:
+    options = ["-o", tmp_path / "a.png", "--color", color, "--distance", "10m", "--size", "8x6", "--samples", "1"]
+    result = run("render", cube, *options)
+    assert result.code == 0
+    assert result.err == "warning: color clamped to 0.0001 where it was below\n"
+    assert "0 is not in 0 < t <= 1" in one_error_line(run("render", cube, *options, "--no-clamp"))
 
 
 # Bad input
@@ -32,7 +48,7 @@ BAD_RENDER_OPTIONS = [
     (["--size", "64"], "--size '64'; not WxH"),
     (["--size", "1.5x2"], "--size '1.5x2'; not WxH"),
     (["--size", "1x2x3"], "--size '1x2x3'; not WxH"),
-    (["--color", "linear(0,0.5,0.5)", "--distance", "1cm"], "red = 0 is not in 0 < t <= 1"),
+    (["--color", "linear(0,0.5,0.5)", "--distance", "1cm", "--no-clamp"], "red = 0 is not in 0 < t <= 1"),
     (["--color", "linear(1.1,0.5,0.5)", "--distance", "1cm"], "red = 1.1 is not in 0 < t <= 1"),
     (["--color", "linear(nan,0.5,0.5)", "--distance", "1cm"], "a channel is not finite"),
     (["--color", "reddish", "--distance", "1cm"], "color 'reddish'; neither a hex color"),
@@ -48,6 +64,9 @@ BAD_RENDER_OPTIONS = [
     (["--backend", "vulkan"], "backend 'vulkan'; not a known backend; use one of egl, window, osmesa"),
     (["--unit", "furlong"], "unit 'furlong'; not a known unit"),
     (["--background", "reddish"], "color 'reddish'; neither a hex color"),
+    (["--environment", "studoi"], "environment 'studoi'; neither one of light-table, studio, checkerboard nor a color"),
+    (["--environment", "studoi,90"], "nor a color or a picture; did you mean studio?"),
+    (["--background", "Light"], "did you mean light-table?"),
     (["--eye", "1,2"], "--eye '1,2'; not three numbers"),
     (["--eye", "a,b,c"], "--eye 'a,b,c'; not three numbers"),
     (["--eye", "nan,0,0"], "camera eye, target or up; not three finite numbers"),
@@ -314,5 +333,41 @@ def test_a_body_too_large_for_its_medium_is_said_to_be_black(run: Run, tmp_path:
     result = run(*command)
     assert result.code == 0
     assert result.err.startswith("warning: only 0.")
-    assert "check --unit, or take a longer --distance" in result.err
+    assert "the model is 2 x 2 x 2 m" in result.err
+    assert "is the file in centimetres? With --unit cm it is 2 x 2 x 2 cm, and " in result.err
+    assert result.err.count("\n") == 1
     assert run(*command, "--unit", "cm").err == ""
+
+
+@pytest.fixture
+def tower(tmp_path: Path) -> Path:
+    """A figure of 44 x 170 x 15 mm, whose file does not say so."""
+    trimesh.creation.box((44, 170, 15)).export(tmp_path / "tower.stl")
+    return tmp_path / "tower.stl"
+
+
+SMALL = ("--size", "64x48", "--samples", "1")
+
+
+@pytest.mark.parametrize("medium", ["jade", "merlot", "grape_juice"])  # juice and wine scatter a little, too
+def test_what_is_black_hears_what_size_would_suit_the_medium(
+    run: Run, tower: Path, tmp_path: Path, medium: str
+) -> None:
+    command = ["render", tower, "-o", tmp_path / "a.png", "--preset", medium, *SMALL]
+    told = run(*command).err
+    assert "the model is 44 x 170 x 15 m and " in told
+    assert "is the file in millimetres? With --unit mm it is 4.4 x 17 x 1.5 cm, and" in told
+    assert run(*command, "--unit", "mm").err == ""
+
+
+def test_no_unit_is_guessed_where_none_would_help(run: Run, tower: Path, tmp_path: Path) -> None:
+    dense = ["--color", "#7b1e3a", "--distance", "0.1mm", *SMALL]
+    for model in (["knot"], [tower, "--unit", "mm"]):
+        told = run("render", *model, "-o", tmp_path / "a.png", *dense).err
+        assert "is the file in" not in told
+        assert re.search(r"in a medium \d+ times as clear \(a color at a --distance so much longer\)", told)
+
+
+def test_milk_gives_light_back_and_is_not_black(run: Run, tower: Path, tmp_path: Path) -> None:
+    told = run("render", tower, "-o", tmp_path / "a.png", "--preset", "whole_milk", *SMALL).err
+    assert "of the light passes" not in told

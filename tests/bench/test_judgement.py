@@ -53,6 +53,14 @@ def test_what_noise_explains_beats_nothing() -> None:
     assert not beats(row("a", 1.0, 1e-8), row("b", 1.0, 9e-7), "thickness"), "both are rounding"
 
 
+def test_errors_that_are_both_rounding_are_a_tie() -> None:
+    # A hundred roundings, 6e-6, is what hard cases call exact; 1e-7 and 5e-6 are so far apart that digits would decide.
+    exact, more = row("exact", 1.0, 1e-7), row("more layers", 1.0, 5e-6)
+    assert [one.pareto for one in mark_frontier([exact, more], "thickness")] == [True, True]
+    assert beats(more, row("slow", 1.2, 1e-7), "thickness"), "time decides"
+    assert beats(exact, row("no rounding", 1.0, 1.2e-5), "thickness")
+
+
 def test_a_method_that_marks_pixels_beats_none_that_does_not() -> None:
     assert not beats(row("a", 1.0, 1e-5, invalid=0.2), row("b", 2.0, 1e-4), "thickness")
     assert beats(row("b", 1.0, 1e-5), row("a", 2.0, 1e-4, invalid=0.2), "thickness")
@@ -159,6 +167,18 @@ def test_a_claim_within_the_noise_is_undecided() -> None:
     found = check_claims([case(row("SignedDepth", 1.3, 1e-7, noise=0.05))], ())[1]
     assert found.held is None
     assert "undecided on 'knot': 1.30 ± 0.05" in found.measured
+
+
+@pytest.mark.parametrize("time", [1.15, 1.31])
+def test_a_figure_that_noise_leaves_open_does_not_hold_on_either_side_of_the_bar(time: float) -> None:
+    vague, clear = case(row("SignedDepth", time, 1e-7, noise=0.16)), case(row("SignedDepth", 1.1, 1e-7), name="torus")
+    frontier, floor = check_claims([clear, vague], ())[:2]
+    assert (frontier.held, floor.held) == (None, None), "that it holds on the other case does not decide it here"
+    assert floor.undecided
+    assert floor.measured.startswith(f"undecided on 'knot': {time:.2f} ± 0.16")
+    assert frontier.measured.startswith(f"undecided on 'knot': {time:.2f} ± 0.16 times the floor")
+    slow = case(row("SignedDepth", 1.9, 1e-7, noise=0.01), name="slow")
+    assert check_claims([vague, slow], ())[1].held is False, "it fails elsewhere"
 
 
 def test_the_median_of_quotients_ignores_a_slow_spell() -> None:

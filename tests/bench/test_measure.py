@@ -16,7 +16,7 @@ from translucent.bench import run as running
 from translucent.bench import scaling
 from translucent.bench.cases import CASES, Case
 from translucent.bench.contenders import CONTENDERS, Effect, check_names, contenders
-from translucent.bench.drawing import Studio
+from translucent.bench.drawing import Floor, Studio
 from translucent.bench.files import read_report, write_report
 from translucent.bench.measure import CaseRun
 from translucent.bench.record import CaseRecord, Report
@@ -24,8 +24,12 @@ from translucent.bench.run import Effort, measure_all
 from translucent.bench.scaling import ScalingRun
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.table import table
+from translucent.bench.truth import Truth
+from translucent.gpu.passes.depth_only import DepthOnlyPass
+from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.storage import Storage
-from translucent.solids import Sphere
+from translucent.gpu.targets import Targets
+from translucent.solids import Box, Sphere
 
 #: Rounds are few and frames small: what is tested is that there are numbers.
 HASTE = Effort(0.0, 0.0, 0.4)
@@ -78,6 +82,55 @@ def test_rows_have_times_errors_and_pictures(studio: Studio) -> None:
     assert error is not None
     # The picture's error is that of the row, silhouettes aside.
     assert np.nanstd(error.array()) == pytest.approx(constant.thickness.rms, rel=0.2)
+
+
+@pytest.fixture
+def staged() -> tl.Scene:
+    """A ball behind a bar, on a stand that is much larger."""
+    ball = tl.Object(Sphere().tessellate(32), tl.Medium(absorption=(1.0, 2.0, 3.0)))
+    bar = tl.Object(Box((-0.1, -3.0, 2.0), (0.1, 3.0, 2.2)).tessellate())
+    stand = tl.Object(Box((-9.0, -3.0, -9.0), (9.0, -2.0, 9.0)).tessellate())
+    return tl.Scene([bar, ball, stand], tl.Camera.look_at((0.0, 0.0, 8.0), (0.0, 0.0, 0.0), fov_y=30.0))
+
+
+def test_staging_is_in_the_floor_as_in_every_cost(
+    studio: Studio, staged: tl.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[str, tuple[int, ...]]] = []
+    run = OpaquePass.run
+    monkeypatch.setattr(DepthOnlyPass, "run", lambda _, __, objects: drawn.append(("depth", objects)))
+    monkeypatch.setattr(
+        OpaquePass, "run", lambda self, job, spec: (drawn.append(("opaque", spec.objects)), run(self, job, spec))
+    )
+    targets = Targets(studio.gl, (16, 16))
+    floor = Floor(studio, staged, targets)
+    floor.draw()
+    floor.release()
+    assert drawn == [("opaque", (0, 2)), ("depth", (1,))]
+    drawn.clear()
+    bare = Floor(studio, dataclasses.replace(staged, objects=staged.bodies), targets)
+    bare.draw()
+    bare.release()
+    targets.release()
+    assert drawn == [("depth", (0,))]
+
+
+def test_edges_of_opaque_objects_are_no_errors_of_a_method(studio: Studio, staged: tl.Scene) -> None:
+    """A rasterizer decides there which of two opaque objects ends a ray, which is not about thickness."""
+    inside = [Box((-0.2, -3.0, 0.2), (0.2, 3.0, 0.3)), Box((-3.0, -3.0, -0.4), (3.0, 3.0, -0.3))]
+    ends = [tl.Object(box.tessellate(), color=(0.9, 0.1, 0.1)) for box in inside]
+    scene = dataclasses.replace(staged, objects=[*staged.bodies, *ends])
+    truth = Truth.of(scene, (64, 64), 1e-3)
+    assert truth.diagonal == pytest.approx(np.linalg.norm([2.0, 2.0, 2.0]), rel=1e-2), "of the ball alone"
+    depth, kept = truth.frame.thickness[32], truth.inside[32]
+    (edges,) = np.nonzero((np.abs(np.diff(depth)) > 0.4) & truth.frame.coverage[32, 1:] & truth.frame.coverage[32, :-1])
+    assert len(edges) == 2, "left and right of the bar, where rays end half a radius earlier"
+    assert not kept[[edges, edges + 1]].any()
+    assert truth.compared.sum() > 300
+    made = measured(studio, Case("mine", "Mine", "mine", lambda _: scene), "signed-depth")
+    signed = next(row for row in made.rows if row.method == "SignedDepth")
+    assert signed.thickness is not None
+    assert signed.thickness.p999 < 1e-5
 
 
 def test_shortcuts_get_the_best_thickness_that_there_is(studio: Studio) -> None:

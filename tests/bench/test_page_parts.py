@@ -47,6 +47,19 @@ def test_the_cheapest_that_is_good_enough_is_advised() -> None:
     assert advice.times_better == pytest.approx(0.2 / 1e-6)
 
 
+def test_few_pixels_that_are_plainly_wrong_are_not_good_enough() -> None:
+    """Of thickness: an RMS of 1e-4 of the diagonal, and ten times that in all but one pixel of a thousand."""
+    errors = Errors(2e-5, 1e-8, 1e-7, 2e-3, 0.1, 0.0)
+    flawed = dataclasses.replace(row("flawed", 1.0, 0.0), thickness=errors)
+    advice = advise(scene(flawed, SIGNED))
+    assert advice is not None
+    assert advice.row == SIGNED
+    almost = dataclasses.replace(flawed, thickness=dataclasses.replace(errors, p999=9e-4))
+    advice = advise(scene(almost, SIGNED))
+    assert advice is not None
+    assert advice.row == almost
+
+
 def test_among_equals_the_exact_one_is_advised() -> None:
     limited = dataclasses.replace(row("KBuffer", 4.9, 2e-8), exact=False)
     exact = dataclasses.replace(LISTS, exact=True)

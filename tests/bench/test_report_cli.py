@@ -16,6 +16,7 @@ from translucent.assets import mesh_path
 from translucent.bench.models import effect_of, model_cases
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
+from translucent.lights import DirectionalLight
 from translucent.medium import Medium
 from translucent.mesh import load_mesh
 from translucent.showcase import showcase
@@ -67,7 +68,7 @@ def test_json_is_one_object(run: Run, new: Path, tmp_path: Path) -> None:
     found = json.loads(result.out)
     assert found["answers"] == [
         {"case": "knot", "method": "SignedDepth", "ratio": 1.1, "quantity": "thickness", "rms_error": 3e-8}
-        | {"good_enough": True}
+        | {"p999_error": 3e-8, "good_enough": True, "seen": None, "cheaper": None, "cheaper_seen": None}
     ]
     assert sorted(Path(path).name for path in found["files"]) == FILES
     assert found["changes"] is None
@@ -77,9 +78,14 @@ def test_changes_are_told(run: Run, new: Path, tmp_path: Path) -> None:
     old = tmp_path / "old.json"
     old.write_text(record(ratio=0.6, rms=1e-9).to_json())
     result = run("--from", new, "--compare", old)
-    assert result.code == 0
+    assert result.code == 1, "what calls it wants to know without reading"
     assert "slower: knot / SignedDepth: 0.60 -> 1.10" in result.out
-    assert "nothing got slower" in run("--from", new, "--compare", new).out
+    assert "1 thing got worse; slower: knot / SignedDepth" in result.err
+    assert result.err.count("\n") == 1
+    assert run("--from", old, "--compare", new)[0] == 0, "faster is no failure"
+    same = run("--from", new, "--compare", new)
+    assert same.code == 0
+    assert "nothing got slower" in same.out
     changes = json.loads(run("--from", new, "--compare", old, "--json").out)["changes"]
     assert [change["kind"] for change in changes] == ["slower"]
 
@@ -136,9 +142,13 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
     [
         (["--from", "x.json", "-o", "out", "--quick"], "nothing is measured"),
         (["--from", "x.json", "-o", "out", "knot"], "nothing is measured"),
+        (["--from", "x.json", "--preset", "jade"], "nothing is measured"),
+        (["--preset", "jade"], "--preset jade; no MODEL to fill; the toolkit's scenes keep their media; add a MODEL"),
+        (["knot", "--color", "teal"], "--distance is missing"),
+        (["knot", "--preset", "milk"], "did you mean skim_milk"),
         (["--from", "absent.json", "-o", "out"], "it cannot be read"),
     ],
-    ids=["from and quick", "from and a model", "no such file"],
+    ids=["from and quick", "from and a model", "from a medium", "no model", "no distance", "preset", "no such file"],
 )
 def test_bad_usage(
     run: Run, arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -180,6 +190,29 @@ def test_a_model_of_the_user_is_measured(run: Run, tmp_path: Path) -> None:
         f"translucent report knot bear -o {tmp_path} --size 64x48 --methods signed-depth,constant-thickness --quick"
     )
     assert sorted(path.name for path in tmp_path.iterdir()) == FILES
+
+
+@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.parametrize("medium", [["--preset", "merlot"], ["--color", "teal", "--distance", "5mm"]], ids=str)
+def test_a_medium_for_the_model_says_what_would_be_seen_in_it(run: Run, tmp_path: Path, medium: list[str]) -> None:
+    more = ("--quick", "--size", "64x48", "--methods", "signed-depth,thin-layer")
+    result = run("bear", *medium, "-o", tmp_path, *more)
+    assert result.code == 0
+    assert "  with it, nobody would see the difference: no pixel is off by more than " in result.out
+    made = Report.from_json((tmp_path / "report.json").read_text())
+    rows = {row.method: row for row in made.cases[0].rows}
+    assert made.cases[0].quantity == "thickness"
+    # Borders, of ior 1.33, would cost the same on top of each method.
+    assert made.cases[0].why == "a model of yours" + (", without its borders" if "merlot" in medium else "")
+    assert rows["SignedDepth"].passes == 1
+    assert all(word in made.provenance.command.split() for word in medium)
+    assert rows["SignedDepth"].color_difference is not None
+    assert rows["SignedDepth"].color_difference.max < 0.1
+    assert rows["ThinLayer"].color_difference is not None
+    assert rows["ThinLayer"].color_difference.median > 2.3
+    page = (tmp_path / "report.html").read_text()
+    assert "In this medium, nobody would see the difference" in page
+    assert "color_difference.p999" in (tmp_path / "report.csv").read_text().splitlines()[0]
 
 
 @pytest.mark.usefixtures("nothing_else")
@@ -240,7 +273,9 @@ def test_models_of_one_name_are_told_apart() -> None:
 
 def test_media_decide_what_is_worth_measuring() -> None:
     mesh = load_mesh(mesh_path("bear"))
-    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), scattering=(1, 1, 1)))) == "scattering"
+    mist = Medium(absorption=(1, 1, 1), scattering=(1, 1, 1))
+    assert effect_of(showcase(mesh, mist, lights=[DirectionalLight((0, -1, 0), (1, 1, 1))])) == "scattering"
+    assert effect_of(showcase(mesh, mist)) == "absorption", "without a light there is nothing to scatter"
     assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), emission=(1, 1, 1)))) == "emission"
     scene = showcase(mesh)
     sheet = dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], sheet_thickness=1e-3)])

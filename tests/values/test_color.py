@@ -46,6 +46,11 @@ def test_srgb_curve_rises_across_its_border() -> None:
         assert values[-1] > values[0]
 
 
+def test_what_is_all_but_black_is_encoded() -> None:
+    """The float64 reference leaves such numbers behind a dense medium."""
+    assert color.linear_to_srgb([5e-324, 1e-310, 0.0]).max() < 1e-300
+
+
 def test_every_byte_survives_the_way_to_linear_and_back() -> None:
     bytes_ = np.arange(256)
     assert np.rint(color.linear_to_srgb(color.srgb_to_linear(bytes_ / 255)) * 255).astype(int).tolist() == [*bytes_]
@@ -69,6 +74,8 @@ RED = (1.0, 0.0, 0.0)
     [
         ("#ff0000", RED),
         ("#F00", RED),
+        ("ff0000", RED),  # as a shell leaves it without quotes, or who does not know what # is for
+        (" FF0000 ", RED),
         (" red ", RED),
         ("srgb(1, 0, 0)", RED),
         ("SRGB(0.5,0.5,0.5)", (0.21404114048223255,) * 3),
@@ -88,7 +95,9 @@ def test_a_color_can_be_written_so(written: object, linear: tuple[float, ...]) -
     [
         ("reddish", "color 'reddish'; neither a hex color, a CSS name"),
         ("#12345", "color '#12345'; neither a hex color"),
-        ("", "color ''; neither"),
+        ("", "color ''; empty; a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"),
+        ("123", "color '123'; neither"),
+        ("7b1e3aff", "color '7b1e3aff'; neither"),
         ("0.1,0.2,0.3", "neither a hex color"),
         ("linear(1, 2)", "color 'linear(1, 2)'; not three numbers"),
         ("srgb(a, b, c)", "not three numbers"),

@@ -167,7 +167,7 @@ def test_a_uv_seam_survives_welding(tmp_path: Path) -> None:
     ("name", "content", "message"),
     [
         ("missing.obj", None, "no such file; check the path"),
-        ("mesh.xyzw", b"", "format '.xyzw' is not known; use obj, stl, ply, off or glb"),
+        ("mesh.xyzw", b"", "format '.xyzw' is not known; use glb, gltf, obj, stl, ply or off"),
         ("mesh", b"", "format 'without suffix' is not known"),
         ("empty.obj", b"", "it has no faces"),
         ("empty.stl", b"", "it has no faces"),

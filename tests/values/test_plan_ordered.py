@@ -216,6 +216,28 @@ def test_without_opengl_rays_find_all_intervals_whatever_the_method(method: Any)
     assert found.exact == (not isinstance(method, tl.ThinLayer))
 
 
+@pytest.mark.parametrize(
+    ("method", "runs", "reason"),
+    [
+        (None, "all surfaces on each ray, in float64", "no OpenGL: all surfaces on each ray, in float64"),
+        (
+            tl.KBuffer(k=2),
+            "all surfaces on each ray, in float64",
+            "in place of KBuffer(k=2, light_points=8), ",
+        ),
+        (tl.ThinLayer(0.01), "all surfaces on each ray, in float64, as sheets of 0.01 m", "no OpenGL"),
+    ],
+    ids=str,
+)
+def test_without_opengl_a_plan_says_what_runs_and_not_what_was_asked_for(method: Any, runs: str, reason: str) -> None:
+    found = plan(scene(body()), method, Capabilities(opengl=False))
+    assert found.runs == found.summary()["method"] == runs
+    assert str(found).startswith(f"{runs}: ")
+    assert reason in found.passes[0].reason
+    drawn = plan(scene(body()), method or tl.SignedDepth())
+    assert drawn.runs == str(drawn.method)
+
+
 def test_without_opengl_slots_and_emitting_sheets_are_no_limit() -> None:
     media = [tl.Medium(absorption=i + 1.0, emission=1.0) for i in range(20)]
     assert plan(scene(*[body(medium) for medium in media]), None, Capabilities(opengl=False)).exact

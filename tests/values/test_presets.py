@@ -202,7 +202,17 @@ def test_an_unknown_name_without_a_like_gives_some(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "guess"), [("honney", "honey"), ("Merlo", "merlot"), ("budwiser", "budweiser"), ("skin", "skin2 or skin1")]
+    ("name", "guess"),
+    [
+        ("honney", "honey?"),
+        ("Merlo", "merlot?"),
+        ("budwiser", "budweiser or budweiser_beer?"),
+        ("skin", "skin2 or skin1?"),
+        ("milk", "skim_milk, whole_milk, lowfat_milk or reduced_milk?"),
+        ("merlot wine", "merlot?"),
+        ("Wine", "chardonnay, white_zinfandel or merlot?"),
+        ("coffee", "mint_mocha_coffee?"),
+    ],
 )
 def test_an_unknown_name_gives_what_it_may_mean(name: str, guess: str) -> None:
     with pytest.raises(tl.InputError, match=re.escape(f"preset {name!r}; not a known preset; did you mean {guess}")):

@@ -11,6 +11,10 @@ from translucent.bench.row import Row
 #: Times the floor, within which signed depth stays.
 MOST_OF_FLOOR = 1.25
 
+#: A time with a noise of `NOISES` standard errors beyond this share of it decides nothing about the frontier: next to
+#: none of the others could beat it.
+VAGUE = 0.25
+
 #: Surfaces on a ray beyond which most of what is drawn is hidden.
 MANY_LAYERS = 8
 
@@ -58,9 +62,10 @@ Check = Callable[[CaseRecord], tuple[bool | None, str]]
 
 
 def _over(text: str, cases: Sequence[CaseRecord], check: Check) -> Claim:
-    """A claim over several cases: held where it holds on all that decide it; None where none does.
+    """A claim over several cases: held where it holds on all, and not where it fails on one.
 
-    A check gives no verdict (None) where the case has not the numbers, or they are too noisy, which it tells in words.
+    A check gives no verdict (None) where the case has not the numbers, or they are too noisy, which it tells in words:
+    a claim that is undecided anywhere is undecided, unless it fails elsewhere.
     """
     found = [(case, *check(case)) for case in cases]
     known = [(case, held, words) for case, held, words in found if held is not None]
@@ -69,7 +74,8 @@ def _over(text: str, cases: Sequence[CaseRecord], check: Check) -> Claim:
         return Claim(text, None, "; ".join(undecided) or "no case in this run to check it on")
     wrong = [f"not on {case.name!r}: {words}" for case, held, words in known if not held]
     right = [f"{case.name}: {words}" for case, held, words in known if held]
-    return Claim(text, not wrong, "; ".join([*wrong, *undecided, *right]))
+    held = False if wrong else None if undecided else True
+    return Claim(text, held, "; ".join([*wrong, *undecided, *right]))
 
 
 def _row(case: CaseRecord, method: str) -> Row | None:
@@ -81,8 +87,11 @@ def _on_frontier(case: CaseRecord) -> tuple[bool | None, str]:
     if row is None:
         return None, ""
     error = error_of(row, case.quantity)
-    place = "" if row.ratio is None or error is None else f"{row.ratio.median:.2f} times the floor, error {error:.1e}"
-    return row.pareto, place
+    if row.ratio is None or error is None:
+        return row.pareto, ""
+    if row.pareto and NOISES * row.ratio.noise > VAGUE * row.ratio.median:
+        return None, f"{row.ratio.median:.2f} ± {row.ratio.noise:.2f} times the floor, too vague to be beaten"
+    return row.pareto, f"{row.ratio.median:.2f} times the floor, error {error:.1e}"
 
 
 def _near_floor(case: CaseRecord) -> tuple[bool | None, str]:
@@ -92,7 +101,7 @@ def _near_floor(case: CaseRecord) -> tuple[bool | None, str]:
     words = f"{row.ratio.median:.2f} ± {row.ratio.noise:.2f}"
     if row.ratio.median > MOST_OF_FLOOR:
         words += _why_slow(case)
-    if row.ratio.median > MOST_OF_FLOOR >= row.ratio.median - NOISES * row.ratio.noise:
+    if abs(row.ratio.median - MOST_OF_FLOOR) <= NOISES * row.ratio.noise:
         return None, words
     return row.ratio.median <= MOST_OF_FLOOR, words
 

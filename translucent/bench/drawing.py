@@ -109,22 +109,31 @@ class _OnGpu:
 
 
 class Floor:
-    """The geometry into a depth buffer, and nothing else: what any rasterized method costs at least."""
+    """What light enters into a depth buffer, and nothing else: what any rasterized method costs at least.
+
+    Opaque objects are staging, which every method draws before and which is in all costs: it is in the floor, too.
+    """
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets) -> None:
-        plan = RenderPlan(SignedDepth(), ())
+        self._bodies = tuple(i for i, item in enumerate(scene.objects) if item.medium is not None)
+        opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
+        self._staging = (PassSpec("opaque", "staging", opaque, 1),) if opaque else ()
         self._studio = studio
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
+        self._job = FrameJob(studio.gl, scene, RenderPlan(SignedDepth(), self._staging), targets, studio.resources)
         self._pass = DepthOnlyPass(studio.gl)
 
     def draw(self) -> Sample:
         """Draw it."""
 
         def geometry() -> None:
+            for spec in self._staging:
+                self._job.place((0.0, 0.0))
+                with self._studio.timer.measure("staging"):
+                    self._studio.step(spec.name).run(self._job, spec)
             self._job.place((0.0, 0.0), with_depth=True)
             self._studio.gl.viewport = (0, 0, *self._job.targets.size)
             with self._studio.timer.measure("depth_only"):
-                self._pass.run(self._job)
+                self._pass.run(self._job, self._bodies)
 
         return self._studio.timed(geometry, _nothing)
 

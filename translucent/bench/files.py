@@ -14,7 +14,7 @@ from translucent.errors import InputError
 from translucent.paths import write_text_atomically
 
 #: Fields of a row that are dataclasses, one column for each of their fields.
-_GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmittance", "radiance")
+_GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmittance", "radiance", "color_difference")
 
 
 def write_report(report: Report, path: Path) -> None:

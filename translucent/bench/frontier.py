@@ -6,6 +6,8 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from translucent.bench.row import Quantity, Row
 
 #: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much. A report
@@ -17,6 +19,10 @@ NOISES = 3.0
 #: Errors closer than this are equal, as are all below `ERROR_FLOOR`: float32 of a path has no more to say.
 ERROR_MARGIN = 1.5
 ERROR_FLOOR = 1e-6
+
+#: Errors up to a hundred roundings of float32, which the hard cases call exact, are rounding: of two such, neither is
+#: the smaller one, whatever the digits say.
+ROUNDING = 100 * float(np.finfo(np.float32).eps) / 2
 
 
 def error_of(row: Row, quantity: Quantity) -> float | None:
@@ -47,7 +53,8 @@ def beats(one: Row, other: Row, quantity: Quantity) -> bool:
     (time_a, noise_a, error_a), (time_b, noise_b, error_b) = a, b
     margin = max((TIME_MARGIN - 1.0) * min(time_a, time_b), NOISES * math.hypot(noise_a, noise_b))
     faster, slower = time_a + margin < time_b, time_a > time_b + margin
-    better, worse = error_a * ERROR_MARGIN < error_b, error_a > error_b * ERROR_MARGIN
+    tied = max(error_a, error_b) <= ROUNDING
+    better, worse = not tied and error_a * ERROR_MARGIN < error_b, not tied and error_a > error_b * ERROR_MARGIN
     return (faster and not worse) or (better and not slower)
 
 

@@ -235,6 +235,7 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
         found[quantity] = None if errors is None else errors[0]
         if errors is not None:
             found["invalid"], found["coverage_mismatch"] = errors[1:]
+    found["color_difference"] = truth.color_difference(frame, case.quantity)
     if "invalid" not in found:
         covered = (frame.coverage | truth.frame.coverage).sum()
         found["invalid"] = float((~frame.valid).sum() / max(covered, 1))

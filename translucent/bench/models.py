@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Mapping
 from functools import partial
@@ -11,7 +12,7 @@ from translucent import reference
 from translucent.bench.cases import Case, Size
 from translucent.bench.contenders import Effect
 from translucent.errors import InputError
-from translucent.scene import Scene
+from translucent.scene import Object, Scene
 
 #: A model is no solid if the reference can trust less than this share of the pixels that it covers ...
 LEAST_VALID = 0.5
@@ -22,6 +23,8 @@ LOOK: Size = (64, 64)
 def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
     """A case for the scene of each model, by the name that the user gave.
 
+    What is judged is what methods do differently: borders, which cost the same on top of each and have scenes of their
+    own, are left out, and so is light that is scattered many times, which no method and no reference follows here.
     A case is called by the file's name, or by all of its path where several files have the same. One that no method can
     treat as solid raises `InputError` when its scene is made, so that it is a row of the report like all that fails.
     """
@@ -30,13 +33,31 @@ def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
         Case(
             f"model {title}",
             title,
-            "a model of yours",
-            partial(_solid, title, scene),
-            effect_of(scene),
+            "a model of yours" if judged is scene else "a model of yours, without its borders",
+            partial(_solid, title, judged),
+            effect_of(judged),
         )
         for model, scene in scenes.items()
+        for judged in [without_borders(scene)]
         for title in [model if shared[Path(model).name] > 1 else Path(model).name]
     ]
+
+
+def without_borders(scene: Scene) -> Scene:
+    """The scene with media that neither bend light nor have a surface; itself, if it has no others."""
+    if not any(_has_border(item) for item in scene.bodies):
+        return scene
+
+    def bare(item: Object) -> Object:
+        if item.medium is None:
+            return item
+        return dataclasses.replace(item, medium=dataclasses.replace(item.medium, ior=1.0), surface=None)
+
+    return dataclasses.replace(scene, objects=[bare(item) for item in scene.objects])
+
+
+def _has_border(item: Object) -> bool:
+    return item.surface is not None or (item.medium is not None and item.medium.ior > 1)
 
 
 def effect_of(scene: Scene) -> Effect:
@@ -44,7 +65,7 @@ def effect_of(scene: Scene) -> Effect:
     media = [body.medium for body in scene.bodies if body.medium is not None]
     if any(body.density is not None for body in scene.bodies):
         return "density"
-    if any(medium.scatters for medium in media):
+    if scene.lights and any(medium.scatters for medium in media):
         return "scattering"
     if any(medium.emits for medium in media):
         return "emission"

@@ -27,7 +27,8 @@ def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Q
     if contender.kind == "counter-example" and contender.ior == "matched":
         return "none: borders are left out", False
     # Thickness is that of straight rays.
-    beside = ("light scattered more", "refraction") if quantity == "thickness" else ("light scattered more",)
+    lit = ("light scattered more",)
+    beside = (*lit, "in-scattered light", "refraction") if quantity == "thickness" else lit
     missing = [effect for effect in plan.unmodelled if not effect.startswith(beside)]
     limits = [*plan.limits, *missing]
     return "; ".join(limits) or "exact", not limits

@@ -211,7 +211,7 @@ class Claim:
     ----------
     text : str
     held : bool or None
-        None where the run has nothing to check it on.
+        None where the run has nothing to check it on, or its numbers are too noisy to tell.
     measured : str
         The numbers behind that; where it does not hold, where and why.
     """
@@ -219,6 +219,11 @@ class Claim:
     text: str
     held: bool | None
     measured: str
+
+    @property
+    def undecided(self) -> bool:
+        """Whether there are numbers, and noise leaves open what they say."""
+        return self.held is None and self.measured.startswith("undecided")
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,18 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class ColorDifference:
+    """By how much colors are off, in CIELAB 1976: median, 99.9th percentile and maximum.
+
+    Of white light that has passed, where thickness ranks the methods; else of the radiance, as a screen shows it.
+    """
+
+    median: float
+    p999: float
+    max: float
+
+
+@dataclass(frozen=True)
 class Row:
     """One method on one case.
 
@@ -94,6 +106,8 @@ class Row:
         Of all targets and buffers of its frames; 53 of them hold the result.
     thickness, transmittance, radiance : Errors, optional
         None where there is no pixel that can be compared.
+    color_difference : ColorDifference, optional
+        What anybody could see of these errors.
     invalid : float, optional
         Share of the covered pixels that the method marks as not to be trusted; errors leave these out.
     coverage_mismatch : float, optional
@@ -124,6 +138,7 @@ class Row:
     thickness: Errors | None = None
     transmittance: Errors | None = None
     radiance: Errors | None = None
+    color_difference: ColorDifference | None = None
     invalid: float | None = None
     coverage_mismatch: float | None = None
     pareto: bool = False

@@ -40,7 +40,7 @@ def _lines(report: Report) -> Iterator[str]:
     if report.claims:
         yield ""
     for claim in report.claims:
-        state = "not checked" if claim.held is None else "held" if claim.held else "NOT HELD"
+        state = {True: "held", False: "NOT HELD", None: "undecided" if claim.undecided else "not checked"}[claim.held]
         yield f"{state}: {claim.text}: {claim.measured}"
 
 

@@ -16,7 +16,8 @@ from translucent import reference
 from translucent.bench.codec import Packed
 from translucent.bench.drawing import Size
 from translucent.bench.record import Picture
-from translucent.bench.row import Errors, Quantity
+from translucent.bench.row import ColorDifference, Errors, Quantity
+from translucent.bench.seeing import color_difference
 from translucent.errors import InputError
 from translucent.frame import Frame
 from translucent.metrics import compare, interior
@@ -29,6 +30,10 @@ BOUNCES = 12
 INVISIBLE = 5e-8
 
 
+#: Radiance below which a picture is black, and errors are no shares of it.
+DARK = 1e-6
+
+
 @dataclass(frozen=True)
 class Truth:
     """What all are held against.
@@ -38,11 +43,11 @@ class Truth:
     frame : Frame
         Of the reference.
     inside : (h, w) bool
-        Pixels away from silhouettes.
+        Pixels away from silhouettes, those of opaque objects included.
     layers : int
         The most surfaces on one ray.
     diagonal : float
-        Of the scene's bounds, in metres.
+        Of the bounds of what light enters, in metres.
     seconds : float
         That the frame took.
     """
@@ -60,7 +65,12 @@ class Truth:
         frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES)
         seconds = time.perf_counter() - begin
         counts = reference.hit_counts(scene, size)
-        return cls(frame, interior(counts), int(counts.max()), scene.diagonal, seconds)
+        inside = interior(counts)
+        for seen in reference.opaque_counts(scene, size):
+            inside &= interior(seen)
+        low, high = np.transpose([body.bounds for body in scene.bodies], (1, 0, 2))
+        diagonal = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+        return cls(frame, inside, int(counts.max()), diagonal, seconds)
 
     @property
     def compared(self) -> npt.NDArray[np.bool_]:
@@ -70,7 +80,9 @@ class Truth:
     def scale(self, quantity: Quantity) -> float:
         """What errors in that quantity are shares of."""
         if quantity == "radiance":
-            return float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2))) or 1.0
+            with np.errstate(under="ignore"):
+                rms = float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2)))
+            return rms if rms > DARK else 1.0
         return self.diagonal if quantity == "thickness" else 1.0
 
     def errors(self, frame: Frame, quantity: Quantity) -> tuple[Errors, float, float] | None:
@@ -82,6 +94,14 @@ class Truth:
         scale = self.scale(quantity)
         values = {field.name: float(getattr(found, field.name)) / scale for field in dataclasses.fields(Errors)}
         return Errors(**values), found.invalid, found.coverage_mismatch
+
+    def color_difference(self, frame: Frame, quantity: Quantity) -> ColorDifference | None:
+        """What anybody could see of the errors of a frame; None where there is no pixel to compare."""
+        used = self.compared & frame.coverage & frame.valid
+        if not used.any():
+            return None
+        shown = "transmittance" if quantity == "thickness" else quantity
+        return color_difference(getattr(frame, shown)[used], getattr(self.frame, shown)[used])
 
     def picture(self, method: str, frame: Frame, quantity: Quantity) -> Picture:
         """The picture of a frame with its errors; the reference has none."""

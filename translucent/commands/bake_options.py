@@ -100,7 +100,7 @@ def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
     settings |= {name: _read_length(name, given[name], unit) for name in _LENGTHS if given[name] is not None}
     if given["tile"] is not None:
         settings["tile"] = given["tile"]
-    medium = read_medium(given["color"], given["distance"], given["preset_name"])
+    medium = read_medium(given["color"], given["distance"], given["preset_name"], given["clamp"])
     job = {
         "model": mesh_file(model, unit),
         "output": str(output),

@@ -13,16 +13,14 @@ import click
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from translucent.environment import Environment
-    from translucent.frame import Frame
     from translucent.medium import Medium
     from translucent.thickness import Method
 
 #: Of tone curves, as in `translucent.tone.TONES`, which only rendering imports.
 TONE_NAMES = ("none", "neutral", "agx")
-
-#: Below this mean share of light a picture shows little but black.
-NEARLY_BLACK = 0.02
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,6 +36,7 @@ def common_options(command: F) -> F:
 
 def medium_options(command: F) -> F:
     """Options that choose a medium."""
+    command = clamp_option(command)
     command = click.option("--preset", "preset_name", metavar="NAME", help="A named medium, such as merlot.")(command)
     command = click.option("--distance", metavar="D", help="Distance at which light has the color: 2cm, 0.8in.")(
         command
@@ -45,6 +44,15 @@ def medium_options(command: F) -> F:
     return click.option("--color", metavar="C", help="Transmitted color: '#7b1e3a', salmon, 'linear(.18,.62,.35)'.")(
         command
     )
+
+
+def clamp_option(command: F) -> F:
+    """Option for colors with a channel of 0, which no finite extinction makes."""
+    return click.option(
+        "--clamp/--no-clamp",
+        default=None,
+        help="Take channels below 1e-4 for 1e-4 and say so, or refuse those of 0. Default: --clamp.",
+    )(command)
 
 
 def unit_option(command: F) -> F:
@@ -122,7 +130,9 @@ def borders_option(command: F) -> F:
     )(command)
 
 
-def read_medium(color: str | None, distance: str | None, preset_name: str | None) -> Medium | None:
+def read_medium(
+    color: str | None, distance: str | None, preset_name: str | None, clamp: bool | None = None
+) -> Medium | None:
     """The medium that the options choose, if they do."""
     from translucent.medium import Medium
     from translucent.presets import preset
@@ -138,7 +148,23 @@ def read_medium(color: str | None, distance: str | None, preset_name: str | None
     if (color is None) != (distance is None):
         given, missing = ("--color", "--distance") if distance is None else ("--distance", "--color")
         raise InputError(given, f"{missing} is missing", "give both: a color has a meaning only at a distance")
-    return None if color is None or distance is None else Medium.from_color(color, parse_length(distance))
+    if color is None or distance is None:
+        return None
+    wanted, told = clamped(color) if clamp is not False else (color, [])
+    medium = Medium.from_color(wanted, parse_length(distance))
+    for line in told:
+        click.echo(f"warning: {line}", err=True)
+    return medium
+
+
+def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
+    """The color without channels that are too dark, and a line for the user where there were any."""
+    from translucent.color import parse_color
+    from translucent.conversion import CLAMP, clamp_colors
+
+    triple, changed = clamp_colors(parse_color(color))
+    # As it was written, if nothing is to be done: errors tell it so.
+    return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
 
 
 def read_method(name: str | None, thickness: str | None) -> Method | None:
@@ -220,15 +246,3 @@ def read_size(text: str) -> tuple[int, int]:
 def triple_text(values: Any) -> str:
     """Three numbers, aligned."""
     return " ".join(f"{value:10.5g}" for value in values)
-
-
-def warn_if_black(frame: Frame) -> None:
-    """Say so where hardly any light passes: most often the file's unit is not what it was taken for."""
-    seen = frame.coverage & frame.valid
-    if seen.any() and (passed := float(frame.transmittance[seen].mean())) < NEARLY_BLACK:
-        metres = float(frame.summary()["thickness"]["median"])
-        click.echo(
-            f"warning: only {passed:.2%} of the light passes, at a median thickness of {metres:.3g} m; "
-            "check --unit, or take a longer --distance",
-            err=True,
-        )

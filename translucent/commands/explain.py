@@ -35,6 +35,7 @@ def explain(
     color: str | None,
     distance: str | None,
     preset_name: str | None,
+    clamp: bool | None,
     unit: str,
     method_name: str | None,
     borders: Borders,
@@ -46,7 +47,7 @@ def explain(
     """
     from translucent.plan import plan
 
-    medium = read_medium(color, distance, preset_name)
+    medium = read_medium(color, distance, preset_name, clamp)
     scene = read_scene(model, unit, medium)
     method = read_method(method_name, None)
     chosen = plan(scene, method, borders=borders) if scene.bodies else None

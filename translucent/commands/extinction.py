@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.common import (
+    clamp_option,
+    clamped,
     common_options,
     overwrite_option,
     read_medium,
@@ -21,8 +23,6 @@ from translucent.commands.on_model import doubts_on, report_on, thickness_on, to
 from translucent.errors import InputError, TranslucentError
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from translucent.fitting import Fit
     from translucent.frame import Frame
     from translucent.medium import Medium
@@ -35,7 +35,7 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.argument("distance", required=False)
 @click.option("--unit", default="m", show_default=True, help="Unit of distances that name none, and of MODEL.")
 @click.option("--unit-out", default="m", show_default=True, metavar="U", help="Give the extinction per this unit, too.")
-@click.option("--clamp", is_flag=True, help="Take channels below 1e-4 for 1e-4, instead of refusing 0.")
+@clamp_option
 @click.option("--as", "target", type=click.Choice(TARGETS), help="Print the material for an engine, to paste.")
 @click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
@@ -53,7 +53,7 @@ def extinction(
     distance: str | None,
     unit: str,
     unit_out: str,
-    clamp: bool,
+    clamp: bool | None,
     target: str | None,
     batch: Path | None,
     output: Path | None,
@@ -66,11 +66,12 @@ def extinction(
 ) -> None:
     """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance.
 
-    COLOR is '#7b1e3a', teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
+    COLOR is '#7b1e3a', 7b1e3a, teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
 
     With --on MODEL and no DISTANCE, the medium in which that model shows COLOR on average, over the pixels that it
     covers before white light; with a DISTANCE, --preset or --from, the average color that this medium shows on it.
     """
+    from translucent.color import QUOTE_HINT
     from translucent.units import metres_per_unit
 
     metres_per_unit(unit_out)
@@ -89,17 +90,17 @@ def extinction(
     if batch is not None:
         if target is not None:
             raise InputError(f"--as {target}", "it takes one color, not --batch", "leave one of them out")
-        return _batch(batch, output, unit, unit_out, clamp)
+        return _batch(batch, output, unit, unit_out, clamp is not False)
     if fit is not None:
         if clamp:
             raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
         return _fit(fit, unit, unit_out, target, as_json)
     medium = _given_medium(source, preset_name, unit)
     if medium is None and (color is None or (distance is None and model is None)):
-        missing = "'COLOR'" if color is None else "'DISTANCE'"
-        raise click.MissingParameter(ctx=context, param_hint=missing, param_type="argument")
+        missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
+        raise click.MissingParameter(hint[:1].upper() + hint[1:], context, param_hint=missing, param_type="argument")
     frame = None if model is None else thickness_on(model, unit, eye)
-    told, medium = _convert(medium, color, distance, frame, unit, unit_out, clamp)
+    told, medium = _convert(medium, color, distance, frame, unit, unit_out, clamp is not False)
     stated = told["distance"]
     if model is not None and frame is not None:
         told["on"] = told_on(model, frame, medium)
@@ -141,7 +142,7 @@ def _convert(
     from translucent.medium import Medium
     from translucent.units import parse_length
 
-    wanted, changes = _clamped(color) if clamp and color is not None else (color or "", [])
+    wanted, changes = clamped(color) if clamp and color is not None else (color or "", [])
     if distance is not None:
         metres = parse_length(distance, unit)
         medium, triple = Medium.from_color(wanted, metres), parse_color(wanted)
@@ -154,15 +155,6 @@ def _convert(
     told = summary(triple, metres, medium.extinction, unit_out)
     told["warnings"][:0] = changes
     return told, medium
-
-
-def _clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
-    """The color without channels that are too dark, and a line for the user where there were any."""
-    from translucent.color import parse_color
-    from translucent.conversion import CLAMP, clamp_colors
-
-    triple, changed = clamp_colors(parse_color(color))
-    return triple, [f"color clamped to {CLAMP:g} where it was below"] if changed.any() else []
 
 
 def _tell(told: dict[str, Any], medium: Medium, stated: float, target: str | None, as_json: bool) -> None:
@@ -209,6 +201,7 @@ def _infinite(values: list[float | None]) -> list[float]:
 
 def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bool) -> None:
     from translucent.batch import check_batch_output, convert_table
+    from translucent.conversion import CLAMP
 
     if output is not None:
         check_batch_output(output)
@@ -218,6 +211,9 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
         click.echo(done.to_json(), nl=False)
     else:
         done.write(output)
+    if done.clamped:
+        told = f"{done.clamped} of {len(done.records)} colors clamped to {CLAMP:g} where they were below"
+        click.echo(f"warning: {told}; their warnings say so", err=True)
     for line in done.errors:
         click.echo(f"error: {line}", err=True)
     if done.errors:

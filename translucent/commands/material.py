@@ -87,6 +87,7 @@ def apply(
     color: str | None,
     distance: str | None,
     preset_name: str | None,
+    clamp: bool | None,
     object_name: str | None,
     thickness: str | None,
     as_json: bool,
@@ -95,7 +96,7 @@ def apply(
     from translucent.materials.gltf_write import write_medium
     from translucent.units import parse_length
 
-    medium = read_medium(color, distance, preset_name)
+    medium = read_medium(color, distance, preset_name, clamp)
     if medium is None:
         raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
     refuse_overwriting(output, model)

@@ -86,6 +86,13 @@ def require_translucent(model: str, scene: Scene) -> None:
         )
 
 
+def is_own(model: str) -> bool:
+    """Whether MODEL is a mesh that comes with the toolkit, and no file of the same name."""
+    from translucent.assets import mesh_names
+
+    return not os.path.lexists(model) and model in mesh_names()
+
+
 def read_mesh(model: str, unit: str) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
     from translucent.mesh import load_mesh
@@ -99,7 +106,7 @@ def mesh_file(model: str, unit: str) -> str:
 
     if os.path.lexists(model):
         return model
-    if model in mesh_names():
+    if is_own(model):
         if unit != "m":
             raise InputError(f"--unit {unit}", f"{model} comes with the toolkit, in metres", "leave --unit out")
         return str(mesh_path(model))

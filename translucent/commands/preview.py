@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from translucent.commands.common import common_options, read_size, unit_option
-from translucent.errors import InputError
+from translucent.errors import InputError, RenderError, TranslucentError
 
 
 @click.command(epilog="Example: translucent preview goblet")
@@ -33,12 +33,14 @@ def preview(
 ) -> None:
     """Open MODEL, a file or one of the toolkit's own meshes, in a window. Without it: a goblet.
 
-    With --script, the window does what the script says, and closes; --screenshot keeps a picture of it.
+    With --script, the window does what the script says, and closes; --screenshot keeps a picture of it. An action that
+    fails does not stop the others; the exit code is then 1, or 2 where it asked for what cannot be.
     """
     from translucent.preview.app import leave, require_display, run
     from translucent.preview.document import Document, Model
     from translucent.preview.script import Script, read_script
     from translucent.preview.session import load_session
+    from translucent.preview.tasks import problem
 
     if session is not None and model is not None:
         raise InputError(f"--session {str(session)!r}", f"{model} is given, too", "give one of them")
@@ -53,10 +55,25 @@ def preview(
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
     require_display()
     work = run(document, pixels, scale, todo, str(screenshot) if screenshot is not None else None)
+    failure = None if todo is None else work.failure
     if as_json:
         told = [{"kind": message.kind, "text": message.text} for message in work.messages]
         click.echo(json.dumps({"model": work.document.model.path, "messages": told}))
     elif todo is not None:
         for message in work.messages:
-            click.echo(f"{message.kind}: {message.text}", err=True)
-    leave(work)
+            # The error by which the script fails is the last line, as that of any verb.
+            if failure is None or message.text != problem(failure):
+                click.echo(f"{message.kind}: {message.text}", err=True)
+    error = None if failure is None else _script_error(failure)
+    if error is not None and not work.ended:
+        click.echo(f"error: {error}", err=True)
+    leave(work, 0 if error is None else 2 if isinstance(error, InputError) else 1)
+    if error is not None:
+        raise error
+
+
+def _script_error(failure: Exception) -> TranslucentError:
+    """What a script fails by: what its first action that failed says, or that it is a defect."""
+    from translucent.preview.tasks import problem
+
+    return failure if isinstance(failure, TranslucentError) else RenderError(problem(failure))

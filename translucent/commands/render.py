@@ -21,9 +21,17 @@ from translucent.commands.common import (
     read_size,
     refuse_overwriting,
     unit_option,
-    warn_if_black,
 )
-from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lines, read_scene, require_translucent
+from translucent.commands.darkness import warn_if_black
+from translucent.commands.model import (
+    DEFAULT_FOV,
+    DEFAULT_UP,
+    View,
+    is_own,
+    medium_lines,
+    read_scene,
+    require_translucent,
+)
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
 
@@ -51,7 +59,8 @@ if TYPE_CHECKING:
     "--method",
     "method_name",
     metavar="NAME",
-    help="signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists or k-buffer. Default: by plan.",
+    help="signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists, k-buffer or ray-marched. "
+    "Default: by plan. Without OpenGL all but thin-layer give way to all surfaces on each ray.",
 )
 @borders_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
@@ -72,6 +81,7 @@ def render(
     color: str | None,
     distance: str | None,
     preset_name: str | None,
+    clamp: bool | None,
     unit: str,
     size: str,
     camera: int | None,
@@ -113,7 +123,7 @@ def render(
     pictures.check()
     refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
-    medium = read_medium(color, distance, preset_name)
+    medium = read_medium(color, distance, preset_name, clamp)
     method = read_method(method_name, thickness)
     view = View(camera, eye, target, up, fov)
     scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background), roughness)
@@ -129,9 +139,7 @@ def render(
 
             draw = partial(render_scene, size=pixels, method=method, samples=samples, renderer=renderer)
         frame = pictures.write(scene, draw)
-    # What scatters many times is bright though no light passes straight.
-    if not any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
-        warn_if_black(frame)
+    warn_if_black(scene, frame, unit, own=is_own(model))
     media = medium_lines(scene)
     if as_json:
         click.echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))

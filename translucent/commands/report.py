@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, read_size, unit_option
+from translucent.commands.common import common_options, medium_options, read_medium, read_size, unit_option
 from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
     from translucent.bench.record import CaseRecord, Report
+    from translucent.medium import Medium
+
+#: How the names of the cases begin that users bring.
+MODEL_CASE = "model "
 
 PATH = click.Path(path_type=Path)
 
@@ -29,7 +33,14 @@ PATH = click.Path(path_type=Path)
 @click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
 @click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
 @click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
-@click.option("--compare", "old", type=PATH, metavar="JSON", help="Tell what got slower or less accurate since this.")
+@click.option(
+    "--compare",
+    "old",
+    type=PATH,
+    metavar="JSON",
+    help="Tell what got worse since this; exit code 1 if so.",
+)
+@medium_options
 @unit_option
 @click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
 @common_options
@@ -41,30 +52,39 @@ def report(
     methods: str | None,
     source: Path | None,
     old: Path | None,
+    color: str | None,
+    distance: str | None,
+    preset_name: str | None,
+    clamp: bool | None,
     unit: str,
     backend: str | None,
     as_json: bool,
 ) -> None:
     """Measure what each method costs and how wrong it is, on the toolkit's scenes and on each MODEL.
 
-    A MODEL is a file, or a mesh of the toolkit by name. Interrupted with Ctrl-C, the finished scenes are written.
-    Without -o and --compare, all numbers are printed, and nothing is kept.
+    A MODEL is a file, or a mesh of the toolkit by name; --color or --preset fills it with a medium, and the report says
+    whether anybody would see there what a method gets wrong. Opaque parts are staging. Interrupted with Ctrl-C, the
+    finished scenes are written. Without -o and --compare, all numbers are printed, and nothing is kept.
     """
     from translucent.bench.comparison import compare_reports, machines_differ
     from translucent.bench.files import read_report
     from translucent.bench.output import check_folder, write_outputs
     from translucent.bench.table import table
 
-    if source is not None and (models or quick or size or methods or backend):
+    if source is not None and (models or quick or size or methods or backend or color or distance or preset_name):
         raise InputError(
             f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
         )
+    medium = read_medium(color, distance, preset_name, clamp)
+    if medium is not None and not models:
+        given = "--color" if preset_name is None else f"--preset {preset_name}"
+        raise InputError(given, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
     before = None if old is None else read_report(old)
     made = None if source is None else read_report(source)
     if output is not None:
         check_folder(output)
     if made is None:
-        made = _measured(models, output, quick, size, methods, unit, backend)
+        made = _measured(models, medium, output, quick, size, methods, unit, backend)
     files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
@@ -77,14 +97,19 @@ def report(
         click.echo(table(made))
     if not made.complete and source is None:
         raise click.exceptions.Abort
+    worse = [change for change in changes or () if change.worse]
     if made.failures:
         raise RenderError(
             f"report: {len(made.failures)} of its measurements", f"they failed: {'; '.join(made.failures)}", "see above"
         )
+    if worse:
+        count = f"{len(worse)} {'thing' if len(worse) == 1 else 'things'} got worse"
+        raise RenderError(f"report --compare {old}", count, str(worse[0]))
 
 
 def _measured(
     models: tuple[str, ...],
+    medium: Medium | None,
     output: Path | None,
     quick: bool,
     size: str | None,
@@ -98,7 +123,7 @@ def _measured(
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
-    scenes = {model: read_scene(model, unit, None, size=pixels) for model in models}
+    scenes = {model: read_scene(model, unit, medium, size=pixels) for model in models}
     for model, scene in scenes.items():
         require_translucent(model, scene)
 
@@ -130,9 +155,11 @@ def _command(given: dict[str, Any]) -> str:
     """What the user wrote, as far as it says what was measured."""
     words = ["translucent", "report", *given["models"]]
     options = {"-o": "output", "--size": "size", "--methods": "methods", "--backend": "backend"}
+    options |= {"--color": "color", "--distance": "distance", "--preset": "preset_name"}
     for option, name in options.items():
         words += [option, str(given[name])] if given[name] is not None else []
     words += ["--unit", given["unit"]] if given["unit"] != "m" else []
+    words += ["--no-clamp"] if given["clamp"] is False else []
     return shlex.join([*words, "--quick"] if given["quick"] else words)
 
 
@@ -153,6 +180,7 @@ def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
 def _answer(case: CaseRecord) -> dict[str, Any]:
     from translucent.bench.frontier import error_of
     from translucent.bench.page.advice import advise
+    from translucent.bench.seeing import seen_words
 
     advice = advise(case)
     if advice is None or advice.row.ratio is None:
@@ -163,25 +191,38 @@ def _answer(case: CaseRecord) -> dict[str, Any]:
         "ratio": advice.row.ratio.median,
         "quantity": case.quantity,
         "rms_error": error_of(advice.row, case.quantity),
+        "p999_error": None if (errors := advice.row.errors(case.quantity)) is None else errors.p999,
         "good_enough": advice.good_enough,
+        "seen": seen_words(advice.row) or None,
+        "cheaper": None if advice.cheaper is None else advice.cheaper.method,
+        "cheaper_seen": None if advice.cheaper is None else seen_words(advice.cheaper) or None,
     }
+
+
+def _tell_seen(answer: dict[str, Any]) -> None:
+    """What an artist's eye would make of the difference, in the model's own medium."""
+    if answer["seen"]:
+        click.echo(f"  with it, {answer['seen']}")
+    if answer["cheaper_seen"]:
+        click.echo(f"  with {answer['cheaper']}, which is cheaper, {answer['cheaper_seen']}")
 
 
 def _tell(made: Report, files: list[Path], changes: Any) -> None:
     click.echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
-    click.echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10}")
+    click.echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
     for answer in map(_answer, made.cases):
         if answer["method"] is None:
             click.echo(f"{answer['case']:<20} -")
             continue
         mark = "" if answer["good_enough"] else "  (not good enough, the most accurate)"
-        ratio, error = answer["ratio"], answer["rms_error"]
-        click.echo(
-            f"{answer['case']:<20} {answer['method']:<30} {ratio:>8.2f} {error:>10.1e} {answer['quantity']}{mark}"
-        )
+        numbers = f"{answer['ratio']:>8.2f} {answer['rms_error']:>10.1e} {answer['p999_error']:>8.1e}"
+        click.echo(f"{answer['case']:<20} {answer['method']:<30} {numbers} {answer['quantity']}{mark}")
+        if answer["case"].startswith(MODEL_CASE):
+            _tell_seen(answer)
     for claim in made.claims:
-        if claim.held is False:
-            click.echo(f"does not hold: {claim.text}; {claim.measured}")
+        if claim.held is False or claim.undecided:
+            verdict = "undecided" if claim.undecided else "does not hold"
+            click.echo(f"{verdict}: {claim.text}; {claim.measured}")
     if changes is not None:
         for change in changes:
             click.echo(str(change))

@@ -71,7 +71,7 @@ class CpuRenderer:
         size : (width, height)
             In pixels.
         plan : RenderPlan
-            Of this scene. Whatever its method, solids show their true thickness.
+            Of this scene, for a renderer without OpenGL. Whatever its method, solids show their true thickness.
         samples : int
             Sub-pixel samples over which radiance and transmittance are averaged. The other arrays belong to the ray
             through the pixel center, as all do with 1.

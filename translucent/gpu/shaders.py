@@ -125,20 +125,19 @@ def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int
     RenderError
         If an include is missing or goes in circles, or the switches do not match the source.
     """
-    collector = _Collector()
-    collector.add(name, ())
-    body = "\n".join(collector.lines)
+    gathered = gather(name)
+    body = "\n".join(gathered.lines)
     given = dict(defines or {})
-    if unknown := sorted(given.keys() - collector.switches):
+    if unknown := sorted(given.keys() - gathered.switches):
         raise RenderError(f"shader {name!r}", f"defines {unknown} that it does not ask for", "check the spelling")
-    if missing := sorted(collector.switches - given.keys()):
+    if missing := sorted(gathered.switches - given.keys()):
         raise RenderError(f"shader {name!r}", f"it asks for {missing}, which are not defined", "define them as 0 or 1")
     head = [f"#version {version} core", *(f"#define {key} {int(value)}" for key, value in given.items())]
-    return ShaderSource("\n".join([*head, body, ""]), tuple(collector.files))
+    return ShaderSource("\n".join([*head, body, ""]), tuple(gathered.files))
 
 
-class _Collector:
-    """Gathers the lines of a file and of what it includes."""
+class Gathered:
+    """The lines of a file and of what it includes, and the switches that they ask for."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -146,6 +145,7 @@ class _Collector:
         self.switches: set[str] = set()
 
     def add(self, name: str, parents: tuple[str, ...]) -> None:
+        """Take a file, which files named before have included, and what it includes."""
         if name in parents:
             raise RenderError(
                 f"shader {parents[0]!r}", f"includes go in circles: {' -> '.join([*parents, name])}", "cut one"
@@ -163,6 +163,13 @@ class _Collector:
             if match := _CONDITION.match(line):
                 self.switches.update(re.findall(r"[A-Z_][A-Z0-9_]*", match[1]))
             self.lines.append(line)
+
+
+def gather(name: str) -> Gathered:
+    """A shader file with its includes, each once."""
+    gathered = Gathered()
+    gathered.add(name, ())
+    return gathered
 
 
 def _text(name: str, parents: tuple[str, ...]) -> str:
@@ -227,9 +234,8 @@ def build_program(
 
 def _stage(name: str, defines: Mapping[str, int], version: int) -> ShaderSource:
     """The stage with those of the defines that it asks for."""
-    collector = _Collector()
-    collector.add(name, ())
-    return preprocess(name, {key: value for key, value in defines.items() if key in collector.switches}, version)
+    asked = gather(name).switches
+    return preprocess(name, {key: value for key, value in defines.items() if key in asked}, version)
 
 
 def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
@@ -239,13 +245,3 @@ def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
     except KeyError:
         known = ", ".join(sorted(program))
         raise RenderError(f"uniform {name!r}", f"the program has only {known}", "check the spelling") from None
-
-
-if __name__ == "__main__":
-    # A shader file as one text, constants and includes written out: for use in another engine.
-    import sys
-
-    if len(sys.argv) < 2:
-        sys.exit("usage: python -m translucent.gpu.shaders lib/optics.glsl [SWITCH=0 ...]")
-    switches = dict(argument.split("=") for argument in sys.argv[2:])
-    print(preprocess(sys.argv[1], {name: int(value) for name, value in switches.items()}).text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.materials.gltf_write import write_medium
 from translucent.preview.actions import Change
@@ -45,7 +46,8 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
         case "png" | "exr" | "turntable":
             _export(desk, kind, path)
         case _:
-            work.tell("error", f"file {path!r}; {kind!r} is nothing to read or write; use {', '.join(QUESTIONS)}")
+            found = f"{kind!r} is nothing to read or write"
+            work.refuse(InputError(f"file {path!r}", found, f"use {', '.join(QUESTIONS)}"))
 
 
 def _export(desk: Desk, kind: str, path: str) -> None:
@@ -65,6 +67,6 @@ def _save_medium(desk: Desk, path: str) -> None:
     source, material = desk.get("model.path"), desk.work.document.material
     if Path(source).suffix.lower() not in SUFFIXES:
         do = "copy the medium as glTF, or export the model as .glb first"
-        return desk.work.tell("error", f"saving into {path!r}: {Path(source).name} is no glTF file; {do}")
+        return desk.work.refuse(InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do))
     medium = medium_of(material)
     return desk.work.write(path, lambda to: write_medium(source, to, medium, distance=material.distance))

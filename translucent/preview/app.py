@@ -101,15 +101,15 @@ def run(
     return window.work
 
 
-def leave(work: Workspace) -> None:
-    """End the process here if threads of a closed window are still at work.
+def leave(work: Workspace, code: int = 0) -> None:
+    """End the process here, with this exit code, if threads of a closed window are still at work.
 
     At exit CPython before 3.14 unwinds the stacks of threads that nobody waits for, at which C++ libraries abort.
     """
     if not work.ended:
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(0)
+        os._exit(code)
 
 
 @contextmanager
@@ -288,6 +288,8 @@ class _Window:
         idling = hello_imgui.get_runner_params().fps_idling
         idling.enable_idling = not self.desk.more and self.script is None
         if self.script is not None and self.script.step(self.desk):
+            for text in filter(None, (self.desk.stage.problem, self.desk.stage.shader_problem)):
+                self.work.refuse(RenderError("the picture is not what it should be", text))
             hello_imgui.get_runner_params().app_shall_exit = True
 
     def _menus(self) -> None:

@@ -130,7 +130,7 @@ def _typed_color(desk: Desk, text: str) -> str:
     try:
         color = np.asarray(parse_color(text))
     except InputError as error:
-        desk.work.tell("error", str(error))
+        desk.work.refuse(error)
         return text
     desk.change("material.color", color.tolist(), step=True)
     return ""

@@ -115,8 +115,8 @@ class Lane:
         self._waiting.put(self.task)
         return self.task
 
-    def poll(self, tell: Callable[[str], None]) -> None:
-        """Hand over a result that is there, or tell what went wrong."""
+    def poll(self, refuse: Callable[[Exception], None]) -> None:
+        """Hand over a result that is there, or what went wrong."""
         task = self.task
         if task is None or not task.finished:
             return
@@ -126,7 +126,7 @@ class Lane:
         if task.error is None:
             task.then(task.result)
         else:
-            tell(problem(task.error))
+            refuse(task.error)
 
     def close(self, patience: float = 0.5) -> None:
         """Cancel what is under way, and end the thread, unless that takes longer than `patience` seconds."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from translucent.errors import InputError, TranslucentError
+from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.paths import remove_partial
 from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, View
@@ -25,7 +25,7 @@ from translucent.preview.lighting import Lighting, prepare
 from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
 from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
-from translucent.preview.tasks import Lane, Task
+from translucent.preview.tasks import Lane, Task, problem
 from translucent.scene import Scene
 from translucent.thickness import Method
 
@@ -60,6 +60,8 @@ class Workspace:
     loaded : Loaded, optional
         The model on show: that of the document, or the one before while that is being read.
     messages : deque of Message
+    failure : Exception, optional
+        The first error that was told, by which a script fails.
     recent : list of str
     size : (width, height)
         Of the viewport in pixels.
@@ -77,6 +79,7 @@ class Workspace:
         self.history = History(document or Document())
         self.loaded: Loaded | None = None
         self.messages: deque[Message] = deque(maxlen=MAX_MESSAGES)
+        self.failure: Exception | None = None
         self.recent: list[str] = []
         self.size = (1280, 720)
         self.measured: Measured | None = None
@@ -115,7 +118,7 @@ class Workspace:
         try:
             self._set(self.history.done(action))
         except TranslucentError as error:
-            self.tell("error", str(error))
+            self.refuse(error)
         return None
 
     def undo(self) -> None:
@@ -143,7 +146,7 @@ class Workspace:
         try:
             document = load_session(path)
         except TranslucentError as error:
-            return self.tell("error", str(error))
+            return self.refuse(error)
         return self.open(document.model, document)
 
     def save_session(self, path: str) -> None:
@@ -155,7 +158,7 @@ class Workspace:
         try:
             work()
         except TranslucentError as error:
-            self.tell("error", str(error))
+            self.refuse(error)
         else:
             self.tell("info", done)
 
@@ -173,7 +176,7 @@ class Workspace:
     def update(self) -> None:
         """Take over what the background has done, and ask it for what is missing."""
         for lane in self.lanes.values():
-            lane.poll(lambda text: self.tell("error", text))
+            lane.poll(self.refuse)
         if self.loaded is None or self.document.model != self.loaded.model:
             self._want(self.document.model)
 
@@ -259,7 +262,7 @@ class Workspace:
         try:
             check_export(path)
         except TranslucentError as error:
-            return self.tell("error", str(error))
+            return self.refuse(error)
 
         def write(task: Task) -> None:
             try:
@@ -276,10 +279,16 @@ class Workspace:
 
     def _write(self, path: str, work: Callable[[Task], object]) -> None:
         if (other := self.lanes["write"].task) is not None:
-            return self.tell("error", f"{path!r} is not written: {other.name} is under way; wait for it, or cancel it")
+            found = f"{other.name} is under way"
+            return self.refuse(RenderError(f"{path!r} is not written", found, "wait for it, or cancel it"))
         done = f"wrote {path}"
         self.lanes["write"].start(f"writing {Path(path).name}", work, lambda _: self.tell("info", done))
         return None
+
+    def refuse(self, error: Exception) -> None:
+        """Tell why something was not done."""
+        self.failure = self.failure or error
+        self.tell("error", problem(error))
 
     def tell(self, kind: Literal["info", "warning", "error"], text: str) -> None:
         """A line for the user, unless it is what the last one said."""

@@ -6,7 +6,7 @@ from translucent.reference.march import march
 from translucent.reference.path_trace import path_trace
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refraction import bent_light
-from translucent.reference.render import hit_counts, render, shade_hits
+from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "hit_counts",
     "line_hits",
     "march",
+    "opaque_counts",
     "path_trace",
     "pixel_rays",
     "render",

@@ -248,6 +248,23 @@ def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
     return counts.reshape(height, width)
 
 
+def opaque_counts(scene: Scene, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], ...]:
+    """Two images (h, w): how many opaque surfaces each pixel's ray crosses, and of which object the nearest is.
+
+    Where neither changes, no edge of an opaque object is seen. Empty, if the scene has none.
+    """
+    if not scene.opaque:
+        return ()
+    width, height = check_size(size)
+    hits = scene_hits(scene, (width, height))
+    counts = np.zeros(width * height, dtype=np.int64)
+    for body, line in zip(scene.objects, hits, strict=True):
+        if body.medium is None:
+            counts += np.bincount(line.pixel, minlength=len(counts))
+    nearest = nearest_opaque(scene, hits, width * height).item
+    return counts.reshape(height, width), nearest.reshape(height, width)
+
+
 def scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
     """All surfaces of each object on the pixel rays, as `line_hits` gives them."""
     return [line_hits(body.mesh, body.matrix, scene.camera, size) for body in scene.objects]

@@ -13,6 +13,9 @@ from translucent.bench.row import Quantity, Row
 #: a tenth of a millimeter on a body of a meter.
 GOOD_ENOUGH: Mapping[Quantity, float] = {"thickness": 1e-4, "transmittance": 1 / 255, "radiance": 1 / 255}
 
+#: Times that, up to which the error of one pixel in a thousand may be: beyond it, flaws are few but plain.
+WORST = 10.0
+
 #: Share of the covered pixels that a method may mark as invalid and still be advised.
 MAX_INVALID = 1e-3
 
@@ -48,7 +51,7 @@ def advise(case: CaseRecord) -> Advice | None:
     kept = [row for row in measured if (row.invalid or 0.0) <= MAX_INVALID]
     # Without OpenGL only where nothing else runs.
     usable = [row for row in kept if row.kind == "method"] or [row for row in kept if row.kind == "cpu"]
-    good = [row for row in usable if _error(row, case) <= GOOD_ENOUGH[case.quantity]]
+    good = [row for row in usable if _good_enough(row, case)]
     if not usable:
         return None
     if good:
@@ -98,6 +101,11 @@ def summarize(cases: Sequence[tuple[CaseRecord, Advice | None]]) -> list[Summary
         costs = [_cost(row) for _, row in members]
         found.append(Summary(members[0][1], tuple(case.title for case, _ in members), (min(costs), max(costs))))
     return found
+
+
+def _good_enough(row: Row, case: CaseRecord) -> bool:
+    errors, limit = row.errors(case.quantity), GOOD_ENOUGH[case.quantity]
+    return errors is not None and errors.rms <= limit and errors.p999 <= WORST * limit
 
 
 def _cost(row: Row) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 
 from translucent.bench.frontier import ERROR_FLOOR, error_of
 from translucent.bench.page import numbers
-from translucent.bench.page.advice import GOOD_ENOUGH, MAX_INVALID, advise, summarize
+from translucent.bench.page.advice import GOOD_ENOUGH, MAX_INVALID, WORST, advise, summarize
 from translucent.bench.page.figure import require_packages
 from translucent.bench.page.pareto import UNITS, identifier, pareto_svg, plotted
 from translucent.bench.page.pictures import data_address, heat_map, scale_colors
@@ -17,6 +17,7 @@ from translucent.bench.page.scaling import AXES, axis_groups, scaling_svg
 from translucent.bench.page.swatch import swatch
 from translucent.bench.page.theme import css_variables
 from translucent.bench.record import CaseRecord, Report
+from translucent.bench.seeing import seen_words
 from translucent.paths import write_text_atomically
 
 #: Rows of a legend that stands beside its plot; longer ones stand below.
@@ -56,6 +57,7 @@ def build_page(report: Report) -> str:
         ],
         scale=scale_colors(),
         good_enough=GOOD_ENOUGH,
+        worst=WORST,
         max_invalid=MAX_INVALID,
         error_floor=ERROR_FLOOR,
         units=UNITS,
@@ -84,6 +86,7 @@ def _environment() -> Any:
         count=numbers.count_text,
         rounded=numbers.rounded_text,
         data=data_address,
+        seen=seen_words,
     )
     environment.globals.update(swatch=swatch)
     return environment

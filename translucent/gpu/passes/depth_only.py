@@ -9,17 +9,17 @@ from translucent.gpu.shaders import build_program
 
 
 class DepthOnlyPass:
-    """Draws all objects, both sides, into a depth buffer. The job must be placed ``with_depth``."""
+    """Draws objects, both sides, into a depth buffer. The job must be placed ``with_depth``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._program = build_program(
             gl, "geometry/body.vert", "thickness/depth_only.frag", {"WITH_NORMAL": 0, "WITH_POSITION": 0}
         )
 
-    def run(self, job: FrameJob) -> None:
-        """Draw everything with the depth test on."""
+    def run(self, job: FrameJob, objects: tuple[int, ...]) -> None:
+        """Draw them with the depth test on."""
         framebuffer = job.targets.depth_only()
         framebuffer.use()
         job.gl.enable_only(moderngl.DEPTH_TEST)
         framebuffer.clear(depth=1.0)
-        job.draw(self._program, tuple(range(len(job.scene.objects))))
+        job.draw(self._program, objects)

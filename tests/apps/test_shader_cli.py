@@ -1,0 +1,74 @@
+"""``translucent shader``: GLSL to be used elsewhere, and what it asks for."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+
+from tests.command_line import Run, one_error_line, strict_json
+from translucent.assets import shader_names
+
+SIGNED = ("signed_depth", "--define", "OPAQUE=0", "--define", "SPECTRAL=1")
+
+
+@pytest.fixture
+def run(run: Run) -> Run:
+    return partial(run, "shader")
+
+
+def test_without_a_name_all_are_listed_with_their_switches(run: Run) -> None:
+    code, out, err = run()
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines()}
+    assert list(rows) == shader_names()
+    assert rows["thickness/signed_depth.frag"] == ["OPAQUE", "SPECTRAL"]
+    assert rows["lib/optics.glsl"] == []
+    assert {row["name"]: row["switches"] for row in strict_json(run("--json").out)["shaders"]} == rows
+
+
+def test_a_name_prints_one_text(run: Run) -> None:
+    code, out, err = run(*SIGNED)
+    assert (code, err) == (0, "")
+    assert out.startswith("#version 330 core\n")
+    assert "out vec4 optical_depth_and_count;" in out
+    told = strict_json(run(*SIGNED, "--json").out)
+    assert told["text"] == out
+    assert told["defines"] == {"OPAQUE": 0, "SPECTRAL": 1}
+    assert told["version"] == 330
+    assert told["files"][-1] == "thickness/signed_depth.frag" or "thickness/signed_depth.frag" in told["files"]
+
+
+def test_a_switch_without_a_value_is_on(run: Run) -> None:
+    assert run("signed_depth", "--define", "SPECTRAL", "--define", "OPAQUE=0") == run(*SIGNED)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["signed_depth"], "it asks for 2 switches more; add --define OPAQUE=0 --define SPECTRAL=0, or other values"),
+        (["signed_depth", "--define", "OPAQUE=0"], "it asks for 1 switch more; add --define SPECTRAL=0"),
+        ([*SIGNED, "--define", "SPECTRUM=1"], "no switch SPECTRUM is in it; switches: OPAQUE, SPECTRAL"),
+        (["optics", "--define", "FAST=1"], "no switch FAST is in it; switches: it has none"),
+        (["signed_depth", "--define", "OPAQUE=yes"], "--define 'OPAQUE=yes'; not a name with a whole number"),
+        (["signed_depth", "--define", "=1"], "--define '=1'; not a name with a whole number"),
+        (["--define", "OPAQUE=1"], "--define OPAQUE=1; no shader is named; add its NAME"),
+        (["../README.md"], "no such shader"),
+        (["opticz"], "did you mean optics?"),
+    ],
+    ids=lambda v: " ".join(v) if isinstance(v, list) else None,
+)
+def test_bad_usage_is_one_line(run: Run, arguments: list[str], message: str) -> None:
+    assert message in one_error_line(run(*arguments))
+
+
+def test_values_that_a_shader_refuses_are_told_in_its_words(run: Run) -> None:
+    given = ["BORDERS", "EMISSION", "MARCH", "PRIORITY", "SCATTER", "SLOTS", "UNION", "VARIES", "GRADIENT", "OPAQUE"]
+    options = [word for key in given for word in ("--define", f"{key}=0")]
+    assert "a walk needs a slot; give other values" in one_error_line(run("fragment_lists_resolve", *options))
+    options[options.index("SLOTS=0")] = "SLOTS=2"
+    assert "winding[SLOTS]" in run("fragment_lists_resolve", *options).out
+
+
+def test_help_has_an_example(run: Run) -> None:
+    assert "Example: translucent shader" in run("--help").out

@@ -1,0 +1,120 @@
+"""Why a picture is black, in words: a file whose unit is not what it was taken for, or a medium too dense for it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+
+from translucent.units import METRES_PER_UNIT, metres_per_unit
+
+if TYPE_CHECKING:
+    from translucent.frame import Frame
+    from translucent.medium import Medium
+    from translucent.scene import Scene
+
+#: Below these shares of light, passed straight or scattered back, a picture shows little but black.
+NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
+
+#: Of light that passes, what makes a picture that shows its medium.
+SHOWS_MEDIUM = (0.05, 0.97)
+
+#: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.
+LARGE, USUAL = 0.5, (0.01, 1.0)
+
+#: Units that files are in, and what they are called.
+_FILE_UNITS = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}
+
+
+def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> None:
+    """Say so where hardly any light passes, or is scattered back, and what may be the reason.
+
+    Parameters
+    ----------
+    scene : Scene
+    frame : Frame
+        Of it.
+    unit : str
+        That the file was taken to be in.
+    own : bool
+        The model comes with the toolkit, so that its unit is known.
+    """
+    seen = frame.coverage & frame.valid
+    if not seen.any():
+        return
+    passed = float(frame.transmittance[seen].mean())
+    if passed >= NEARLY_BLACK or any(_given_back(scene, medium) >= HARDLY_LIT for medium in _media(scene)):
+        return
+    depth = frame.optical_depth[seen].astype(np.float64)
+    low, high = (
+        np.min([body.bounds[0] for body in scene.bodies], 0),
+        np.max([body.bounds[1] for body in scene.bodies], 0),
+    )
+    thickness = float(np.median(frame.thickness[seen]))
+    # Of the channel that gets farthest.
+    clearest = float(np.median(depth, axis=0).min())
+    tenth = thickness * math.log(10.0) / clearest if clearest > 0 else math.inf
+    click.echo(
+        f"warning: only {passed:.2%} of the light passes: the model is {_extent(high - low)} and {_length(thickness)} "
+        f"thick at the median, and this medium leaves a tenth of the light after {_length(tenth)}; "
+        + (_other_unit(high - low, depth, unit, own) or _clearer(clearest)),
+        err=True,
+    )
+
+
+def _other_unit(size: np.ndarray, depth: np.ndarray, unit: str, own: bool) -> str:
+    """The unit in which the model would be of a usual size, and the medium would show; nothing if there is none."""
+    if own or size.max() < LARGE:
+        return ""
+    for name, words in _FILE_UNITS.items():
+        scale = METRES_PER_UNIT[name] / metres_per_unit(unit)
+        with np.errstate(under="ignore"):
+            passes = float(np.exp(-scale * depth).mean())
+        usual = scale < 1 and USUAL[0] <= scale * size.max() <= USUAL[1]
+        if usual and SHOWS_MEDIUM[0] <= passes <= SHOWS_MEDIUM[1]:
+            return f"is the file in {words}? With --unit {name} it is {_extent(scale * size)}, and {passes:.0%} passes"
+    return ""
+
+
+def _clearer(depth: float) -> str:
+    """By how much the medium would have to be clearer, where its clearest channel is so deep."""
+    times = float(f"{depth / math.log(5.0):.2g}")
+    return f"in a medium {times:.3g} times as clear (a color at a --distance so much longer), a fifth would pass"
+
+
+def _media(scene: Scene) -> list[Medium]:
+    """Those that give back what they scatter many times."""
+    return [
+        body.medium
+        for body in scene.bodies
+        if body.medium is not None and body.surface is not None and body.surface.multiple_scattering
+    ]
+
+
+def _given_back(scene: Scene, medium: Medium) -> float:
+    """Luminance of what a body as large as the scene gives back of white light."""
+    from translucent.color import luminance
+    from translucent.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
+
+    absorbed = two_stream_absorption(medium.absorption) * scene.diagonal
+    turned = two_stream_scattering(medium.scattering, medium.anisotropy) * scene.diagonal
+    return float(luminance(two_stream_reflectance(absorbed, turned)))
+
+
+def _extent(size: np.ndarray) -> str:
+    unit, scale = _unit(float(size.max()))
+    return f"{' x '.join(f'{value / scale:.3g}' for value in size)} {unit}"
+
+
+def _length(metres: float) -> str:
+    unit, scale = _unit(metres)
+    return f"{metres / scale:.3g} {unit}"
+
+
+def _unit(metres: float) -> tuple[str, float]:
+    """In which a length is read best."""
+    return next(
+        ((name, METRES_PER_UNIT[name]) for name in ("m", "cm", "mm") if metres >= METRES_PER_UNIT[name]), ("um", 1e-6)
+    )

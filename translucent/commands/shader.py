@@ -1,0 +1,56 @@
+"""``translucent shader``: the GLSL of the toolkit, to be used elsewhere."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from translucent.commands.common import common_options
+from translucent.errors import InputError
+
+
+@click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0")
+@click.argument("name", required=False)
+@click.option("--define", "defines", multiple=True, metavar="X=1", help="Value of a switch, once for each that it has.")
+@common_options
+def shader(name: str | None, defines: tuple[str, ...], as_json: bool) -> None:
+    """Print the shader NAME as one text, with its constants and includes in place and without what it does not use.
+
+    NAME is a file under shaders/, or its name alone where no other has it. Without NAME, all are listed, with the
+    switches that they ask for.
+    """
+    from translucent.gpu.lifting import find_shader, lift
+
+    given = dict(map(_define, defines))
+    if name is None:
+        if given:
+            raise InputError(f"--define {defines[0]}", "no shader is named", "add its NAME")
+        return _list(as_json)
+    lifted = lift(find_shader(name), given)
+    if not as_json:
+        return click.echo(lifted.text, nl=False)
+    told = {"name": lifted.name, "version": lifted.version, "defines": lifted.defines, "files": lifted.files}
+    return click.echo(json.dumps({**told, "text": lifted.text}))
+
+
+def _list(as_json: bool) -> None:
+    from translucent.assets import shader_names
+    from translucent.gpu.lifting import switches
+
+    found = {name: switches(name) for name in shader_names()}
+    if as_json:
+        rows = [{"name": name, "switches": asked} for name, asked in found.items()]
+        return click.echo(json.dumps({"shaders": rows}))
+    wide = max(map(len, found))
+    for name, asked in found.items():
+        click.echo(f"{name:<{wide}}  {' '.join(asked)}".rstrip())
+    return None
+
+
+def _define(text: str) -> tuple[str, int]:
+    """A switch and its value; one that is only named is on."""
+    key, equals, value = text.partition("=")
+    if not (key.isidentifier() and (value.isdecimal() if equals else True)):
+        raise InputError(f"--define {text!r}", "not a name with a whole number", "write for example --define OPAQUE=0")
+    return key, int(value) if equals else 1
