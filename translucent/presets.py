@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from translucent.color import to_hex
 from translucent.errors import InputError
 from translucent.medium import Medium
+from translucent.reading import toml_value
 from translucent.units import metres_per_unit, parse_length
 
 Array = npt.NDArray[np.float64]
@@ -231,8 +231,8 @@ def read_presets(text: str, file: str = "presets.toml") -> dict[str, Preset]:
         If an entry lacks a key, has an unknown one or a value of the wrong type, or a name is given twice.
     """
     try:
-        entries = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        entries = toml_value(text)
+    except ValueError as error:
         raise InputError(file, f"no TOML: {error}", "correct the file") from None
     found = {name: _Entry(file, name, entry).preset() for name, entry in entries.items()}
     taken = set(found)

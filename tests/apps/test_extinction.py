@@ -296,8 +296,8 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--batch", "none.csv"], "table 'none.csv'; cannot be read (No such file or directory)"),
-        (["--batch", "."], "table '.'; cannot be read"),
+        (["--batch", "none.csv"], "table 'none.csv'; no such file"),
+        (["--batch", "."], "table '.'; it is a folder"),
         (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': it is empty"),
         (["--batch", "head.csv"], "table 'head.csv'; no rows; give at least one"),
         (["--batch", "few.csv"], "no column 'distance': its first line says name, color"),
@@ -315,7 +315,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["gray", "1cm", "--as", "word"], "'word' is not one of"),
         (["gray", "--from", "dict.json"], "--from with COLOR; each asks for something else"),
         (["--preset", "jade", "--from", "dict.json"], "--from with --preset"),
-        (["--from", "none.mtlx"], "material 'none.mtlx'; cannot be read (No such file or directory)"),
+        (["--from", "none.mtlx"], "material 'none.mtlx'; no such file"),
         (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json file"),
         (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
         (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),

@@ -132,7 +132,7 @@ def test_grids_that_cannot_be(values: Any, found: str) -> None:
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match=r"^density grid '.*no\.npy'; it cannot be read \(No such file"):
+    with pytest.raises(tl.InputError, match=r"^density grid '.*no\.npy'; no such file; check the path"):
         tl.DensityGrid.load(tmp_path / "no.npy")
     (tmp_path / "text.npy").write_text("smoke")
     with pytest.raises(tl.InputError, match="not a NumPy array"):

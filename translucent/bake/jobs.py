@@ -37,7 +37,7 @@ from translucent.frame import remove_partial
 from translucent.gltf.load import SUFFIXES
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
-from translucent.paths import require_file
+from translucent.reading import read_bytes
 from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
@@ -132,11 +132,7 @@ def content_hash(job: Job) -> str:
 
 def _parts(path: Path) -> list[bytes]:
     """A file and, of a .gltf, what it links to."""
-    require_file(path, f"mesh {str(path)!r}")
-    try:
-        data = [path.read_bytes()]
-    except OSError as error:
-        raise InputError(f"mesh {str(path)!r}", f"it cannot be read ({error.strerror})", "check its rights") from error
+    data = [read_bytes(path, f"mesh {str(path)!r}")]
     if path.suffix.lower() in SUFFIXES:
         from translucent.materials.gltf_file import read_gltf
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.reading import json_value
 
 #: Of an array, in characters once decoded: a damaged file must not fill the memory.
 _LARGEST = 1 << 28
@@ -86,7 +87,7 @@ def decode(kind: type[T], text: str, name: str, file_format: str, version: int) 
         If the text is no JSON, says another format or version, or a field is missing, unknown or of another type.
     """
     try:
-        found = json.loads(text)
+        found = json_value(text)
     except ValueError as error:
         raise InputError(
             f"reading {name}", f"it is cut off or no JSON ({error})", "give a report.json that was written completely"

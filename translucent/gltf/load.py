@@ -62,7 +62,14 @@ class GltfScene(Scene):
     left_out: tuple[str, ...] = ()
 
 
-def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: tuple[int, int] = (1, 1)) -> GltfScene:
+def load_scene(
+    path: str | Path,
+    unit: str = "m",
+    camera: int | None = 0,
+    size: tuple[int, int] = (1, 1),
+    *,
+    allow_outside: bool = False,
+) -> GltfScene:
     """Read a scene from a .gltf or .glb file: its objects with their media, one camera, and its lights.
 
     Parameters
@@ -77,6 +84,8 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
         cameras.
     size : (width, height)
         Size of the picture in pixels, which the framing depends on; a wider picture shows all objects, too.
+    allow_outside : bool
+        Whether buffers and images may lie outside the file's folder: only for files that you trust.
 
     Returns
     -------
@@ -94,7 +103,7 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
         transform of a light or of the camera is singular; if there is no such camera.
     """
     metres = metres_per_unit(unit)
-    file = _read(path)
+    file = _read(path, allow_outside)
     left_out = LeftOut()
     _check_extensions(file, left_out)
     with np.errstate(under="ignore"):
@@ -113,14 +122,14 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
     return GltfScene(objects, view, lights, environment, left_out=lost)
 
 
-def _read(path: str | Path) -> GltfFile:
+def _read(path: str | Path, allow_outside: bool) -> GltfFile:
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(
             f"scene {str(path)!r}",
             f"suffix {Path(path).suffix!r}, and scenes are glTF files",
             "give a .glb or .gltf file, or read a mesh with tl.load_mesh",
         )
-    return read_gltf(path)
+    return read_gltf(path, allow_outside)
 
 
 def _check_extensions(file: GltfFile, left_out: LeftOut) -> None:
@@ -163,9 +172,12 @@ def _scene_nodes(file: GltfFile, left_out: LeftOut) -> Iterator[int]:
     for i in range(len(scenes)):
         if i != chosen:
             left_out.add("other scenes", label(scenes, i))
-    pending = roots[::-1]
+    pending, seen = roots[::-1], set()
     while pending:
         index = pending.pop()
         node = file.item("nodes", index)
+        if index in seen:
+            continue
+        seen.add(index)
         yield index
         pending += node.get("children", [])[::-1]
