@@ -54,9 +54,7 @@ def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
     """
     require_file(Path(path), asked)
     try:
-        # What was a file a moment ago may be a pipe now, which this does not wait for.
-        flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        stream = os.fdopen(os.open(path, flags), "rb")
+        stream = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
     except OSError as error:
         raise InputError(asked, f"it cannot be read ({error.strerror})", "check its permissions") from None
     found = os.fstat(stream.fileno())
@@ -66,6 +64,11 @@ def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
     if not stat.S_ISREG(found.st_mode):
         raise InputError(asked, "it is no file", "give a regular file")
     raise InputError(asked, f"it has {size_text(found.st_size)}, more than {size_text(limit)}", "split it, or check it")
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open what was a file a moment ago, and does not wait if it has become a pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_bytes(path: str | Path, asked: str, limit: int = MAX_FILE) -> bytes:
@@ -197,8 +200,8 @@ def _whole(text: str) -> int:
 
 def _require_shallow(value: Any) -> None:
     """Raise `ValueError` where lists and objects are nested too deeply, or a whole number is too long."""
-    level = [value]
-    for _ in range(MAX_DEPTH):
+    level: list[Any] = [[value]]
+    for _ in range(MAX_DEPTH + 1):
         inner: list[Any] = []
         for holder in level:
             children: Iterable[Any] = holder.values() if isinstance(holder, dict) else holder

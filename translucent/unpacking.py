@@ -137,7 +137,7 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
         width, height, _ = sizes[0]
         require_room(asked, f"{width}x{height} pixels", sum(4 * w * h * n for w, h, n in sizes), stored)
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            return file.header(), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+            return dict(file.header()), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except InputError:
         raise
     except Exception as error:  # of the library's C++

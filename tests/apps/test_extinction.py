@@ -320,7 +320,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
         (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),
         (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; not a known unit"),
-        (["none.png@1,2", "1cm"], "pixel 1,2 of 'none.png'; No such file or directory"),
+        (["none.png@1,2", "1cm"], "pixel 1,2 of 'none.png'; no such file"),
         (["linear(-.1,1,1)", "1cm", "--clamp"], "red = -0.1 is not in 0 < t <= 1"),
         (["--fit", "few.csv"], "no column 'distance'"),
         (["--fit", "good.csv", "--clamp"], "--clamp; a sample made up would bend --fit"),

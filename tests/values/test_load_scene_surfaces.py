@@ -15,6 +15,7 @@ from PIL import Image
 import translucent as tl
 from translucent import reading
 from translucent.color import srgb_to_linear
+from translucent.gltf import images
 from translucent.materials.gltf_texture import TextureTransform
 from translucent.materials.gltf_texture import sample as sample_gltf
 
@@ -359,7 +360,7 @@ def test_a_missing_picture_is_refused_by_name(tmp_path: Path) -> None:
 def test_a_picture_beyond_all_measure_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "FREE", 40)
     monkeypatch.setattr(reading, "RATIO", 0)
-    with pytest.raises(tl.InputError, match="4x3 pixels take 48 bytes; .* at most 40 bytes are read; make it smaller"):
+    with pytest.raises(tl.InputError, match=r"4x3 pixels take 48 bytes; .* at most 40 bytes are read; make it smaller"):
         tl.load_scene(plate(tmp_path, base_color(), png(PICTURE)))
 
 

@@ -49,6 +49,15 @@ def unit_option(command: F) -> F:
     )(command)
 
 
+def outside_option(command: F) -> F:
+    """Option for files that a model links to."""
+    return click.option(
+        "--allow-outside",
+        is_flag=True,
+        help="Read files that MODEL links to wherever they are, not only below its folder. For models that you trust.",
+    )(command)
+
+
 def borders_option(command: F) -> F:
     """Option for where rays bend."""
     return click.option(

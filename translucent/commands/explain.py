@@ -11,6 +11,7 @@ from translucent.commands.common import (
     borders_option,
     common_options,
     medium_options,
+    outside_option,
     read_medium,
     read_method,
     unit_option,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 @click.argument("model")
 @medium_options
 @unit_option
+@outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
 @borders_option
 @common_options
@@ -36,6 +38,7 @@ def explain(
     distance: str | None,
     preset_name: str | None,
     unit: str,
+    allow_outside: bool,
     method_name: str | None,
     borders: Borders,
     as_json: bool,
@@ -47,7 +50,7 @@ def explain(
     from translucent.plan import plan
 
     medium = read_medium(color, distance, preset_name)
-    scene = read_scene(model, unit, medium)
+    scene = read_scene(model, unit, medium, allow_outside=allow_outside)
     method = read_method(method_name, None)
     chosen = plan(scene, method, borders=borders) if scene.bodies else None
     if as_json:

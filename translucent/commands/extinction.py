@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, read_medium, triple_text
+from translucent.commands.common import common_options, outside_option, read_medium, triple_text
 from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
 
@@ -38,6 +38,7 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx, .usda or .json material instead.")
 @click.option("--on", "model", metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above.")
 @click.option("--eye", metavar="X,Y,Z", help="Of --on: where it is seen from, in metres. Default: as render shows it.")
+@outside_option
 @common_options
 @click.pass_context
 def extinction(
@@ -55,6 +56,7 @@ def extinction(
     source: str | None,
     model: str | None,
     eye: str | None,
+    allow_outside: bool,
     as_json: bool,
 ) -> None:
     """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance.
@@ -91,7 +93,7 @@ def extinction(
     if medium is None and (color is None or (distance is None and model is None)):
         missing = "'COLOR'" if color is None else "'DISTANCE'"
         raise click.MissingParameter(ctx=context, param_hint=missing, param_type="argument")
-    frame = None if model is None else thickness_on(model, unit, eye)
+    frame = None if model is None else thickness_on(model, unit, eye, allow_outside)
     told, medium = _convert(medium, color, distance, frame, unit, unit_out, clamp)
     stated = told["distance"]
     if model is not None and frame is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from translucent.commands.common import common_options, medium_options, read_medium, triple_text
+from translucent.commands.common import common_options, medium_options, outside_option, read_medium, triple_text
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def _texture_text(entry: GltfMaterial) -> str:
     help="Only the objects of this name. Default: all that light enters, or all.",
 )
 @click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
+@outside_option
 @common_options
 def apply(
     model: str,
@@ -81,6 +82,7 @@ def apply(
     preset_name: str | None,
     object_name: str | None,
     thickness: str | None,
+    allow_outside: bool,
     as_json: bool,
 ) -> None:
     """Write a medium into MODEL's materials; a color leaves them their index of refraction, a preset brings its own."""
@@ -98,6 +100,7 @@ def apply(
         object_name=object_name,
         thickness=None if thickness is None else parse_length(thickness),
         keep_ior=preset_name is None,
+        allow_outside=allow_outside,
     )
     if as_json:
         click.echo(json.dumps({"output": str(output), "materials": changed}))

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import click
 
-from translucent.commands.common import common_options, read_size, unit_option
+from translucent.commands.common import common_options, outside_option, read_size, unit_option
 from translucent.errors import InputError
 
 
 @click.command(epilog="Example: translucent preview goblet")
 @click.argument("model", required=False)
 @unit_option
+@outside_option
 @click.option("--session", type=click.Path(path_type=Path), metavar="FILE", help="Begin with a session, a .toml file.")
 @click.option("--size", default="1600x1000", show_default=True, metavar="WxH", help="Size of the window.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Makes letters and fields larger.")
@@ -24,6 +25,7 @@ from translucent.errors import InputError
 def preview(
     model: str | None,
     unit: str,
+    allow_outside: bool,
     session: Path | None,
     size: str,
     scale: float,
@@ -52,7 +54,8 @@ def preview(
         document = dataclasses.replace(document, model=Model(model, unit))
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
     require_display()
-    work = run(document, pixels, scale, todo, str(screenshot) if screenshot is not None else None)
+    shot = str(screenshot) if screenshot is not None else None
+    work = run(document, pixels, scale, todo, shot, allow_outside)
     if as_json:
         told = [{"kind": message.kind, "text": message.text} for message in work.messages]
         click.echo(json.dumps({"model": work.document.model.path, "messages": told}))

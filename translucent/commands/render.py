@@ -14,6 +14,7 @@ from translucent.commands.common import (
     common_options,
     look_options,
     medium_options,
+    outside_option,
     read_environment,
     read_medium,
     read_method,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 )
 @medium_options
 @unit_option
+@outside_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
 @click.option(
     "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
@@ -70,6 +72,7 @@ def render(
     distance: str | None,
     preset_name: str | None,
     unit: str,
+    allow_outside: bool,
     size: str,
     camera: int | None,
     eye: str | None,
@@ -112,7 +115,8 @@ def render(
     medium = read_medium(color, distance, preset_name)
     method = read_method(method_name, thickness)
     view = View(camera, eye, target, up, fov)
-    scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background), roughness)
+    lit = read_environment(environment, background)
+    scene = read_scene(model, unit, medium, view, pixels, lit, roughness, allow_outside=allow_outside)
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, read_size, unit_option
+from translucent.commands.common import common_options, outside_option, read_size, unit_option
 from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
@@ -31,6 +31,7 @@ PATH = click.Path(path_type=Path)
 @click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
 @click.option("--compare", "old", type=PATH, metavar="JSON", help="Tell what got slower or less accurate since this.")
 @unit_option
+@outside_option
 @click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
 @common_options
 def report(
@@ -42,6 +43,7 @@ def report(
     source: Path | None,
     old: Path | None,
     unit: str,
+    allow_outside: bool,
     backend: str | None,
     as_json: bool,
 ) -> None:
@@ -64,7 +66,7 @@ def report(
     if output is not None:
         check_folder(output)
     if made is None:
-        made = _measured(models, output, quick, size, methods, unit, backend)
+        made = _measured(models, output, quick, size, methods, unit, backend, allow_outside)
     files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
@@ -91,6 +93,7 @@ def _measured(
     methods: str | None,
     unit: str,
     backend: str | None,
+    allow_outside: bool,
 ) -> Report:
     """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
     from translucent.bench.files import write_report
@@ -98,7 +101,7 @@ def _measured(
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
-    scenes = {model: read_scene(model, unit, None, size=pixels) for model in models}
+    scenes = {model: read_scene(model, unit, None, size=pixels, allow_outside=allow_outside) for model in models}
     for model, scene in scenes.items():
         require_translucent(model, scene)
 

@@ -24,11 +24,11 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 class Accessors:
-    """Arrays of a file, by the index of their accessor; all of them together may take what `require_room` allows."""
+    """Arrays of a file, by the index of their accessor; what is made of them may take what `require_room` allows."""
 
     def __init__(self, file: GltfFile) -> None:
         self.file = file
-        self._taken = 0
+        self._kept = 0
 
     def vectors(self, index: object, kind: str) -> Array:
         """(n, width) float64: an accessor of vectors of this kind, such as ``"VEC3"``.
@@ -63,10 +63,10 @@ class Accessors:
         count, dtype = whole(self.file, where, entry, "count"), self._dtype(where, entry)
         if count > MAX_INDEX:
             raise refused(self.file, f"{where} has {count} elements", "split the mesh")
-        self._take(where, 8 * count * _WIDTHS[kind])
         if "bufferView" in entry:
             found = self._block(where, entry, dtype, count, _WIDTHS[kind])
         elif "sparse" in entry:
+            self._require_room(f"{where}: {count} elements", 8 * count * _WIDTHS[kind])
             found = np.zeros((count, _WIDTHS[kind]), dtype)
         else:
             raise refused(self.file, f"{where} has no data", "export the file without compression")
@@ -74,11 +74,13 @@ class Accessors:
             found = self._replaced(where, section(self.file, where, entry, "sparse"), found)
         return found, entry
 
-    def _take(self, where: str, size: int) -> None:
-        """Count what an accessor takes; that many share one buffer makes no small file a large one."""
-        self._taken += size
-        asked = f"glTF {str(self.file.path)!r}"
-        require_room(asked, f"{where} and those before it", self._taken, self.file.stored, "split the file")
+    def keep(self, what: str, size: int) -> None:
+        """Count the bytes of a mesh that is kept: many that share one buffer make no small file a large one."""
+        self._kept += size
+        self._require_room(f"{what} and what was read before it", self._kept)
+
+    def _require_room(self, what: str, size: int) -> None:
+        require_room(f"glTF {str(self.file.path)!r}", what, size, self.file.stored, "split the file")
 
     def _replaced(self, where: str, sparse: Json, stored: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """A copy of `stored` with those elements exchanged that a sparse accessor lists."""

@@ -105,9 +105,9 @@ def load_scene(
     metres = metres_per_unit(unit)
     file = _read(path, allow_outside)
     left_out = LeftOut()
-    _check_extensions(file, left_out)
+    check_extensions(file, left_out)
     with np.errstate(under="ignore"):
-        transforms = _scene_transforms(file, left_out)
+        transforms = scene_transforms(file, left_out)
         objects = scene_objects(file, transforms, metres, left_out)
         view = scene_camera(file, transforms, camera, metres, left_out) or framing(objects, size)
         lights = scene_lights(file, transforms, metres, left_out)
@@ -132,7 +132,7 @@ def _read(path: str | Path, allow_outside: bool) -> GltfFile:
     return read_gltf(path, allow_outside)
 
 
-def _check_extensions(file: GltfFile, left_out: LeftOut) -> None:
+def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
     """Refuse a file that cannot be read without what it requires, and note what it merely uses."""
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
@@ -147,7 +147,7 @@ def _check_extensions(file: GltfFile, left_out: LeftOut) -> None:
             left_out.add("extensions", name)
 
 
-def _scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
+def scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
     """Node to world of the nodes of the scene; raises `InputError` where one is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         world = node_transforms(file)
