@@ -62,6 +62,8 @@ def damaged_json(text: str, chance: random.Random) -> str:
     tree = json.loads(text)
     for _ in range(chance.randint(1, 3)):
         holders = [holder for holder in _holders(tree) if holder]
+        if not holders:
+            break
         holder = chance.choice(holders)
         key = chance.choice(list(holder) if isinstance(holder, dict) else range(len(holder)))
         match chance.randrange(5):
@@ -198,13 +200,13 @@ def attempt(reader: Reader, path: Path) -> str:
             warnings.simplefilter("ignore", tl.TranslucentWarning)
             reader.read(path)
     except tl.InputError as error:
-        text, cause = str(error), error.__cause__ or error.__context__
-        if isinstance(cause, MemoryError):
+        text = str(error)
+        if isinstance(error.__cause__, MemoryError):
             return "it asked for too much memory"
         if len(text) > LONGEST or not text.isprintable():
             return f"its message is {len(text)} characters long, or not printable: {text[:500]!r}"
         return "refused"
-    except (Exception, TooLongError):
+    except (Exception, TooLongError):  # noqa: BLE001
         return traceback.format_exc()
     return "read"
 

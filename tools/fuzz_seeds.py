@@ -26,8 +26,39 @@ from translucent.materials.gltf_write import write_medium
 from translucent.pixel import pixel_color
 from translucent.presets import read_presets
 from translucent.solids import Box
+from translucent.unpacking import PICTURES
 
 JADE = tl.Medium.from_color((0.2, 0.6, 0.4), 0.02, ior=1.5)
+
+TABLE = b'name,color,distance\nred,#7b1e3a,1cm\n"two, three","linear(.2,.6,.3)",2 in\n'
+ROWS = b'[{"name": "a", "color": [0.1, 0.2, 0.3], "distance": "1cm"}]'
+SESSION = b"""version = 1
+[model]
+path = "bear"
+unit = "m"
+[material]
+color = [0.1, 0.2, 0.3]
+ior = 1.5
+[look]
+light = true
+"""
+SCRIPT = b"""[[action]]
+do = "turn"
+right = 30.0
+up = 1
+[[action]]
+do = "change"
+field = "look.light"
+value = true
+"""
+PRESETS = b"""[wax]
+kind = "estimated"
+source = "me"
+ior = 1.4
+unit = "mm"
+absorption = [1, 2.5, 3]
+scattering = [1.0, 1, 1]
+"""
 
 
 class Reader(NamedTuple):
@@ -46,7 +77,7 @@ def picture(kind: str, mode: str = "RGB", size: tuple[int, int] = (16, 8)) -> by
 
 def gltf_tree(binary: bytes | None) -> tuple[dict[str, Any], bytes]:
     """JSON and buffer of a scene with what scenes have: a textured, sparse, transformed, lit body and a camera."""
-    box = Box((1, 1, 1)).tessellate(1)
+    box = Box((0, 0, 0), (1, 1, 1)).tessellate(1)
     parts = [
         box.vertices.astype("<f4").tobytes(),
         np.linspace(0, 1, 2 * len(box.vertices)).astype("<f4").tobytes(),
@@ -150,7 +181,7 @@ def _numpy(save: Callable[..., None], *arrays: Any, **named: Any) -> bytes:
 def _meshes() -> list[tuple[str, bytes]]:
     import trimesh
 
-    box = Box((1, 2, 3)).tessellate(2)
+    box = Box((0, 0, 0), (1, 2, 3)).tessellate(2)
     solid = trimesh.Trimesh(box.vertices, box.faces, process=False)
     found = []
     for kind, options in (("obj", {}), ("stl", {}), ("ply", {}), ("off", {}), ("ply", {"encoding": "ascii"})):
@@ -212,21 +243,10 @@ def readers(folder: Path) -> dict[str, Reader]:
     glb = ("scene.glb", packed_glb(*gltf_tree(b"")))
     text = ("scene.gltf", json.dumps(gltf_tree(None)[0]).encode())
     color = JADE.transmittance(0.02)
-    materials = {
-        name: text_block(target, JADE, color, 0.02).encode()
-        for name, target in (
-            ("a.usda", "usd"),
-            ("a.mtlx", "openpbr"),
-            ("b.mtlx", "standard_surface"),
-            ("a.json", "json"),
-        )
-    }
+    targets = {"a.usda": "usd", "a.mtlx": "openpbr", "b.mtlx": "standard_surface", "a.json": "json"}
+    materials = {name: text_block(target, JADE, color, 0.02).encode() for name, target in targets.items()}
     grid = np.linspace(0, 1, 24)
     map_values = {"scale": np.array(1.0), "offset": np.array(0.0), "values": np.ones((4, 4), np.float32)}
-    table = b'name,color,distance\nred,#7b1e3a,1cm\n"two, three","linear(.2,.6,.3)",2 in\n'
-    session = b'version = 1\n[model]\npath = "bear"\nunit = "m"\n[material]\ncolor = [0.1, 0.2, 0.3]\nior = 1.5\n[look]\nlight = true\n'
-    script = b'[[action]]\ndo = "turn"\nright = 30.0\nup = 1\n[[action]]\ndo = "change"\nfield = "look.light"\nvalue = true\n'
-    presets = b'[wax]\nkind = "estimated"\nsource = "me"\nior = 1.4\nunit = "mm"\nabsorption = [1, 2.5, 3]\nscattering = [1.0, 1, 1]\n'
     return {
         "scene": Reader(tl.load_scene, [glb, text]),
         "gltf mesh": Reader(tl.load_mesh, [glb, text]),
@@ -246,14 +266,14 @@ def readers(folder: Path) -> dict[str, Reader]:
             ],
         ),
         "material": Reader(load_medium, list(materials.items())),
-        "table": Reader(_read_table, [("t.csv", table), ("t.json", b'[{"name": "a", "color": [0.1, 0.2, 0.3], "distance": "1cm"}]')]),
+        "table": Reader(_read_table, [("t.csv", TABLE), ("t.json", ROWS)]),
         "wedge": Reader(fit_wedge, [("w.csv", b"distance,color,weight\n1cm,#7b1e3a,1\n2cm,#3b0e1a,2\n")]),
-        "presets": Reader(lambda path: read_presets(path.read_text("utf-8", "replace")), [("p.toml", presets)]),
-        "session": Reader(_read_preview, [("s.toml", session)]),
-        "script": Reader(_read_script, [("s.toml", script)]),
+        "presets": Reader(lambda path: read_presets(path.read_text("utf-8", "replace")), [("p.toml", PRESETS)]),
+        "session": Reader(_read_preview, [("s.toml", SESSION)]),
+        "script": Reader(_read_script, [("s.toml", SCRIPT)]),
         "report": Reader(_read_report, [("report.json", report_text())]),
         "pixel": Reader(
             lambda path: pixel_color(path, 1, 1),
-            [(f"p.{kind.lower()}", picture(kind)) for kind in ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")],
+            [(f"p.{kind.lower()}", picture(kind)) for kind in PICTURES],
         ),
     }  # fmt: skip

@@ -299,13 +299,14 @@ class _Entry:
             return Medium.from_color(self._triple("color"), parse_length(self._text("distance")), ior=ior)
         per_metre = 1.0 / metres_per_unit(self._text("unit"))
         key = "reduced_scattering" if "reduced_scattering" in self.entry else "scattering"
-        scattering = np.array(self._triple(key) if key in self.entry else (0.0, 0.0, 0.0)) * per_metre
         for g in anisotropy:
             if not -1 < g < 1:
                 raise self._wrong("anisotropy", "between -1 and 1")
-        total = float(scattering.sum())
-        mean = float(scattering @ np.array(anisotropy)) / total if total > 0 else 0.0
-        absorption = np.array(self._triple("absorption")) * per_metre
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # a medium refuses what is not finite
+            scattering = np.array(self._triple(key) if key in self.entry else (0.0, 0.0, 0.0)) * per_metre
+            absorption = np.array(self._triple("absorption")) * per_metre
+            total = float(scattering.sum())
+            mean = float(scattering @ np.array(anisotropy)) / total if total > 0 else 0.0
         return Medium(absorption=absorption, scattering=scattering, anisotropy=mean, ior=ior)
 
     def _text(self, key: str) -> str:

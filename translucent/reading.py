@@ -75,7 +75,7 @@ def read_bytes(path: str | Path, asked: str, limit: int = MAX_FILE) -> bytes:
     """The content of a file; raises `InputError` like `open_file`."""
     with open_file(path, asked, limit) as stream:
         try:
-            return stream.read(limit)
+            return stream.read(os.fstat(stream.fileno()).st_size)
         except OSError as error:
             raise InputError(asked, f"it cannot be read ({error.strerror})", "check the disk") from None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import os
@@ -47,9 +48,11 @@ def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it wit
         version = form.read_magic(stream)
         read_header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
         shape, _, dtype = read_header(stream)
+    except MemoryError:  # what Python's parser says of too many brackets
+        raise InputError(asked, "not a NumPy array", do) from None
     except Exception as error:  # a header is Python, and what is broken in it raises whatever Python does
         raise InputError(asked, f"not a NumPy array ({shown(error)})", do) from error
-    if dtype.hasobject or dtype.kind not in "biufUS":
+    if dtype.hasobject or dtype.kind not in "biufU" or not dtype.itemsize:
         raise InputError(asked, f"its type is {str(dtype)!r}, not numbers", do)
     needed, held = math.prod(shape) * dtype.itemsize, size - stream.tell()
     if not 0 <= needed <= held:
@@ -136,7 +139,10 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
             sizes = [_exr_size(part.header) for part in file.parts]
         width, height, _ = sizes[0]
         require_room(asked, f"{width}x{height} pixels", sum(4 * w * h * n for w, h, n in sizes), stored)
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        # The library prints what is wrong with pixels, and leaves their part out.
+        with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:
+                raise InputError(asked, "its pixels are damaged", "copy the file again")
             return dict(file.header()), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except InputError:
         raise
