@@ -61,7 +61,7 @@ def _read_exr(path: Path) -> Pixels:
 def _read_encoded(path: Path) -> Pixels:
     asked = f"environment {str(path)!r}"
     try:
-        with open_file(path, asked) as file, open_picture(file, asked, ("PNG", "JPEG"), per_pixel=12) as image:
+        with open_file(path, asked) as file, open_picture(file, asked, ("PNG", "JPEG"), per_pixel=38) as image:
             encoded = np.asarray(image.convert("RGB"))
     except InputError:
         raise

@@ -77,7 +77,7 @@ def _header(path: str | Path, data: bytes) -> _Header:
     rows, columns = int(match[3]), int(match[6])
     if not rows * columns:
         raise _refused(path, f"{columns}x{rows} pixels", "save it again")
-    require_room(f"environment {str(path)!r}", f"{columns}x{rows} pixels", 12 * rows * columns, len(data))
+    require_room(f"environment {str(path)!r}", f"{columns}x{rows} pixels", 28 * rows * columns, len(data))
     start = len(text) + len(blank) + len(line) + len(end)
     return _Header(rows, columns, match[1] + match[2], match[4] + match[5], exposure, start)
 

@@ -27,7 +27,7 @@ MAX_FILE = 2**32 - 1
 #: Bytes of the largest text that a person may have written: a material, a table, a session.
 MAX_TEXT = 8 << 20
 #: Bytes that any file may unpack into, and how many times its own size a larger one may.
-FREE, RATIO = 1 << 29, 64
+FREE, RATIO = 1 << 29, 128
 #: Levels of lists and objects within each other.
 MAX_DEPTH = 100
 #: Digits of a whole number that is still in the range of float64.
@@ -128,7 +128,7 @@ def require_room(asked: str, found: str, size: int, stored: int, do: str = "make
     found : str
         What takes it, such as ``"16384x16384 pixels"``.
     size : int
-        Bytes, once it is unpacked.
+        Bytes that reading it takes at most, with all that is made in between.
     stored : int
         Bytes of the file that it is unpacked from.
     do : str

@@ -138,7 +138,7 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
         with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
             sizes = [_exr_size(part.header) for part in file.parts]
         width, height, _ = sizes[0]
-        require_room(asked, f"{width}x{height} pixels", sum(4 * w * h * n for w, h, n in sizes), stored)
+        require_room(asked, f"{width}x{height} pixels", sum(12 * w * h * n for w, h, n in sizes), stored)
         # The library prints what is wrong with pixels, and leaves their part out.
         with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
             if not file.parts:

@@ -114,7 +114,7 @@ def test_a_file_that_is_not_there_or_not_text(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_report(tmp_path / "none.json")
     (tmp_path / "picture").write_bytes(b"\xff\xfe\x00\x81")
-    with pytest.raises(InputError, match="not text"):
+    with pytest.raises(InputError, match="not UTF-8 text"):
         read_report(tmp_path / "picture")
 
 

@@ -68,7 +68,7 @@ def _read_exr(path: Path) -> _Stored:
 
 def _read_png(path: Path) -> _Stored:
     asked = f"thickness map {str(path)!r}"
-    with open_file(path, asked) as file, open_picture(file, asked, ("PNG",), per_pixel=8) as image:
+    with open_file(path, asked) as file, open_picture(file, asked, ("PNG",), per_pixel=16) as image:
         text, stored = getattr(image, "text", {}), np.array(image)
     if f"{PNG_PREFIX}scale" not in text:
         raise InputError(asked, "it does not say its scale", "keep the metadata when copying the image")

@@ -119,7 +119,7 @@ class Textures:
 
     def _decoded(self, where: str, data: bytes) -> Image.Image:
         do = "give a PNG or JPEG picture"
-        opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=4, do=do)
+        opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12, do=do)
         try:
             if opened.mode.startswith("I"):  # 16 bits of grey, which `convert` would clip
                 return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
@@ -141,7 +141,8 @@ def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
     """A normal map whose normals are steeper by a factor, and of unit length again."""
     if scale == 1.0:
         return pixels
-    normals = (2.0 * pixels[..., :3] - 1.0) * (scale, scale, 1.0)
+    largest = max(abs(scale), 1.0)  # only directions count
+    normals = (2.0 * pixels[..., :3] - 1.0) * (scale / largest, scale / largest, 1.0 / largest)
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     unit = normals / np.where(length > 0, length, 1.0)
     return np.concatenate([0.5 + 0.5 * unit, pixels[..., 3:]], axis=-1).clip(0.0, 1.0).astype(np.float32)

@@ -41,7 +41,7 @@ def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
                 listed = primitives(file, file.item("meshes", index))
                 meshes[index] = [raw_mesh(accessors, primitive, f"mesh {index}") for primitive in listed]
             for mesh in filter(None, meshes[index]):
-                size += mesh.vertices.nbytes + mesh.faces.nbytes
+                size += 4 * (mesh.vertices.nbytes + mesh.faces.nbytes)  # until they are one mesh
                 require_room(f"glTF {str(path)!r}", "its parts in all places", size, file.stored, "split the file")
                 parts.append(_placed(mesh, matrix))
     if not parts:
