@@ -37,8 +37,9 @@ def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
             index = file.items("nodes")[node].get("mesh")
             if index is None or not matrix[:3, :3].any():
                 continue
+            entry = file.item("meshes", index)
             if index not in meshes:
-                listed = primitives(file, file.item("meshes", index))
+                listed = primitives(file, entry)
                 meshes[index] = [raw_mesh(accessors, primitive, f"mesh {index}") for primitive in listed]
             for mesh in filter(None, meshes[index]):
                 size += 4 * (mesh.vertices.nbytes + mesh.faces.nbytes)  # until they are one mesh
