@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from translucent.commands.console import echo
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def read_medium(color: str | None, distance: str | None, preset_name: str | None
             raise InputError(f"--preset {preset_name}", "--color or --distance is given, too", "give one or the other")
         chosen = preset(preset_name)
         if chosen.warning:
-            click.echo(f"warning: {chosen.warning}", err=True)
+            echo(f"warning: {chosen.warning}", err=True)
         return chosen.medium
     if (color is None) != (distance is None):
         given, missing = ("--color", "--distance") if distance is None else ("--distance", "--color")
@@ -174,7 +175,7 @@ def warn_if_black(frame: Frame) -> None:
     seen = frame.coverage & frame.valid
     if seen.any() and (passed := float(frame.transmittance[seen].mean())) < NEARLY_BLACK:
         metres = float(frame.summary()["thickness"]["median"])
-        click.echo(
+        echo(
             f"warning: only {passed:.2%} of the light passes, at a median thickness of {metres:.3g} m; "
             "check --unit, or take a longer --distance",
             err=True,

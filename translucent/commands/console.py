@@ -8,11 +8,11 @@ import click
 
 from translucent.errors import printable
 
-#: Ends of lines, tabs, and cells of `translucent.swatches.terminal_strip`.
-_KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {8}\x1b\[0m)")
+#: Ends of lines, tabs, and swatches such as those of `translucent.swatches`.
+_KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 
-def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
+def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = None) -> None:
     """Print text; what is not printable in it is escaped, but for line ends, tabs and swatches."""
     parts = _KEPT.split(text)
-    click.echo("".join(part if i % 2 else printable(part) for i, part in enumerate(parts)), err=err, nl=nl)
+    click.echo("".join(part if i % 2 else printable(part) for i, part in enumerate(parts)), err=err, nl=nl, color=color)

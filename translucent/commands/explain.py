@@ -16,6 +16,7 @@ from translucent.commands.common import (
     read_method,
     unit_option,
 )
+from translucent.commands.console import echo
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def explain(
     method = read_method(method_name, None)
     chosen = plan(scene, method, borders=borders) if scene.bodies else None
     if as_json:
-        click.echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
+        echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):
         _tell_scene(model, scene)
         _tell_plan(chosen)
@@ -89,18 +90,18 @@ def _kind(item: Object) -> str:
 
 def _tell_mesh(mesh: Mesh) -> None:
     low, high = mesh.bounds
-    click.echo(
+    echo(
         f"{mesh.name}: {len(mesh.vertices)} vertices, {len(mesh.faces)} faces, "
         f"{' x '.join(f'{v:.4g}' for v in high - low)} m"
     )
-    click.echo(f"mesh: {mesh.diagnosis}")
+    echo(f"mesh: {mesh.diagnosis}")
     for repair in mesh.repairs:
-        click.echo(f"repaired: {repair}")
+        echo(f"repaired: {repair}")
 
 
 def _tell_scene(model: str, scene: Scene) -> None:
     low, high = scene.bounds
-    click.echo(
+    echo(
         f"{model}: {len(scene.objects)} objects, {len(scene.bodies)} of them translucent, {len(scene.lights)} lights, "
         f"{' x '.join(f'{v:.4g}' for v in high - low)} m"
     )
@@ -108,15 +109,15 @@ def _tell_scene(model: str, scene: Scene) -> None:
         kind, size = _kind(item), " x ".join(f"{v:.4g}" for v in item.bounds[1] - item.bounds[0])
         # Only what bounds a solid has to be closed.
         state = f"; {item.mesh.diagnosis}" if kind == "body" else ""
-        click.echo(f"  {item.mesh.name!r}, {kind}: {len(item.mesh.faces)} faces, {size} m{state}")
+        echo(f"  {item.mesh.name!r}, {kind}: {len(item.mesh.faces)} faces, {size} m{state}")
         for repair in item.mesh.repairs if kind == "body" else ():
-            click.echo(f"    repaired: {repair}")
+            echo(f"    repaired: {repair}")
     for line in medium_lines(scene):
-        click.echo(f"medium: {line}")
+        echo(f"medium: {line}")
 
 
 def _tell_plan(chosen: RenderPlan | None) -> None:
     if chosen is None:
-        click.echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
+        echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
     else:
-        click.echo(f"plan: {chosen}")
+        echo(f"plan: {chosen}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.common import common_options, outside_option, read_medium, triple_text
+from translucent.commands.console import echo
 from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
 
@@ -165,10 +166,10 @@ def _tell(told: dict[str, Any], medium: Medium, stated: float, target: str | Non
         from translucent.materials import text_block
 
         for line in told["warnings"]:
-            click.echo(f"warning: {line}", err=True)
-        click.echo(text_block(target, medium, medium.transmittance(stated), stated))
+            echo(f"warning: {line}", err=True)
+        echo(text_block(target, medium, medium.transmittance(stated), stated))
         return
-    click.echo(json.dumps(told) if as_json else _report(told))
+    echo(json.dumps(told) if as_json else _report(told))
 
 
 def _report(told: dict[str, Any]) -> str:
@@ -209,11 +210,11 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
         check_batch_output(output)
     done = convert_table(table, unit, unit_out, clamp)
     if output is None:
-        click.echo(done.to_json(), nl=False)
+        echo(done.to_json(), nl=False)
     else:
         done.write(output)
     for line in done.errors:
-        click.echo(f"error: {line}", err=True)
+        echo(f"error: {line}", err=True)
     if done.errors:
         total = len(done.errors) + len(done.records)
         raise TranslucentError(
@@ -235,7 +236,7 @@ def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: boo
     told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
     _tell(told, fit.medium, distance, target, as_json)
     if not as_json and target is None:
-        click.echo(_fit_report(fit))
+        echo(_fit_report(fit))
 
 
 def _fit_report(fit: Fit) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from translucent.commands.common import common_options, medium_options, outside_option, read_medium, triple_text
+from translucent.commands.console import echo
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,28 +30,28 @@ def show(model: str, as_json: bool) -> None:
 
     found = read_materials(model)
     if as_json:
-        click.echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
+        echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
         return
-    click.echo(f"{model}: {len(found)} material{'' if len(found) == 1 else 's'}")
+    echo(f"{model}: {len(found)} material{'' if len(found) == 1 else 's'}")
     for entry in found:
         _describe(entry)
 
 
 def _describe(entry: GltfMaterial) -> None:
     medium = entry.medium()
-    click.echo(f"{entry.index} {entry.name!r}: {entry.kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
+    echo(f"{entry.index} {entry.name!r}: {entry.kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
     if entry.has_volume:
         texture = _texture_text(entry) if entry.has_thickness_texture else ""
-        click.echo(f"  thickness   {entry.thickness:10.5g}{texture} (mesh space)")
-        click.echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
+        echo(f"  thickness   {entry.thickness:10.5g}{texture} (mesh space)")
+        echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
     if medium is not None:
-        click.echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
+        echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
     if entry.dispersion:
-        click.echo(f"  dispersion  {entry.dispersion:10.5g}")
+        echo(f"  dispersion  {entry.dispersion:10.5g}")
     if any(entry.emissive):
-        click.echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
+        echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
     for warning in entry.warnings:
-        click.echo(f"  warning: {warning}")
+        echo(f"  warning: {warning}")
 
 
 def _texture_text(entry: GltfMaterial) -> str:
@@ -103,6 +104,6 @@ def apply(
         allow_outside=allow_outside,
     )
     if as_json:
-        click.echo(json.dumps({"output": str(output), "materials": changed}))
+        echo(json.dumps({"output": str(output), "materials": changed}))
         return
-    click.echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")
+    echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")

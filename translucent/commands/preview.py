@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from translucent.commands.common import common_options, outside_option, read_size, unit_option
+from translucent.commands.console import echo
 from translucent.errors import InputError
 
 
@@ -58,8 +59,8 @@ def preview(
     work = run(document, pixels, scale, todo, shot, allow_outside)
     if as_json:
         told = [{"kind": message.kind, "text": message.text} for message in work.messages]
-        click.echo(json.dumps({"model": work.document.model.path, "messages": told}))
+        echo(json.dumps({"model": work.document.model.path, "messages": told}))
     elif todo is not None:
         for message in work.messages:
-            click.echo(f"{message.kind}: {message.text}", err=True)
+            echo(f"{message.kind}: {message.text}", err=True)
     leave(work)

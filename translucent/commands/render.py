@@ -22,6 +22,7 @@ from translucent.commands.common import (
     unit_option,
     warn_if_black,
 )
+from translucent.commands.console import echo
 from translucent.commands.model import DEFAULT_FOV, DEFAULT_UP, View, medium_lines, read_scene, require_translucent
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
@@ -134,13 +135,13 @@ def render(
         warn_if_black(frame)
     media = medium_lines(scene)
     if as_json:
-        click.echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))
+        echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))
         return
     drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
-    click.echo(f"{output}: {pixels[0]}x{pixels[1]}, {', '.join(drawn_by)}")
+    echo(f"{output}: {pixels[0]}x{pixels[1]}, {', '.join(drawn_by)}")
     if "opaque" in frame.provenance:
-        click.echo(f"opaque objects: {frame.provenance['opaque']}")
+        echo(f"opaque objects: {frame.provenance['opaque']}")
     for line in media:
-        click.echo(f"medium: {line}")
-    click.echo(str(frame.plan))
-    click.echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in frame.seconds.items()))
+        echo(f"medium: {line}")
+    echo(str(frame.plan))
+    echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in frame.seconds.items()))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.common import common_options, outside_option, read_size, unit_option
+from translucent.commands.console import echo
 from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
@@ -70,13 +71,13 @@ def report(
     files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
-        click.echo(f"warning: times of two machines are compared: {difference}", err=True)
+        echo(f"warning: times of two machines are compared: {difference}", err=True)
     if as_json:
-        click.echo(json.dumps(_summary(made, files, changes)))
+        echo(json.dumps(_summary(made, files, changes)))
     else:
         _tell(made, files, changes)
     if output is None and old is None and not as_json:
-        click.echo(table(made))
+        echo(table(made))
     if not made.complete and source is None:
         raise click.exceptions.Abort
     if made.failures:
@@ -171,24 +172,22 @@ def _answer(case: CaseRecord) -> dict[str, Any]:
 
 
 def _tell(made: Report, files: list[Path], changes: Any) -> None:
-    click.echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
-    click.echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10}")
+    echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
+    echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10}")
     for answer in map(_answer, made.cases):
         if answer["method"] is None:
-            click.echo(f"{answer['case']:<20} -")
+            echo(f"{answer['case']:<20} -")
             continue
         mark = "" if answer["good_enough"] else "  (not good enough, the most accurate)"
         ratio, error = answer["ratio"], answer["rms_error"]
-        click.echo(
-            f"{answer['case']:<20} {answer['method']:<30} {ratio:>8.2f} {error:>10.1e} {answer['quantity']}{mark}"
-        )
+        echo(f"{answer['case']:<20} {answer['method']:<30} {ratio:>8.2f} {error:>10.1e} {answer['quantity']}{mark}")
     for claim in made.claims:
         if claim.held is False:
-            click.echo(f"does not hold: {claim.text}; {claim.measured}")
+            echo(f"does not hold: {claim.text}; {claim.measured}")
     if changes is not None:
         for change in changes:
-            click.echo(str(change))
+            echo(str(change))
         if not changes:
-            click.echo("nothing got slower or less accurate, beyond noise")
+            echo("nothing got slower or less accurate, beyond noise")
     for path in files:
-        click.echo(str(path))
+        echo(str(path))
