@@ -14,7 +14,7 @@ from translucent.environment_map import EnvironmentMap
 from translucent.errors import InputError, RenderError
 from translucent.paths import require_file
 from translucent.radiance_hdr import read_radiance
-from translucent.reading import open_file, shown
+from translucent.reading import read_bytes, shown
 from translucent.unpacking import open_picture, read_exr
 
 Pixels = npt.NDArray[Any]
@@ -61,7 +61,7 @@ def _read_exr(path: Path) -> Pixels:
 def _read_encoded(path: Path) -> Pixels:
     asked = f"environment {str(path)!r}"
     try:
-        with open_file(path, asked) as file, open_picture(file, asked, ("PNG", "JPEG"), per_pixel=38) as image:
+        with open_picture(read_bytes(path, asked), asked, ("PNG", "JPEG"), per_pixel=38) as image:
             encoded = np.asarray(image.convert("RGB"))
     except InputError:
         raise

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from translucent.color import srgb_to_linear
 from translucent.errors import InputError
-from translucent.reading import open_file
+from translucent.reading import read_bytes
 from translucent.unpacking import open_picture
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _read(what: str, path: str | Path) -> tuple[Image, Image | None]:
 
     do = "give an image file and a pixel, for example photo.png@120,45"
     try:
-        with open_file(path, what) as file, open_picture(file, what, per_pixel=16, do=do) as image:
+        with open_picture(read_bytes(path, what), what, per_pixel=16, do=do) as image:
             kind = str(image.tile[0][3]) if image.tile else ""
             if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (
                 "16" in kind and image.mode[0] != "I" and kind not in _SIXTEEN_BITS
@@ -72,7 +72,7 @@ def _read(what: str, path: str | Path) -> tuple[Image, Image | None]:
         if kind not in _SIXTEEN_BITS:
             return high, None
         # Pillow keeps the first byte of each number. Told that the other one comes first, it keeps the other.
-        with open_file(path, what) as file, open_picture(file, what, per_pixel=16, do=do) as image:
+        with open_picture(read_bytes(path, what), what, per_pixel=16, do=do) as image:
             image.tile = [tile._replace(args=kind.replace("16B", "16L")) for tile in image.tile]
             return high, ImageOps.exif_transpose(image)
     except InputError:

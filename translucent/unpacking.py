@@ -10,7 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,7 +79,7 @@ def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> 
 
 
 def open_picture(
-    source: BinaryIO | bytes,
+    data: bytes,
     asked: str,
     formats: tuple[str, ...] = PICTURES,
     *,
@@ -90,7 +90,8 @@ def open_picture(
 
     Parameters
     ----------
-    source : file or bytes
+    data : bytes
+        Of a whole file: a chunk may say that it is longer than that, and what reads on in a file makes room first.
     asked : str
         What the error says was asked for.
     formats : tuple of str
@@ -107,18 +108,16 @@ def open_picture(
     """
     from PIL import Image
 
-    stored = len(source) if isinstance(source, bytes) else os.fstat(source.fileno()).st_size
-    stream = io.BytesIO(source) if isinstance(source, bytes) else source
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of many pixels, which are counted below, and of odd metadata
-            image = Image.open(stream, formats=formats)
+            image = Image.open(io.BytesIO(data), formats=formats)
     except Image.DecompressionBombError:
         raise InputError(asked, "it has too many pixels", "make it smaller") from None
     except Exception as error:  # each of Pillow's readers raises its own kinds
         raise InputError(asked, f"it is not an image that can be read: none of {', '.join(formats)}", do) from error
     width, height = image.size
-    require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, stored)
+    require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, len(data))
     return image
 
 

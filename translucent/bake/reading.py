@@ -13,7 +13,7 @@ from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
 from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.paths import require_file
-from translucent.reading import open_file
+from translucent.reading import open_file, read_bytes
 from translucent.unpacking import open_picture, read_array, read_arrays, read_exr
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +68,7 @@ def _read_exr(path: Path) -> _Stored:
 
 def _read_png(path: Path) -> _Stored:
     asked = f"thickness map {str(path)!r}"
-    with open_file(path, asked) as file, open_picture(file, asked, ("PNG",), per_pixel=16) as image:
+    with open_picture(read_bytes(path, asked), asked, ("PNG",), per_pixel=16) as image:
         text, stored = getattr(image, "text", {}), np.array(image)
     if f"{PNG_PREFIX}scale" not in text:
         raise InputError(asked, "it does not say its scale", "keep the metadata when copying the image")
