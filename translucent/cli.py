@@ -10,6 +10,7 @@ import warnings
 import click
 
 from translucent.commands.bake import bake
+from translucent.commands.console import echo
 from translucent.commands.doctor import doctor
 from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
@@ -19,7 +20,7 @@ from translucent.commands.preview import preview
 from translucent.commands.render import render
 from translucent.commands.report import report
 from translucent.commands.shader import shader
-from translucent.errors import InputError, TranslucentError
+from translucent.errors import InputError, TranslucentError, message_of
 
 #: Options after which a shell drops a color that is not quoted.
 TAKE_COLORS = ("--color", "--background", "--environment")
@@ -31,7 +32,7 @@ def main(arguments: list[str] | None = None) -> int:
     if threading.current_thread() is threading.main_thread():
         # Asked to end, unwind as for Ctrl-C, so that no half-written file stays behind.
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    warnings.showwarning = lambda message, *_, **__: click.echo(f"warning: {message}", err=True)
+    warnings.showwarning = lambda message, *_, **__: echo(f"warning: {message_of(str(message))}", err=True)
     try:
         cli.main(args=given, prog_name="translucent", standalone_mode=False)
     except click.exceptions.Abort:
@@ -63,7 +64,7 @@ def _quoting(error: click.ClickException) -> str:
 
 
 def _failed(message: str, code: int) -> int:
-    click.echo(f"error: {message}", err=True)
+    echo(f"error: {message_of(message)}", err=True)
     return code
 
 

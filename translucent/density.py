@@ -6,6 +6,7 @@ texture. An affine transform keeps straight lines straight, so means along them 
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import numpy.typing as npt
 from translucent import optics
 from translucent.errors import InputError
 from translucent.frozen import Frozen
+from translucent.reading import open_file
+from translucent.unpacking import read_array
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -71,14 +74,8 @@ class DensityGrid(Frozen):
     def load(cls, path: str | Path) -> DensityGrid:
         """Read the array of a NumPy file (``.npy``); raises `InputError` if there is none that can be used."""
         where = f"density grid {str(path)!r}"
-        try:
-            with Path(path).open("rb") as stream:
-                values = np.lib.format.read_array(stream, allow_pickle=False)
-        except OSError as error:
-            raise InputError(where, f"it cannot be read ({error.strerror})", "check the path") from None
-        except (ValueError, EOFError) as error:
-            raise InputError(where, f"not a NumPy array ({error})", "write it with numpy.save") from None
-        return cls(values)
+        with open_file(path, where) as stream:
+            return cls(read_array(stream, os.fstat(stream.fileno()).st_size, where))
 
     def __repr__(self) -> str:
         return f"DensityGrid of {' x '.join(str(n) for n in np.shape(self.values))} voxels"

@@ -14,6 +14,8 @@ from translucent.environment_map import EnvironmentMap
 from translucent.errors import InputError, RenderError
 from translucent.paths import require_file
 from translucent.radiance_hdr import read_radiance
+from translucent.reading import read_bytes, shown
+from translucent.unpacking import open_picture, read_exr
 
 Pixels = npt.NDArray[Any]
 
@@ -44,16 +46,12 @@ def read_environment_map(path: str | Path) -> EnvironmentMap:
 
 def _read_exr(path: Path) -> Pixels:
     try:
-        import OpenEXR
+        import OpenEXR  # noqa: F401
     except ImportError:
         raise RenderError(
             f"environment {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
         ) from None
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
-    except (RuntimeError, ValueError, OSError) as error:
-        raise InputError(f"environment {str(path)!r}", f"not an OpenEXR file ({error})", "check the file") from None
+    _, channels = read_exr(path, f"environment {str(path)!r}")
     for names in ("RGB", "YYY"):
         if set(names) <= channels.keys():
             return np.stack([channels[name] for name in names], axis=-1)
@@ -61,15 +59,15 @@ def _read_exr(path: Path) -> Pixels:
 
 
 def _read_encoded(path: Path) -> Pixels:
-    from PIL import Image
-
+    asked = f"environment {str(path)!r}"
     try:
-        with Image.open(path) as image:
+        with open_picture(read_bytes(path, asked), asked, ("PNG", "JPEG"), per_pixel=38) as image:
             encoded = np.asarray(image.convert("RGB"))
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        found = getattr(error, "strerror", None) or "not an image that can be read"
-        raise InputError(f"environment {str(path)!r}", found, "check the file") from None
-    return np.asarray(srgb_to_linear(np.arange(256) / 255.0)[encoded])
+    except InputError:
+        raise
+    except Exception as error:  # each of Pillow's decoders raises its own kinds
+        raise InputError(asked, f"not an image that can be read ({shown(error)})", "check the file") from error
+    return np.asarray(srgb_to_linear(np.arange(256) / 255.0).astype(np.float32)[encoded])
 
 
 READERS: dict[str, Callable[[Path], Pixels]] = {

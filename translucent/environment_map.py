@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -43,7 +43,9 @@ class EnvironmentMap(Frozen):
 
     def __post_init__(self) -> None:
         try:
-            given = np.asarray(self.pixels, dtype=np.float64)
+            given = np.asarray(self.pixels)
+            if given.dtype.kind not in "biuf":
+                given = given.astype(np.float64)
         except (TypeError, ValueError):
             raise InputError("environment image", "its pixels are not numbers", "give an array of floats") from None
         if given.ndim != 3 or given.shape[2] != 3 or given.size == 0:
@@ -55,10 +57,8 @@ class EnvironmentMap(Frozen):
         for doubt in doubts:
             # The caller of tl.Environment.image, past this function, the constructor and `image`.
             warnings.warn(f"environment image: {doubt}", TranslucentWarning, stacklevel=4)
-        with np.errstate(under="ignore"):
-            pixels = np.ascontiguousarray(usable, dtype=np.float32)
-        pixels.setflags(write=False)
-        object.__setattr__(self, "pixels", pixels)
+        usable.setflags(write=False)
+        object.__setattr__(self, "pixels", usable)
 
     def __repr__(self) -> str:
         return f"EnvironmentMap({self.size[0]}x{self.size[1]})"
@@ -107,6 +107,12 @@ class EnvironmentMap(Frozen):
             return np.asarray(np.einsum("xj,yjc->yxc", columns, lower, optimize=True))
 
 
+def row_blocks(height: int, width: int) -> Iterator[slice]:
+    """Rows of a picture that are worked on at a time: about a million pixels."""
+    step = max(1, (1 << 20) // max(width, 1))
+    return (slice(row, row + step) for row in range(0, height, step))
+
+
 def row_solid_angles(height: int, width: int) -> Array:
     """(height,): exact solid angle in sr of a pixel in each row of an equirectangular picture."""
     edges = np.linspace(0.0, np.pi, height + 1)
@@ -139,18 +145,28 @@ def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], share: Array) -> Arr
     return np.asarray(first * (1.0 - share) + second * share)
 
 
-def _usable(given: Array) -> tuple[Array, list[str]]:
-    """The pixels with all that is no radiance replaced, and what was replaced, in words."""
-    unknown, negative, high = ~np.isfinite(given), given < 0, given > MAX_RADIANCE
-    wrong = unknown | negative
-    if wrong.all():
+def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]]:
+    """The pixels with all that is no radiance replaced, and what was replaced, in words.
+
+    In blocks of rows: a large picture is in memory once, and not once for each step.
+    """
+    pixels, any_right, counts = np.empty(given.shape, dtype=np.float32), False, np.zeros(3, dtype=np.int64)
+    for rows in row_blocks(*given.shape[:2]):
+        values = given[rows].astype(np.float64)
+        unknown = ~np.isfinite(values)
+        negative, high = (values < 0) & ~unknown, (values > MAX_RADIANCE) & ~unknown
+        wrong = unknown | negative
+        any_right |= not wrong.all()
+        counts += [np.count_nonzero(where.any(axis=2)) for where in (unknown, negative, high)]
+        with np.errstate(under="ignore"):
+            pixels[rows] = np.minimum(np.where(wrong, 0.0, values), MAX_RADIANCE)
+    if not any_right:
         raise InputError("environment image", "no pixel holds a finite radiance of 0 or above", "check how it was made")
-    count, doubts = given.shape[0] * given.shape[1], []
-    for what, where, become in (
-        ("not finite", unknown, "0"),
-        ("below 0", negative & ~unknown, "0"),
-        (f"above {MAX_RADIANCE:g}", high & ~unknown, "that"),
-    ):
-        if found := int(np.count_nonzero(where.any(axis=2))):
-            doubts.append(f"{found} of {count} pixels are {what}, taken as {become}")
-    return np.minimum(np.where(wrong, 0.0, given), MAX_RADIANCE), doubts
+    count = given.shape[0] * given.shape[1]
+    words = (("not finite", "0"), ("below 0", "0"), (f"above {MAX_RADIANCE:g}", "that"))
+    doubts = [
+        f"{found} of {count} pixels are {what}, taken as {become}"
+        for found, (what, become) in zip(counts.tolist(), words, strict=True)
+        if found
+    ]
+    return pixels, doubts

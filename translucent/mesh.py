@@ -15,6 +15,7 @@ from translucent.diagnosis import Diagnosis, diagnose
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frozen import Frozen
 from translucent.grouping import equal_rows, used_vertices
+from translucent.mesh_files import Triangles, mesh_formats, read_triangles
 from translucent.paths import require_file
 from translucent.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
 from translucent.units import metres_per_unit
@@ -204,7 +205,7 @@ class Mesh(Frozen):
         return None
 
 
-def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
+def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False) -> Mesh:
     """Read a triangle mesh from a file, weld it and wind it consistently.
 
     Parameters
@@ -213,6 +214,8 @@ def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
         What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
     unit : str
         Unit of the file's coordinates. glTF is in metres by definition; another unit rescales it.
+    allow_outside : bool
+        Whether the buffers of a .gltf file may lie outside its folder: only for files that you trust.
 
     Returns
     -------
@@ -227,7 +230,7 @@ def load_mesh(path: str | Path, unit: str = "m") -> Mesh:
     """
     path = Path(path)
     scale = metres_per_unit(unit)
-    vertices, faces, uv = _read(path)
+    vertices, faces, uv = _read(path, allow_outside)
     raw = Mesh(vertices * scale, faces, uv, name=path.name)
     raw.require_finite()
     return mended(raw)
@@ -250,30 +253,15 @@ _SCENES_OF_PROGRAMS = (
 )
 
 
-def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
-    import trimesh
-
+def _read(path: Path, allow_outside: bool) -> Triangles:
     asked = f"mesh {str(path)!r}"
     require_file(path, asked)
-    if path.suffix[1:].lower() not in trimesh.available_formats():
+    if path.suffix[1:].lower() not in mesh_formats():
         do = (
             "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
         raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", do)
-    try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
-            scene = trimesh.load_scene(path, process=False)
-            geometry = scene.to_mesh()
-    except Exception as error:  # each of trimesh's readers raises its own kinds
-        raise InputError(
-            asked, f"it cannot be read ({type(error).__name__}: {error})", "export the mesh again"
-        ) from error
-    if len(geometry.faces) == 0:
-        raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
-    coordinates = getattr(geometry.visual, "uv", None)
-    uv = None if coordinates is None or len(coordinates) != len(geometry.vertices) else np.array(coordinates)
-    return np.array(geometry.vertices, dtype=np.float64), np.array(geometry.faces, dtype=np.int32), uv
+    return read_triangles(path, asked, allow_outside)
 
 
 def mended(raw: Mesh) -> Mesh:

@@ -32,12 +32,14 @@ def require_file(path: Path, asked: str) -> None:
     Raises
     ------
     InputError
-        If nothing of that name is there, or a folder.
+        If nothing of that name is there, or a folder, a pipe or a device.
     """
     if os.path.isfile(path):
         return
     if os.path.isdir(path):
         raise InputError(asked, "it is a folder", "give a file in it")
+    if os.path.exists(path):
+        raise InputError(asked, "it is a pipe or a device", "copy its content into a file, and give that")
     raise InputError(asked, "no such file", "check the path")
 
 

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from translucent.color import srgb_to_linear
 from translucent.errors import InputError
+from translucent.reading import read_bytes
+from translucent.unpacking import open_picture
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -56,10 +58,11 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
 
 def _read(what: str, path: str | Path) -> tuple[Image, Image | None]:
     """The image, and a second one with the low bytes of its channels where they have 16 bits."""
-    from PIL import Image, ImageOps
+    from PIL import ImageOps
 
+    do = "give an image file and a pixel, for example photo.png@120,45"
     try:
-        with Image.open(path) as image:
+        with open_picture(read_bytes(path, what), what, per_pixel=16, do=do) as image:
             kind = str(image.tile[0][3]) if image.tile else ""
             if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (
                 "16" in kind and image.mode[0] != "I" and kind not in _SIXTEEN_BITS
@@ -69,14 +72,13 @@ def _read(what: str, path: str | Path) -> tuple[Image, Image | None]:
         if kind not in _SIXTEEN_BITS:
             return high, None
         # Pillow keeps the first byte of each number. Told that the other one comes first, it keeps the other.
-        with Image.open(path) as image:
+        with open_picture(read_bytes(path, what), what, per_pixel=16, do=do) as image:
             image.tile = [tile._replace(args=kind.replace("16B", "16L")) for tile in image.tile]
             return high, ImageOps.exif_transpose(image)
     except InputError:
         raise
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        found = getattr(error, "strerror", None) or "not an image that can be read"
-        raise InputError(what, found, "give an image file and a pixel, for example photo.png@120,45") from None
+    except Exception as error:  # each of Pillow's decoders raises its own kinds
+        raise InputError(what, "not an image that can be read", do) from error
 
 
 def _pixel(image: Image, x: int, y: int) -> Array:

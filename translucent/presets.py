@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from translucent.color import to_hex
 from translucent.errors import InputError
 from translucent.medium import Medium
+from translucent.reading import toml_value
 from translucent.suggestions import LEAST_PART, close_names, did_you_mean
 from translucent.units import metres_per_unit, parse_length
 
@@ -233,8 +233,8 @@ def read_presets(text: str, file: str = "presets.toml") -> dict[str, Preset]:
         If an entry lacks a key, has an unknown one or a value of the wrong type, or a name is given twice.
     """
     try:
-        entries = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        entries = toml_value(text)
+    except ValueError as error:
         raise InputError(file, f"no TOML: {error}", "correct the file") from None
     found = {name: _Entry(file, name, entry).preset() for name, entry in entries.items()}
     taken = set(found)
@@ -301,13 +301,14 @@ class _Entry:
             return Medium.from_color(self._triple("color"), parse_length(self._text("distance")), ior=ior)
         per_metre = 1.0 / metres_per_unit(self._text("unit"))
         key = "reduced_scattering" if "reduced_scattering" in self.entry else "scattering"
-        scattering = np.array(self._triple(key) if key in self.entry else (0.0, 0.0, 0.0)) * per_metre
         for g in anisotropy:
             if not -1 < g < 1:
                 raise self._wrong("anisotropy", "between -1 and 1")
-        total = float(scattering.sum())
-        mean = float(scattering @ np.array(anisotropy)) / total if total > 0 else 0.0
-        absorption = np.array(self._triple("absorption")) * per_metre
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # a medium refuses what is not finite
+            scattering = np.array(self._triple(key) if key in self.entry else (0.0, 0.0, 0.0)) * per_metre
+            absorption = np.array(self._triple("absorption")) * per_metre
+            total = float(scattering.sum())
+            mean = float(scattering @ np.array(anisotropy)) / total if total > 0 else 0.0
         return Medium(absorption=absorption, scattering=scattering, anisotropy=mean, ior=ior)
 
     def _text(self, key: str) -> str:

@@ -13,17 +13,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from translucent.environment_map import row_blocks
 from translucent.errors import InputError
+from translucent.reading import read_bytes, require_room
 
 Bytes = npt.NDArray[np.uint8]
 
 #: Rows of these widths may be encoded channel by channel.
 CHANNEL_WIDTHS = range(8, 32768)
 
-#: More pixels than any panorama has; a header that names more is broken.
-MAX_PIXELS = 1 << 28
-
-_RESOLUTION = re.compile(rb"([+-])([XY]) +(\d+) +([+-])([XY]) +(\d+)\s*")
+_RESOLUTION = re.compile(rb"([+-])([XY]) +(\d{1,10}) +([+-])([XY]) +(\d{1,10})\s*")
 
 
 class _Header(NamedTuple):
@@ -47,17 +46,16 @@ def read_radiance(path: str | Path) -> npt.NDArray[np.float32]:
     InputError
         If there is no such file, it is no RGBE picture, or it ends early.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise _refused(path, error.strerror or "it cannot be read", "check the path") from None
+    data = read_bytes(path, f"environment {str(path)!r}")
     header = _header(path, data)
     stored = _pixels(path, np.frombuffer(data, dtype=np.uint8)[header.start :], header.rows, header.columns)
-    with np.errstate(under="ignore"):
-        factor = np.ldexp(
-            np.where(stored[..., 3] > 0, 1.0 / header.exposure, 0.0), stored[..., 3].astype(np.int32) - 136
-        )
-        pixels = (stored[..., :3] * factor[..., None]).astype(np.float32)
+    # What an exponent means, looked up: no array of the picture's size in between.
+    exponents = np.arange(256)
+    with np.errstate(under="ignore", over="ignore"):
+        factors = np.where(exponents > 0, np.ldexp(1.0 / header.exposure, exponents - 136), 0.0)
+        pixels = np.empty((*stored.shape[:2], 3), dtype=np.float32)
+        for rows in row_blocks(header.rows, header.columns):
+            pixels[rows] = stored[rows, :, :3] * factors[stored[rows, :, 3], None]
     return np.ascontiguousarray(_upright(pixels, header))
 
 
@@ -77,8 +75,9 @@ def _header(path: str | Path, data: bytes) -> _Header:
         if name.strip() == b"EXPOSURE":
             exposure *= _exposure(path, value)
     rows, columns = int(match[3]), int(match[6])
-    if not 0 < rows * columns <= MAX_PIXELS:
-        raise _refused(path, f"{columns}x{rows} pixels", "give a picture of at most 16384x16384")
+    if not rows * columns:
+        raise _refused(path, f"{columns}x{rows} pixels", "save it again")
+    require_room(f"environment {str(path)!r}", f"{columns}x{rows} pixels", 28 * rows * columns, len(data))
     start = len(text) + len(blank) + len(line) + len(end)
     return _Header(rows, columns, match[1] + match[2], match[4] + match[5], exposure, start)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 from translucent.color import parse_color
 from translucent.errors import InputError
+from translucent.reading import json_value, read_text
 from translucent.units import parse_length
 
 
@@ -69,12 +69,7 @@ def read_table(path: str | Path, *, needs: Iterable[tuple[str, ...]]) -> list[Ro
         If the file cannot be read, holds no row, or lacks a column.
     """
     what = f"table {str(path)!r}"
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(what, f"cannot be read ({error.strerror})", "check the path") from None
-    except ValueError:
-        raise InputError(what, "not UTF-8 text", "save it as CSV or JSON, in UTF-8") from None
+    text = read_text(path, what, do="save it as CSV or JSON, in UTF-8")
     rows = _json_rows(what, path, text) if Path(path).suffix.lower() == ".json" else _csv_rows(path, text, needs)
     if not rows:
         raise InputError(what, "no rows", "give at least one")
@@ -104,7 +99,7 @@ def _csv_rows(path: str | Path, text: str, needs: Iterable[tuple[str, ...]]) -> 
 
 def _json_rows(what: str, path: str | Path, text: str) -> list[Row]:
     try:
-        items = json.loads(text)
+        items = json_value(text)
     except ValueError as error:
         raise InputError(what, f"no JSON: {error}", "write a list of objects with color and distance") from None
     if not (isinstance(items, list) and all(isinstance(item, dict) for item in items)):

@@ -96,7 +96,7 @@ def broken(path: list[Any], value: Any) -> str:
     [
         (["seconds"], "long", r"seconds is 'long', not a number"),
         (["seconds"], True, r"seconds is True, not a number"),
-        (["cases", 0, "rows", 0, "wall", "median"], float("nan"), r"cases\[0\].rows\[0\].wall.median is nan"),
+        (["cases", 0, "rows", 0, "wall", "median"], float("nan"), r"NaN is no JSON number"),
         (["cases", 0, "size"], [1, 2, 3], r"size is \[1, 2, 3\], not 2 values"),
         (["cases", 0, "quantity"], "mass", r"quantity is 'mass', not one of 'thickness'"),
         (["cases", 0, "rows", 1, "kind"], None, r"cases\[0\].rows\[1\] has no kind"),
@@ -111,10 +111,10 @@ def test_a_wrong_field_is_named(path: list[Any], value: Any, message: str) -> No
 
 
 def test_a_file_that_is_not_there_or_not_text(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such file"):
         read_report(tmp_path / "none.json")
     (tmp_path / "picture").write_bytes(b"\xff\xfe\x00\x81")
-    with pytest.raises(InputError, match="not text"):
+    with pytest.raises(InputError, match="not UTF-8 text"):
         read_report(tmp_path / "picture")
 
 

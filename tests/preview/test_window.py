@@ -77,7 +77,7 @@ def test_no_display_names_the_way_without_one(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--script", "none.toml"), "cannot be read"),
+        (("--script", "none.toml"), "no such file"),
         (("--session", "none.toml"), "cannot be read"),
         (("--session", "none.toml", "goblet"), "goblet is given, too"),
         (("--screenshot", "a.jpg"), "no .png"),

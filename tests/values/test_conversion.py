@@ -282,7 +282,7 @@ def test_pixels_that_cannot_be_picked(tmp_path: Path) -> None:
         ("gray_alpha.png@0,0", "pixels of the kind LA;16B"),
         ("text.png@0,0", "not an image that can be read"),
         ("cut.png@0,0", "not an image that can be read"),
-        ("none.png@0,0", "No such file or directory; give an image file and a pixel"),
+        ("none.png@0,0", "no such file; check the path"),
         (".@0,0", "pixel 0,0 of"),
     ]:
         with pytest.raises(tl.InputError, match=message):

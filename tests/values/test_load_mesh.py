@@ -172,7 +172,7 @@ def test_a_uv_seam_survives_welding(tmp_path: Path) -> None:
         ("empty.obj", b"", "it has no faces"),
         ("empty.stl", b"", "it has no faces"),
         ("empty.ply", b"", "it cannot be read"),
-        ("garbage.glb", b"\x00\xff" * 200, "it cannot be read"),
+        ("garbage.glb", b"\x00\xff" * 200, "its JSON is broken"),
         ("garbage.ply", b"\x00\xff" * 200, "it cannot be read"),
         ("garbage.off", b"\x00\xff" * 200, "it cannot be read"),
         ("points.obj", b"v 0 0 0\nv 1 0 0\n", "it has no faces; give a triangle mesh, not points or lines"),

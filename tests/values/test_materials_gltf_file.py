@@ -53,7 +53,10 @@ def test_links_hold_from_another_folder(tmp_path: Path) -> None:
     write_gltf(read_gltf(saved(tmp_path / "in" / "m.gltf", tree)), tmp_path / "out" / "m.gltf")
     moved = read_gltf(tmp_path / "out" / "m.gltf")
     assert moved.tree["buffers"][0]["uri"] == "../in/a%20b/mesh.bin"
-    assert moved.resource(moved.tree["buffers"][0]) == b"1234"
+    with pytest.raises(tl.InputError, match="is outside its folder"):
+        moved.resource(moved.tree["buffers"][0])
+    trusted = read_gltf(tmp_path / "out" / "m.gltf", allow_outside=True)
+    assert trusted.resource(trusted.tree["buffers"][0]) == b"1234"
 
 
 def uri(data: bytes, kind: str = "application/octet-stream") -> str:

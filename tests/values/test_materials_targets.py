@@ -249,7 +249,7 @@ def test_json_holds_all_of_it(medium: tl.Medium) -> None:
         ('{"absorbtion": 1}', "unknown absorbtion"),
         ('{"ior": "glass"}', "ior is 'glass', not a number"),
         ('{"absorption": [1, 2]}', "not one or three numbers"),
-        ('{"absorption": NaN}', "not finite"),
+        ('{"absorption": NaN}', "NaN is no JSON number"),
     ],
 )
 def test_bad_json_is_refused(text: str, message: str) -> None:
@@ -289,5 +289,5 @@ def test_files_that_hold_no_material_are_refused(tmp_path: Path, name: str, text
     (tmp_path / name).write_text(text)
     with pytest.raises(tl.InputError, match=re.escape(message)):
         load_medium(tmp_path / name)
-    with pytest.raises(tl.InputError, match=r"cannot be read|suffix"):
+    with pytest.raises(tl.InputError, match=r"no such file|suffix"):
         load_medium(tmp_path / "none" / name)

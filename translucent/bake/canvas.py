@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import time
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from translucent.bake.strips import COUNTS, Strip
 from translucent.errors import InputError
 from translucent.mesh import Mesh
 from translucent.paths import write_atomically
+from translucent.unpacking import read_arrays
 from translucent.version import VERSION
 
 #: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.
@@ -94,17 +94,14 @@ class Checkpoint:
         if not self._path.is_file():
             return
         asked = f"checkpoint {str(self._path)!r}"
-        try:
-            # Opened here, since NumPy leaves what it opens itself open where it is damaged.
-            with self._path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-                if str(data["key"]) != self._key:
-                    raise InputError(asked, "it is of another mesh or other settings", "remove it, or bake as before")
-                for name in self._ARRAYS:
-                    setattr(canvas, name, data[name])
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile, EOFError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(asked, f"it cannot be read ({error})", "remove it") from error
+        found = read_arrays(self._path, asked, ("key", *self._ARRAYS), "remove it")
+        if str(found.pop("key")) != self._key:
+            raise InputError(asked, "it is of another mesh or other settings", "remove it, or bake as before")
+        for name, array in found.items():
+            own = getattr(canvas, name)
+            if (array.shape, array.dtype) != (own.shape, own.dtype):
+                raise InputError(asked, f"{name} of shape {array.shape}, not {own.shape}", "remove it")
+            setattr(canvas, name, array)
 
     def keep(self, canvas: Canvas) -> None:
         """Write `canvas` if the last time was long enough ago."""

@@ -43,7 +43,7 @@ class GlbBuilder:
     """
 
     def __init__(self, file: GltfFile) -> None:
-        self._path = file.path
+        self._path, self._allow_outside = file.path, file.allow_outside
         if file.chunks:
             if "uri" in (file.items("buffers") or [{}])[0]:
                 raise InputError(f"glTF {str(file.path)!r}", "its first buffer is a link", "export it as one .glb")
@@ -62,7 +62,7 @@ class GlbBuilder:
             buffers[0]["byteLength"] = len(self._data)
         data = bytes(self._data) + b"\0" * (-len(self._data) % _ALIGNMENT)
         chunk = _CHUNK.pack(len(data), _BINARY_CHUNK) + data if data else b""
-        return GltfFile(self._path, self.tree, chunk + self._rest)
+        return GltfFile(self._path, self.tree, chunk + self._rest, self._allow_outside)
 
     def add(self, key: str, entry: Json) -> int:
         """Put an object at the end of a list such as ``"materials"``; its index."""

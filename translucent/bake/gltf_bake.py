@@ -21,7 +21,7 @@ def bake_gltf(job: Job, about: Record, progress: Progress | None = None) -> tupl
     metres = metres_per_unit(job.get("unit", "m"))
     output, vertices = Path(job["output"]), bool(job.get("vertices"))
     size = job.get("settings", {}).get("size", 1024)
-    builder = GlbBuilder(read_gltf(job["model"]))
+    builder = GlbBuilder(read_gltf(job["model"], bool(job.get("outside"))))
     targets = find_targets(builder, metres, needs_uv=not vertices, new_uv=bool(job.get("unwrap")), size=size)
     if job.get("high") is not None and len(targets) > 1:
         raise InputError(f"high mesh {job['high']!r}", f"{len(targets)} objects get thickness", "bake them one by one")

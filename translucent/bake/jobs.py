@@ -13,6 +13,7 @@ A job holds what JSON can hold, so it can be kept, sent and hashed:
 ``vertices``   True: thickness per vertex instead of a map
 ``unwrap``     True: new UVs, whatever the model has
 ``normalize``  True: store shares of the largest value; ``invert``: 1 minus them
+``outside``    True: read files that a glTF model links to wherever they are, not only below its folder
 ``resume``     True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
 ``threads``    how many (default: all processors); results do not depend on it
 =============  ==========================================================================================
@@ -36,7 +37,7 @@ from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.medium import Medium
 from translucent.mesh import Mesh, load_mesh
-from translucent.paths import require_file
+from translucent.reading import read_bytes
 from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
@@ -46,10 +47,10 @@ Progress = Callable[[float, int], None]
 
 KEYS = {
     "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
-    "resume", "threads",
+    "resume", "threads", "outside",
 }  # fmt: skip
 #: Keys that do not change what is written into the file.
-_HOW = {"output", "model", "high", "cage", "resume", "threads"}
+_HOW = {"output", "model", "high", "cage", "resume", "threads", "outside"}
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
 #: What has no meaning for vertices: a mistake, and what merely has a default.
 _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
@@ -124,22 +125,18 @@ def content_hash(job: Job) -> str:
     digest = hashlib.sha256(json.dumps([VERSION, meant], sort_keys=True).encode())
     for key in ("model", "high", "cage"):
         if job.get(key) is not None:
-            for data in _parts(Path(job[key])):
+            for data in _parts(Path(job[key]), bool(job.get("outside"))):
                 digest.update(key.encode() + hashlib.sha256(data).digest())
     return digest.hexdigest()
 
 
-def _parts(path: Path) -> list[bytes]:
+def _parts(path: Path, allow_outside: bool) -> list[bytes]:
     """A file and, of a .gltf, what it links to."""
-    require_file(path, f"mesh {str(path)!r}")
-    try:
-        data = [path.read_bytes()]
-    except OSError as error:
-        raise InputError(f"mesh {str(path)!r}", f"it cannot be read ({error.strerror})", "check its rights") from error
+    data = [read_bytes(path, f"mesh {str(path)!r}")]
     if path.suffix.lower() in SUFFIXES:
         from translucent.materials.gltf_file import read_gltf
 
-        file = read_gltf(path)
+        file = read_gltf(path, allow_outside)
         holders = [*file.items("buffers"), *file.items("images")]
         data += [file.resource(one) for one in holders if isinstance(one.get("uri"), str)]
     return data
@@ -190,7 +187,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
         from translucent.bake.gltf_bake import bake_gltf
 
         return bake_gltf(job, about, progress)
-    mesh = load_mesh(job["model"], unit=job.get("unit", "m"))
+    mesh = load_mesh(job["model"], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))
     if job.get("unwrap"):
         mesh = dataclasses.replace(mesh, uv=None)
     result = bake_one(job, mesh, progress=progress)
@@ -225,7 +222,7 @@ def bake_one(
         given.setdefault("medium", medium)
     for key in ("high", "cage"):
         if job.get(key) is not None:
-            given[key] = load_mesh(job[key], unit=job.get("unit", "m"))
+            given[key] = load_mesh(job[key], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))
     tell = None
     if progress is not None:
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
 from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.paths import require_file
+from translucent.reading import open_file, read_bytes
+from translucent.unpacking import open_picture, read_array, read_arrays, read_exr
 
 Array = npt.NDArray[np.float64]
 
@@ -54,37 +57,36 @@ _Stored = tuple[float, float, npt.NDArray[np.generic]]
 
 def _read_exr(path: Path) -> _Stored:
     try:
-        import OpenEXR
+        import OpenEXR  # noqa: F401
     except ImportError:
         raise RenderError(
             f"thickness map {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
         ) from None
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        header, channels = file.header(), file.channels()
-        return float(header["scale"]), float(header["offset"]), np.array(channels["Y"].pixels)
+    header, channels = read_exr(path, f"thickness map {str(path)!r}")
+    return float(header["scale"]), float(header["offset"]), channels["Y"]
 
 
 def _read_png(path: Path) -> _Stored:
-    from PIL import Image
-
-    with Image.open(path) as image:
+    asked = f"thickness map {str(path)!r}"
+    with open_picture(read_bytes(path, asked), asked, ("PNG",), per_pixel=16) as image:
         text, stored = getattr(image, "text", {}), np.array(image)
     if f"{PNG_PREFIX}scale" not in text:
-        raise InputError(
-            f"thickness map {str(path)!r}", "it does not say its scale", "keep the metadata when copying the image"
-        )
+        raise InputError(asked, "it does not say its scale", "keep the metadata when copying the image")
     if stored.ndim != 2 or stored.max(initial=0) > PNG_LEVELS:
-        raise InputError(f"thickness map {str(path)!r}", "it is not 16-bit grey", "give the file as it was baked")
+        raise InputError(asked, "it is not 16-bit grey", "give the file as it was baked")
     return float(text[f"{PNG_PREFIX}scale"]), float(text[f"{PNG_PREFIX}offset"]), stored
 
 
 def _read_npz(path: Path) -> _Stored:
-    with np.load(path, allow_pickle=False) as file:
-        return float(file["scale"]), float(file["offset"]), file["values"]
+    names = ("scale", "offset", "values")
+    scale, offset, values = read_arrays(path, f"thickness map {str(path)!r}", names, "bake it again").values()
+    return float(scale), float(offset), values
 
 
 def _read_npy(path: Path) -> _Stored:
-    stored = np.load(path, allow_pickle=False)
+    asked = f"thickness map {str(path)!r}"
+    with open_file(path, asked) as stream:
+        stored = read_array(stream, os.fstat(stream.fileno()).st_size, asked, "bake it again")
     encoding = (read_record(path) or {}).get("encoding", {})
     return float(encoding.get("scale", 1.0)), float(encoding.get("offset", 0.0)), stored
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from translucent.paths import write_text_atomically
+from translucent.reading import json_value, read_text
 from translucent.version import VERSION
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def file_hash(path: Path) -> str:
 def read_record(path: Path) -> Record | None:
     """The record of a file, if there is one and it is whole."""
     try:
-        found = json.loads(sidecar_of(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json_value(read_text(sidecar_of(path), f"record of {str(path)!r}"))
+    except ValueError:
         return None
     return found if isinstance(found, dict) else None

@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.reading import json_value
 
-#: Of an array, in characters once decoded: a damaged file must not fill the memory.
+#: Of an array, in bytes once unpacked: a damaged file must not fill the memory.
 _LARGEST = 1 << 28
 
 T = TypeVar("T")
@@ -59,13 +60,22 @@ class Packed:
         return cls((height, width), "float16", scale, _deflate(rounded.tobytes()))
 
     def array(self) -> npt.NDArray[Any]:
-        """(h, w) float64 or bool."""
+        """(h, w) float64 or bool; raises `ValueError` if the text holds no such array."""
         height, width = self.shape
-        raw = zlib.decompressobj().decompress(base64.b64decode(self.data), _LARGEST)
+        size = -(-height * width // 8) if self.dtype == "bool" else 2 * height * width
+        if not (height >= 0 and width >= 0 and size <= _LARGEST):
+            raise ValueError(f"a shape of {height} x {width}")
+        raw = zlib.decompressobj().decompress(base64.b64decode(self.data, validate=True), size + 1)
+        if len(raw) != size:
+            raise ValueError(f"a shape of {height} x {width} for {len(raw)} bytes of data")
         if self.dtype == "bool":
             bits = np.unpackbits(np.frombuffer(raw, np.uint8), count=height * width)
             return bits.reshape(height, width).astype(bool)
         return np.frombuffer(raw, np.float16).reshape(height, width).astype(np.float64) * self.scale
+
+    def check(self) -> None:
+        """Raise `ValueError` if the text holds no such array."""
+        self.array()
 
 
 def _deflate(raw: bytes) -> str:
@@ -86,7 +96,7 @@ def decode(kind: type[T], text: str, name: str, file_format: str, version: int) 
         If the text is no JSON, says another format or version, or a field is missing, unknown or of another type.
     """
     try:
-        found = json.loads(text)
+        found = json_value(text)
     except ValueError as error:
         raise InputError(
             f"reading {name}", f"it is cut off or no JSON ({error})", "give a report.json that was written completely"
@@ -153,7 +163,13 @@ def _read_dataclass(kind: Any, value: Any, where: str) -> Any:
     }
     if missing := needed - value.keys():
         raise _WrongFieldError(f"{where or 'the report'} has no {', '.join(sorted(missing))}")
-    return kind(**{name: _read(hints[name], item, f"{where}.{name}".lstrip(".")) for name, item in value.items()})
+    made = kind(**{name: _read(hints[name], item, f"{where}.{name}".lstrip(".")) for name, item in value.items()})
+    try:
+        if hasattr(made, "check"):
+            made.check()
+    except (ValueError, zlib.error) as error:
+        raise _WrongFieldError(f"{where}: {error}") from None
+    return made
 
 
 def _require(held: bool, where: str, value: Any, expected: str) -> None:

@@ -10,8 +10,11 @@ from typing import Any, get_args, get_type_hints
 
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
-from translucent.errors import InputError
 from translucent.paths import write_text_atomically
+from translucent.reading import read_text
+
+#: Bytes of a report: it holds pictures.
+_LARGEST = 1 << 28
 
 #: Fields of a row that are dataclasses, one column for each of their fields.
 _GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmittance", "radiance", "color_difference")
@@ -30,12 +33,7 @@ def read_report(path: Path) -> Report:
     InputError
         If it cannot be read, or is no report.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"report {str(path)!r}", f"it cannot be read ({error.strerror})", "check the path") from error
-    except UnicodeDecodeError:
-        raise InputError(f"report {str(path)!r}", "it is not text", "give a report.json") from None
+    text = read_text(path, f"report {str(path)!r}", _LARGEST, do="give a report.json")
     return Report.from_json(text, path.name)
 
 

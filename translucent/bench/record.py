@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -78,6 +79,12 @@ class Picture:
     png: str
     error: Packed | None = None
     invalid: Packed | None = None
+
+    def check(self) -> None:
+        """Raise `ValueError` if the picture is no base64, or its parts are of different shapes."""
+        base64.b64decode(self.png, validate=True)
+        if self.error is not None and self.invalid is not None and self.error.shape != self.invalid.shape:
+            raise ValueError(f"errors of shape {self.error.shape} and marks of shape {self.invalid.shape}")
 
 
 @dataclass(frozen=True)

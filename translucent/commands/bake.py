@@ -14,7 +14,8 @@ import click
 
 from translucent.commands.bake_options import FORMATS, bake_options, read_job
 from translucent.commands.common import common_options, overwrite_option
-from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.commands.console import echo
+from translucent.errors import InputError, RenderError, TranslucentError, printable
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -85,12 +86,12 @@ def _bake_one(job: Job, check: bool, as_json: bool) -> None:
     told = {"output": job["output"], **told_of(record, results)}
     checks = _check(job, record, results) if check else {}
     if as_json:
-        click.echo(json.dumps({**told, "record": record, **checks}))
+        echo(json.dumps({**told, "record": record, **checks}))
         return
     for line in _lines(record, told):
-        click.echo(line)
+        echo(line)
     for line in checks.get("lines", []):
-        click.echo(line)
+        echo(line)
 
 
 @contextlib.contextmanager
@@ -102,7 +103,7 @@ def _progress(label: str) -> Iterator[Progress | None]:
     began = time.perf_counter()
     rate = ""
     with click.progressbar(
-        range(STEPS), label=label, file=sys.stderr, show_eta=True, item_show_func=lambda _: rate
+        range(STEPS), label=printable(label), file=sys.stderr, show_eta=True, item_show_func=lambda _: rate
     ) as bar:
 
         def tell(share: float, rays: int) -> None:
@@ -161,7 +162,7 @@ def _bake_many(
     wanted = [read_job(model, output, given) for model, output in files]
     with _executor(dask) as executor, _counting(len(wanted)) as progress:
         report = bake_many(wanted, executor, jobs, progress)
-    click.echo(json.dumps(report.summary()) if as_json else str(report))
+    echo(json.dumps(report.summary()) if as_json else str(report))
     if failed := report.count("failed"):
         raise TranslucentError(f"{failed} of {len(wanted)} models failed", "the others are done", "see above")
 
@@ -177,7 +178,7 @@ def _counting(total: int) -> Iterator[Callable[[Record], None] | None]:
 
         def tell(entry: Record) -> None:
             nonlocal last
-            last = f"{Path(entry['model']).name} {entry['status']}"
+            last = printable(f"{Path(entry['model']).name} {entry['status']}")
             bar.update(1)
 
         yield tell

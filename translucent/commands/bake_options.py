@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import F, medium_options, read_medium, refuse_overwriting, unit_option
+from translucent.commands.common import F, medium_options, outside_option, read_medium, refuse_overwriting, unit_option
 from translucent.commands.model import mesh_file
 from translucent.errors import InputError
 
@@ -67,6 +67,7 @@ _OPTIONS = [
     click.option("--cage", metavar="MESH", help="Of --high: MODEL, moved outwards, where the search begins."),
     _length("--high-distance", "Of --high: how far its surface may be from that of MODEL."),
     unit_option,
+    outside_option,
     medium_options,
     click.option("--unwrap", is_flag=True, help="Make new UVs, even if MODEL has some."),
     click.option("--vertices", is_flag=True, help="Thickness per vertex, into a .ply, .glb or .npy file."),
@@ -110,6 +111,8 @@ def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
     }
     job |= {name: mesh_file(given[name], unit) for name in ("high", "cage") if given[name] is not None}
     refuse_overwriting(output, job["model"], job.get("high"), job.get("cage"))
+    if given["allow_outside"]:
+        job["outside"] = True
     return job | {name: True for name in _FLAGS if given[name]}
 
 

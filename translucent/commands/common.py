@@ -10,6 +10,7 @@ from urllib.parse import unquote
 
 import click
 
+from translucent.commands.console import echo
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -119,6 +120,15 @@ def _linked_files(name: str) -> list[Path]:
     ]
 
 
+def outside_option(command: F) -> F:
+    """Option for files that a model links to."""
+    return click.option(
+        "--allow-outside",
+        is_flag=True,
+        help="Read files that MODEL links to wherever they are, not only below its folder. For models that you trust.",
+    )(command)
+
+
 def borders_option(command: F) -> F:
     """Option for where rays bend."""
     return click.option(
@@ -143,7 +153,7 @@ def read_medium(
             raise InputError(f"--preset {preset_name}", "--color or --distance is given, too", "give one or the other")
         chosen = preset(preset_name)
         if chosen.warning:
-            click.echo(f"warning: {chosen.warning}", err=True)
+            echo(f"warning: {chosen.warning}", err=True)
         return chosen.medium
     if (color is None) != (distance is None):
         given, missing = ("--color", "--distance") if distance is None else ("--distance", "--color")
@@ -153,7 +163,7 @@ def read_medium(
     wanted, told = clamped(color) if clamp is not False else (color, [])
     medium = Medium.from_color(wanted, parse_length(distance))
     for line in told:
-        click.echo(f"warning: {line}", err=True)
+        echo(f"warning: {line}", err=True)
     return medium
 
 

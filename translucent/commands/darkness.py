@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import click
 import numpy as np
 
+from translucent.commands.console import echo
 from translucent.units import METRES_PER_UNIT, metres_per_unit
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
     # Of the channel that gets farthest.
     clearest = float(np.median(depth, axis=0).min())
     tenth = thickness * math.log(10.0) / clearest if clearest > 0 else math.inf
-    click.echo(
+    echo(
         f"warning: only {passed:.2%} of the light passes: the model is {_extent(high - low)} and {_length(thickness)} "
         f"thick at the median, and this medium leaves a tenth of the light after {_length(tenth)}; "
         + (_other_unit(high - low, depth, unit, own) or _clearer(clearest)),

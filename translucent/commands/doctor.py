@@ -7,6 +7,7 @@ import json
 import click
 
 from translucent.commands.common import common_options
+from translucent.commands.console import echo
 from translucent.errors import TranslucentError
 
 
@@ -17,6 +18,6 @@ def doctor(as_json: bool) -> None:
     from translucent import doctor as examination
 
     facts = examination.examine()
-    click.echo(json.dumps(facts) if as_json else examination.report(facts))
+    echo(json.dumps(facts) if as_json else examination.report(facts))
     if facts["backend"] is None:
         raise TranslucentError("rendering", "neither OpenGL nor Embree works", "see the lines above")

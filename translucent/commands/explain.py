@@ -11,10 +11,12 @@ from translucent.commands.common import (
     borders_option,
     common_options,
     medium_options,
+    outside_option,
     read_medium,
     read_method,
     unit_option,
 )
+from translucent.commands.console import echo
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 @click.argument("model")
 @medium_options
 @unit_option
+@outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
 @borders_option
 @common_options
@@ -37,6 +40,7 @@ def explain(
     preset_name: str | None,
     clamp: bool | None,
     unit: str,
+    allow_outside: bool,
     method_name: str | None,
     borders: Borders,
     as_json: bool,
@@ -48,11 +52,11 @@ def explain(
     from translucent.plan import plan
 
     medium = read_medium(color, distance, preset_name, clamp)
-    scene = read_scene(model, unit, medium)
+    scene = read_scene(model, unit, medium, allow_outside=allow_outside)
     method = read_method(method_name, None)
     chosen = plan(scene, method, borders=borders) if scene.bodies else None
     if as_json:
-        click.echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
+        echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):
         _tell_scene(model, scene)
         _tell_plan(chosen)
@@ -87,18 +91,18 @@ def _kind(item: Object) -> str:
 
 def _tell_mesh(mesh: Mesh) -> None:
     low, high = mesh.bounds
-    click.echo(
+    echo(
         f"{mesh.name}: {len(mesh.vertices)} vertices, {len(mesh.faces)} faces, "
         f"{' x '.join(f'{v:.4g}' for v in high - low)} m"
     )
-    click.echo(f"mesh: {mesh.diagnosis}")
+    echo(f"mesh: {mesh.diagnosis}")
     for repair in mesh.repairs:
-        click.echo(f"repaired: {repair}")
+        echo(f"repaired: {repair}")
 
 
 def _tell_scene(model: str, scene: Scene) -> None:
     low, high = scene.bounds
-    click.echo(
+    echo(
         f"{model}: {len(scene.objects)} objects, {len(scene.bodies)} of them translucent, {len(scene.lights)} lights, "
         f"{' x '.join(f'{v:.4g}' for v in high - low)} m"
     )
@@ -106,15 +110,15 @@ def _tell_scene(model: str, scene: Scene) -> None:
         kind, size = _kind(item), " x ".join(f"{v:.4g}" for v in item.bounds[1] - item.bounds[0])
         # Only what bounds a solid has to be closed.
         state = f"; {item.mesh.diagnosis}" if kind == "body" else ""
-        click.echo(f"  {item.mesh.name!r}, {kind}: {len(item.mesh.faces)} faces, {size} m{state}")
+        echo(f"  {item.mesh.name!r}, {kind}: {len(item.mesh.faces)} faces, {size} m{state}")
         for repair in item.mesh.repairs if kind == "body" else ():
-            click.echo(f"    repaired: {repair}")
+            echo(f"    repaired: {repair}")
     for line in medium_lines(scene):
-        click.echo(f"medium: {line}")
+        echo(f"medium: {line}")
 
 
 def _tell_plan(chosen: RenderPlan | None) -> None:
     if chosen is None:
-        click.echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
+        echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
     else:
-        click.echo(f"plan: {chosen}")
+        echo(f"plan: {chosen}")

@@ -14,11 +14,13 @@ from translucent.commands.common import (
     clamp_option,
     clamped,
     common_options,
+    outside_option,
     overwrite_option,
     read_medium,
     refuse_overwriting,
     triple_text,
 )
+from translucent.commands.console import echo
 from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
 
@@ -45,6 +47,7 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.option("--on", "model", metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above.")
 @click.option("--eye", metavar="X,Y,Z", help="Of --on: where it is seen from, in metres. Default: as render shows it.")
 @overwrite_option
+@outside_option
 @common_options
 @click.pass_context
 def extinction(
@@ -62,6 +65,7 @@ def extinction(
     source: str | None,
     model: str | None,
     eye: str | None,
+    allow_outside: bool,
     as_json: bool,
 ) -> None:
     """Extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) / distance.
@@ -99,7 +103,7 @@ def extinction(
     if medium is None and (color is None or (distance is None and model is None)):
         missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
         raise click.MissingParameter(hint[:1].upper() + hint[1:], context, param_hint=missing, param_type="argument")
-    frame = None if model is None else thickness_on(model, unit, eye)
+    frame = None if model is None else thickness_on(model, unit, eye, allow_outside)
     told, medium = _convert(medium, color, distance, frame, unit, unit_out, clamp is not False)
     stated = told["distance"]
     if model is not None and frame is not None:
@@ -162,10 +166,10 @@ def _tell(told: dict[str, Any], medium: Medium, stated: float, target: str | Non
         from translucent.materials import text_block
 
         for line in told["warnings"]:
-            click.echo(f"warning: {line}", err=True)
-        click.echo(text_block(target, medium, medium.transmittance(stated), stated))
+            echo(f"warning: {line}", err=True)
+        echo(text_block(target, medium, medium.transmittance(stated), stated))
         return
-    click.echo(json.dumps(told) if as_json else _report(told))
+    echo(json.dumps(told) if as_json else _report(told))
 
 
 def _report(told: dict[str, Any]) -> str:
@@ -208,14 +212,14 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
         refuse_overwriting(output, table)
     done = convert_table(table, unit, unit_out, clamp)
     if output is None:
-        click.echo(done.to_json(), nl=False)
+        echo(done.to_json(), nl=False)
     else:
         done.write(output)
     if done.clamped:
         told = f"{done.clamped} of {len(done.records)} colors clamped to {CLAMP:g} where they were below"
-        click.echo(f"warning: {told}; their warnings say so", err=True)
+        echo(f"warning: {told}; their warnings say so", err=True)
     for line in done.errors:
-        click.echo(f"error: {line}", err=True)
+        echo(f"error: {line}", err=True)
     if done.errors:
         total = len(done.errors) + len(done.records)
         raise TranslucentError(
@@ -237,7 +241,7 @@ def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: boo
     told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
     _tell(told, fit.medium, distance, target, as_json)
     if not as_json and target is None:
-        click.echo(_fit_report(fit))
+        echo(_fit_report(fit))
 
 
 def _fit_report(fit: Fit) -> str:

@@ -11,11 +11,13 @@ import click
 from translucent.commands.common import (
     common_options,
     medium_options,
+    outside_option,
     overwrite_option,
     read_medium,
     refuse_overwriting,
     triple_text,
 )
+from translucent.commands.console import echo
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,28 +38,28 @@ def show(model: str, as_json: bool) -> None:
 
     found = read_materials(model)
     if as_json:
-        click.echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
+        echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
         return
-    click.echo(f"{model}: {len(found)} material{'' if len(found) == 1 else 's'}")
+    echo(f"{model}: {len(found)} material{'' if len(found) == 1 else 's'}")
     for entry in found:
         _describe(entry)
 
 
 def _describe(entry: GltfMaterial) -> None:
     medium = entry.medium()
-    click.echo(f"{entry.index} {entry.name!r}: {entry.kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
+    echo(f"{entry.index} {entry.name!r}: {entry.kind}, transmission {entry.transmission:g}, ior {entry.ior:g}")
     if entry.has_volume:
         texture = _texture_text(entry) if entry.has_thickness_texture else ""
-        click.echo(f"  thickness   {entry.thickness:10.5g}{texture} (mesh space)")
-        click.echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
+        echo(f"  thickness   {entry.thickness:10.5g}{texture} (mesh space)")
+        echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
     if medium is not None:
-        click.echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
+        echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
     if entry.dispersion:
-        click.echo(f"  dispersion  {entry.dispersion:10.5g}")
+        echo(f"  dispersion  {entry.dispersion:10.5g}")
     if any(entry.emissive):
-        click.echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
+        echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
     for warning in entry.warnings:
-        click.echo(f"  warning: {warning}")
+        echo(f"  warning: {warning}")
 
 
 def _texture_text(entry: GltfMaterial) -> str:
@@ -80,6 +82,7 @@ def _texture_text(entry: GltfMaterial) -> str:
 )
 @click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
 @overwrite_option
+@outside_option
 @common_options
 def apply(
     model: str,
@@ -90,6 +93,7 @@ def apply(
     clamp: bool | None,
     object_name: str | None,
     thickness: str | None,
+    allow_outside: bool,
     as_json: bool,
 ) -> None:
     """Write a medium into MODEL's materials; a color leaves them their index of refraction, a preset brings its own."""
@@ -108,8 +112,9 @@ def apply(
         object_name=object_name,
         thickness=None if thickness is None else parse_length(thickness),
         keep_ior=preset_name is None,
+        allow_outside=allow_outside,
     )
     if as_json:
-        click.echo(json.dumps({"output": str(output), "materials": changed}))
+        echo(json.dumps({"output": str(output), "materials": changed}))
         return
-    click.echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")
+    echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")

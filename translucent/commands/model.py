@@ -53,6 +53,8 @@ def read_scene(
     size: tuple[int, int] = (1280, 720),
     environment: Environment | None = None,
     roughness: float | None = None,
+    *,
+    allow_outside: bool = False,
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
     from translucent.gltf.load import load_scene
@@ -64,9 +66,9 @@ def read_scene(
     if not is_scene_file(model):
         if view.camera is not None:
             raise InputError(f"--camera {view.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
-        scene = showcase(read_mesh(model, unit), medium, size, environment=environment)
+        scene = showcase(read_mesh(model, unit, allow_outside), medium, size, environment=environment)
     else:
-        scene = load_scene(model, unit, None if view.placed else view.camera or 0, size)
+        scene = load_scene(model, unit, None if view.placed else view.camera or 0, size, allow_outside=allow_outside)
         if medium is not None:
             scene = filled(scene, medium)
         if environment is not None:
@@ -93,11 +95,11 @@ def is_own(model: str) -> bool:
     return not os.path.lexists(model) and model in mesh_names()
 
 
-def read_mesh(model: str, unit: str) -> Mesh:
+def read_mesh(model: str, unit: str, allow_outside: bool = False) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
     from translucent.mesh import load_mesh
 
-    return load_mesh(mesh_file(model, unit), unit=unit)
+    return load_mesh(mesh_file(model, unit), unit=unit, allow_outside=allow_outside)
 
 
 def mesh_file(model: str, unit: str) -> str:

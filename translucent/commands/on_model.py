@@ -18,12 +18,12 @@ SIZE = (640, 360)
 MOST_THIN_SHARE = 0.5
 
 
-def thickness_on(model: str, unit: str, eye: str | None) -> Frame:
+def thickness_on(model: str, unit: str, eye: str | None, allow_outside: bool = False) -> Frame:
     """The model as ``translucent render`` shows it, all of it filled with one medium."""
     import translucent as tl
 
     # Any medium will do: only the thickness is looked at.
-    scene = read_scene(model, unit, tl.Medium(absorption=1.0), View(eye=eye), SIZE)
+    scene = read_scene(model, unit, tl.Medium(absorption=1.0), View(eye=eye), SIZE, allow_outside=allow_outside)
     with tl.Renderer() as renderer:
         return renderer.render(scene, SIZE)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from translucent.commands.common import common_options, triple_text
+from translucent.commands.console import echo
 
 if TYPE_CHECKING:
     from translucent.presets import Preset
@@ -30,9 +31,9 @@ def presets(context: click.Context, as_json: bool) -> None:
     found = list(all_presets().values())
     if as_json:
         rows = [{key: one.summary()[key] for key in _LISTED} for one in found]
-        click.echo(json.dumps({"presets": rows}))
+        echo(json.dumps({"presets": rows}))
         return
-    click.echo(_table(found), color=_colorful())
+    echo(_table(found), color=_colorful())
 
 
 @presets.command(epilog="Example: translucent presets show merlot")
@@ -46,9 +47,9 @@ def show(context: click.Context, name: str, as_json: bool) -> None:
     one = preset(name)
     above = context.parent.params if context.parent else {}
     if as_json or above.get("as_json"):
-        click.echo(json.dumps(one.summary()))
+        echo(json.dumps(one.summary()))
         return
-    click.echo(_details(one), color=_colorful())
+    echo(_details(one), color=_colorful())
 
 
 def _table(found: list[Preset]) -> str:

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import click
 
-from translucent.commands.common import common_options, read_size, unit_option
-from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.commands.common import common_options, outside_option, read_size, unit_option
+from translucent.commands.console import echo
+from translucent.errors import InputError, RenderError, TranslucentError, message_of
 
 
 @click.command(epilog="Example: translucent preview goblet")
 @click.argument("model", required=False)
 @unit_option
+@outside_option
 @click.option("--session", type=click.Path(path_type=Path), metavar="FILE", help="Begin with a session, a .toml file.")
 @click.option("--size", default="1600x1000", show_default=True, metavar="WxH", help="Size of the window.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Makes letters and fields larger.")
@@ -24,6 +26,7 @@ from translucent.errors import InputError, RenderError, TranslucentError
 def preview(
     model: str | None,
     unit: str,
+    allow_outside: bool,
     session: Path | None,
     size: str,
     scale: float,
@@ -54,19 +57,20 @@ def preview(
         document = dataclasses.replace(document, model=Model(model, unit))
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None
     require_display()
-    work = run(document, pixels, scale, todo, str(screenshot) if screenshot is not None else None)
+    shot = str(screenshot) if screenshot is not None else None
+    work = run(document, pixels, scale, todo, shot, allow_outside)
     failure = None if todo is None else work.failure
     if as_json:
         told = [{"kind": message.kind, "text": message.text} for message in work.messages]
-        click.echo(json.dumps({"model": work.document.model.path, "messages": told}))
+        echo(json.dumps({"model": work.document.model.path, "messages": told}))
     elif todo is not None:
         for message in work.messages:
             # The error by which the script fails is the last line, as that of any verb.
             if failure is None or message.text != problem(failure):
-                click.echo(f"{message.kind}: {message.text}", err=True)
+                echo(f"{message.kind}: {message.text}", err=True)
     error = None if failure is None else _script_error(failure)
     if error is not None and not work.ended:
-        click.echo(f"error: {error}", err=True)
+        echo(f"error: {message_of(str(error))}", err=True)
     leave(work, 0 if error is None else 2 if isinstance(error, InputError) else 1)
     if error is not None:
         raise error

@@ -14,6 +14,7 @@ from translucent.commands.common import (
     common_options,
     look_options,
     medium_options,
+    outside_option,
     overwrite_option,
     read_environment,
     read_medium,
@@ -22,6 +23,7 @@ from translucent.commands.common import (
     refuse_overwriting,
     unit_option,
 )
+from translucent.commands.console import echo
 from translucent.commands.darkness import warn_if_black
 from translucent.commands.model import (
     DEFAULT_FOV,
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
 )
 @medium_options
 @unit_option
+@outside_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
 @click.option(
     "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
@@ -83,6 +86,7 @@ def render(
     preset_name: str | None,
     clamp: bool | None,
     unit: str,
+    allow_outside: bool,
     size: str,
     camera: int | None,
     eye: str | None,
@@ -126,7 +130,8 @@ def render(
     medium = read_medium(color, distance, preset_name, clamp)
     method = read_method(method_name, thickness)
     view = View(camera, eye, target, up, fov)
-    scene = read_scene(model, unit, medium, view, pixels, read_environment(environment, background), roughness)
+    lit = read_environment(environment, background)
+    scene = read_scene(model, unit, medium, view, pixels, lit, roughness, allow_outside=allow_outside)
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)
@@ -142,13 +147,13 @@ def render(
     warn_if_black(scene, frame, unit, own=is_own(model))
     media = medium_lines(scene)
     if as_json:
-        click.echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))
+        echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))
         return
     drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
-    click.echo(f"{output}: {pixels[0]}x{pixels[1]}, {', '.join(drawn_by)}")
+    echo(f"{output}: {pixels[0]}x{pixels[1]}, {', '.join(drawn_by)}")
     if "opaque" in frame.provenance:
-        click.echo(f"opaque objects: {frame.provenance['opaque']}")
+        echo(f"opaque objects: {frame.provenance['opaque']}")
     for line in media:
-        click.echo(f"medium: {line}")
-    click.echo(str(frame.plan))
-    click.echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in frame.seconds.items()))
+        echo(f"medium: {line}")
+    echo(str(frame.plan))
+    echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in frame.seconds.items()))

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import common_options, medium_options, read_medium, read_size, unit_option
+from translucent.commands.common import (
+    common_options,
+    medium_options,
+    outside_option,
+    read_medium,
+    read_size,
+    unit_option,
+)
+from translucent.commands.console import echo
 from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
@@ -42,6 +50,7 @@ PATH = click.Path(path_type=Path)
 )
 @medium_options
 @unit_option
+@outside_option
 @click.option("--backend", metavar="B", help="egl, window or osmesa. Default: what works here.")
 @common_options
 def report(
@@ -57,6 +66,7 @@ def report(
     preset_name: str | None,
     clamp: bool | None,
     unit: str,
+    allow_outside: bool,
     backend: str | None,
     as_json: bool,
 ) -> None:
@@ -84,17 +94,17 @@ def report(
     if output is not None:
         check_folder(output)
     if made is None:
-        made = _measured(models, medium, output, quick, size, methods, unit, backend)
+        made = _measured(models, medium, output, quick, size, methods, unit, backend, allow_outside)
     files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
-        click.echo(f"warning: times of two machines are compared: {difference}", err=True)
+        echo(f"warning: times of two machines are compared: {difference}", err=True)
     if as_json:
-        click.echo(json.dumps(_summary(made, files, changes)))
+        echo(json.dumps(_summary(made, files, changes)))
     else:
         _tell(made, files, changes)
     if output is None and old is None and not as_json:
-        click.echo(table(made))
+        echo(table(made))
     if not made.complete and source is None:
         raise click.exceptions.Abort
     worse = [change for change in changes or () if change.worse]
@@ -116,6 +126,7 @@ def _measured(
     methods: str | None,
     unit: str,
     backend: str | None,
+    allow_outside: bool,
 ) -> Report:
     """Measure, with a bar that tells how far it is; each finished scene is in ``report.json`` at once."""
     from translucent.bench.files import write_report
@@ -123,7 +134,7 @@ def _measured(
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, measure_all
 
     pixels = read_size(size) if size is not None else QUICK_SIZE if quick else FULL_SIZE
-    scenes = {model: read_scene(model, unit, medium, size=pixels) for model in models}
+    scenes = {model: read_scene(model, unit, medium, size=pixels, allow_outside=allow_outside) for model in models}
     for model, scene in scenes.items():
         require_translucent(model, scene)
 
@@ -202,31 +213,31 @@ def _answer(case: CaseRecord) -> dict[str, Any]:
 def _tell_seen(answer: dict[str, Any]) -> None:
     """What an artist's eye would make of the difference, in the model's own medium."""
     if answer["seen"]:
-        click.echo(f"  with it, {answer['seen']}")
+        echo(f"  with it, {answer['seen']}")
     if answer["cheaper_seen"]:
-        click.echo(f"  with {answer['cheaper']}, which is cheaper, {answer['cheaper_seen']}")
+        echo(f"  with {answer['cheaper']}, which is cheaper, {answer['cheaper_seen']}")
 
 
 def _tell(made: Report, files: list[Path], changes: Any) -> None:
-    click.echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
-    click.echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
+    echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
+    echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
     for answer in map(_answer, made.cases):
         if answer["method"] is None:
-            click.echo(f"{answer['case']:<20} -")
+            echo(f"{answer['case']:<20} -")
             continue
         mark = "" if answer["good_enough"] else "  (not good enough, the most accurate)"
         numbers = f"{answer['ratio']:>8.2f} {answer['rms_error']:>10.1e} {answer['p999_error']:>8.1e}"
-        click.echo(f"{answer['case']:<20} {answer['method']:<30} {numbers} {answer['quantity']}{mark}")
+        echo(f"{answer['case']:<20} {answer['method']:<30} {numbers} {answer['quantity']}{mark}")
         if answer["case"].startswith(MODEL_CASE):
             _tell_seen(answer)
     for claim in made.claims:
         if claim.held is False or claim.undecided:
             verdict = "undecided" if claim.undecided else "does not hold"
-            click.echo(f"{verdict}: {claim.text}; {claim.measured}")
+            echo(f"{verdict}: {claim.text}; {claim.measured}")
     if changes is not None:
         for change in changes:
-            click.echo(str(change))
+            echo(str(change))
         if not changes:
-            click.echo("nothing got slower or less accurate, beyond noise")
+            echo("nothing got slower or less accurate, beyond noise")
     for path in files:
-        click.echo(str(path))
+        echo(str(path))

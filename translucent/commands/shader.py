@@ -7,6 +7,7 @@ import json
 import click
 
 from translucent.commands.common import common_options
+from translucent.commands.console import echo
 from translucent.errors import InputError
 
 
@@ -29,9 +30,9 @@ def shader(name: str | None, defines: tuple[str, ...], as_json: bool) -> None:
         return _list(as_json)
     lifted = lift(find_shader(name), given)
     if not as_json:
-        return click.echo(lifted.text, nl=False)
+        return echo(lifted.text, nl=False)
     told = {"name": lifted.name, "version": lifted.version, "defines": lifted.defines, "files": lifted.files}
-    return click.echo(json.dumps({**told, "text": lifted.text}))
+    return echo(json.dumps({**told, "text": lifted.text}))
 
 
 def _list(as_json: bool) -> None:
@@ -41,10 +42,10 @@ def _list(as_json: bool) -> None:
     found = {name: switches(name) for name in shader_names()}
     if as_json:
         rows = [{"name": name, "switches": asked} for name, asked in found.items()]
-        return click.echo(json.dumps({"shaders": rows}))
+        return echo(json.dumps({"shaders": rows}))
     wide = max(map(len, found))
     for name, asked in found.items():
-        click.echo(f"{name:<{wide}}  {' '.join(asked)}".rstrip())
+        echo(f"{name:<{wide}}  {' '.join(asked)}".rstrip())
     return None
 
 

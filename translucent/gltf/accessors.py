@@ -13,6 +13,7 @@ import numpy.typing as npt
 from translucent.gltf.fields import refused, section, whole
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.mesh import MAX_INDEX
+from translucent.reading import require_room
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -22,12 +23,16 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
+#: Bytes that a vertex costs until its mesh is welded and diagnosed: counted where no buffer holds it.
+_MADE_UP = 512
+
+
 class Accessors:
-    """Arrays of a file, by the index of their accessor; each buffer is read once, when it is first asked for."""
+    """Arrays of a file, by the index of their accessor; what is made of them may take what `require_room` allows."""
 
     def __init__(self, file: GltfFile) -> None:
         self.file = file
-        self._buffers: dict[int, bytes] = {}
+        self._kept = 0
 
     def vectors(self, index: object, kind: str) -> Array:
         """(n, width) float64: an accessor of vectors of this kind, such as ``"VEC3"``.
@@ -65,12 +70,21 @@ class Accessors:
         if "bufferView" in entry:
             found = self._block(where, entry, dtype, count, _WIDTHS[kind])
         elif "sparse" in entry:
+            self._require_room(f"{where}: {count} elements", _MADE_UP * count)
             found = np.zeros((count, _WIDTHS[kind]), dtype)
         else:
             raise refused(self.file, f"{where} has no data", "export the file without compression")
         if "sparse" in entry:
             found = self._replaced(where, section(self.file, where, entry, "sparse"), found)
         return found, entry
+
+    def keep(self, what: str, size: int) -> None:
+        """Count the bytes of a mesh that is kept: many that share one buffer make no small file a large one."""
+        self._kept += size
+        self._require_room(f"{what} and what was read before it", self._kept)
+
+    def _require_room(self, what: str, size: int) -> None:
+        require_room(f"glTF {str(self.file.path)!r}", what, size, self.file.stored, "split the file")
 
     def _replaced(self, where: str, sparse: Json, stored: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """A copy of `stored` with those elements exchanged that a sparse accessor lists."""
@@ -93,7 +107,7 @@ class Accessors:
     def _block(self, where: str, entry: Json, dtype: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
         """(count, width): what a buffer view holds from the entry's offset on."""
         view = self.file.item("bufferViews", entry.get("bufferView"))
-        data = self._buffer(view.get("buffer"))
+        data = self.file.buffer(view.get("buffer"))
         start, length = (whole(self.file, where, view, key, 0) for key in ("byteOffset", "byteLength"))
         offset, element = whole(self.file, where, entry, "byteOffset", 0), dtype.itemsize * width
         stride = whole(self.file, where, view, "byteStride", element)
@@ -101,9 +115,3 @@ class Accessors:
         if count < 1 or stride < element or end > length or start + length > len(data):
             raise refused(self.file, f"{where} leaves its buffer", "copy or export the file again")
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
-
-    def _buffer(self, index: Any) -> bytes:
-        entry = self.file.item("buffers", index)
-        if index not in self._buffers:
-            self._buffers[index] = self.file.resource(entry)
-        return self._buffers[index]

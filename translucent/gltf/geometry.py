@@ -26,10 +26,22 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 def primitive_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
     """The mesh of a primitive in the file's unit, welded and wound as by `load_mesh`; None for points and lines.
 
+    Raises `InputError` like `raw_mesh`, and if a coordinate is not finite.
+    """
+    raw = raw_mesh(accessors, primitive, name)
+    if raw is None:
+        return None
+    raw.require_finite()
+    return mended(raw)
+
+
+def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
+    """The mesh of a primitive in the file's unit, as the file has it; None for points and lines.
+
     Raises
     ------
     InputError
-        If its data are missing, of a wrong kind or not finite, or an index points at no vertex.
+        If its data are missing or of a wrong kind, or an index points at no vertex.
     """
     mode = primitive.get("mode", _TRIANGLES)
     if mode in _POINTS_AND_LINES:
@@ -48,9 +60,8 @@ def primitive_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | N
         if len(uv) != len(positions):
             raise refused(accessors.file, f"{name!r}: {len(uv)} texture coordinates for {len(positions)} vertices")
         uv = np.column_stack([uv[used, 0], 1.0 - uv[used, 1]])  # glTF counts v downwards
-    raw = Mesh(positions[used], faces.reshape(-1, 3).astype(np.int32), uv, name=name)
-    raw.require_finite()
-    return mended(raw)
+    accessors.keep(repr(name), 24 * len(used) + 8 * faces.size)
+    return Mesh(positions[used], faces.reshape(-1, 3).astype(np.int32), uv, name=name)
 
 
 def _faces(accessors: Accessors, mode: Any, corners: Indices, name: str) -> Indices:

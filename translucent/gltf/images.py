@@ -5,13 +5,11 @@ Read are PNG and JPEG, from buffer views, data URIs and files beside; all over T
 
 from __future__ import annotations
 
-import io
 import math
-import warnings
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from translucent.color import srgb_to_linear
 from translucent.gltf.fields import extension, label, number, numbers, refused, section, whole
@@ -19,12 +17,13 @@ from translucent.gltf.left_out import LeftOut
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.materials.gltf_texture import TEXTURE_TRANSFORM, TextureTransform
 from translucent.texture import Texture, Wrap
+from translucent.unpacking import open_picture
 
 Bytes = npt.NDArray[np.uint8]
 Pixels = npt.NDArray[np.float32]
 
-#: Pixels along a side beyond which a picture is made smaller; and of a whole one, beyond which it is refused.
-MAX_SIDE, MAX_PIXELS = 4096, 2**28
+#: Pixels along a side beyond which a picture is made smaller.
+MAX_SIDE = 4096
 
 _NEAREST = 9728
 _WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
@@ -83,6 +82,7 @@ class Textures:
         if sampler.get("magFilter") == _NEAREST:
             self._left_out.add("nearest-neighbor filters of textures, drawn smooth", name)
         wraps = tuple(self._wrap(where, sampler, axis) for axis in ("wrapS", "wrapT"))
+        self._file.item("images", entry["source"])
         made = (entry["source"], srgb, normal_scale, wraps, transform)
         if made not in self._made:
             pixels = _linear(self._picture(entry["source"], name), srgb=srgb)
@@ -101,7 +101,7 @@ class Textures:
 
     def _wrap(self, where: str, sampler: Json, axis: str) -> str:
         code = sampler.get(axis, 10497)
-        if code not in _WRAPS:
+        if not isinstance(code, int) or code not in _WRAPS:
             raise refused(self._file, f"{where}: {axis} {code!r} is none of glTF 2.0")
         return _WRAPS[code]
 
@@ -119,20 +119,12 @@ class Textures:
 
     def _decoded(self, where: str, data: bytes) -> Image.Image:
         do = "give a PNG or JPEG picture"
+        opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12, do=do)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-                opened = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
-            if opened.width * opened.height > MAX_PIXELS:
-                raise refused(self._file, f"{where} has {opened.width}x{opened.height} pixels", "make it smaller")
             if opened.mode.startswith("I"):  # 16 bits of grey, which `convert` would clip
                 return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
             return opened.convert("RGBA")
-        except Image.DecompressionBombError:
-            raise refused(self._file, f"{where} is too large", "make it smaller") from None
-        except UnidentifiedImageError:
-            raise refused(self._file, f"{where} is neither PNG nor JPEG", do) from None
-        except (OSError, ValueError, SyntaxError) as error:
+        except Exception as error:  # each of Pillow's decoders raises its own kinds
             raise refused(self._file, f"{where} is broken ({error})", do) from error
 
 
@@ -149,7 +141,8 @@ def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
     """A normal map whose normals are steeper by a factor, and of unit length again."""
     if scale == 1.0:
         return pixels
-    normals = (2.0 * pixels[..., :3] - 1.0) * (scale, scale, 1.0)
+    largest = max(abs(scale), 1.0)  # only directions count
+    normals = (2.0 * pixels[..., :3] - 1.0) * (scale / largest, scale / largest, 1.0 / largest)
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     unit = normals / np.where(length > 0, length, 1.0)
     return np.concatenate([0.5 + 0.5 * unit, pixels[..., 3:]], axis=-1).clip(0.0, 1.0).astype(np.float32)

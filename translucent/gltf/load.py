@@ -62,7 +62,14 @@ class GltfScene(Scene):
     left_out: tuple[str, ...] = ()
 
 
-def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: tuple[int, int] = (1, 1)) -> GltfScene:
+def load_scene(
+    path: str | Path,
+    unit: str = "m",
+    camera: int | None = 0,
+    size: tuple[int, int] = (1, 1),
+    *,
+    allow_outside: bool = False,
+) -> GltfScene:
     """Read a scene from a .gltf or .glb file: its objects with their media, one camera, and its lights.
 
     Parameters
@@ -77,6 +84,8 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
         cameras.
     size : (width, height)
         Size of the picture in pixels, which the framing depends on; a wider picture shows all objects, too.
+    allow_outside : bool
+        Whether buffers and images may lie outside the file's folder: only for files that you trust.
 
     Returns
     -------
@@ -94,11 +103,11 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
         transform of a light or of the camera is singular; if there is no such camera.
     """
     metres = metres_per_unit(unit)
-    file = _read(path)
+    file = _read(path, allow_outside)
     left_out = LeftOut()
-    _check_extensions(file, left_out)
+    check_extensions(file, left_out)
     with np.errstate(under="ignore"):
-        transforms = _scene_transforms(file, left_out)
+        transforms = scene_transforms(file, left_out)
         objects = scene_objects(file, transforms, metres, left_out)
         view = scene_camera(file, transforms, camera, metres, left_out) or framing(objects, size)
         lights = scene_lights(file, transforms, metres, left_out)
@@ -113,17 +122,17 @@ def load_scene(path: str | Path, unit: str = "m", camera: int | None = 0, size: 
     return GltfScene(objects, view, lights, environment, left_out=lost)
 
 
-def _read(path: str | Path) -> GltfFile:
+def _read(path: str | Path, allow_outside: bool) -> GltfFile:
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(
             f"scene {str(path)!r}",
             f"suffix {Path(path).suffix!r}, and scenes are glTF files",
             "give a .glb or .gltf file, or read a mesh with tl.load_mesh",
         )
-    return read_gltf(path)
+    return read_gltf(path, allow_outside)
 
 
-def _check_extensions(file: GltfFile, left_out: LeftOut) -> None:
+def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
     """Refuse a file that cannot be read without what it requires, and note what it merely uses."""
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
@@ -138,7 +147,7 @@ def _check_extensions(file: GltfFile, left_out: LeftOut) -> None:
             left_out.add("extensions", name)
 
 
-def _scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
+def scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
     """Node to world of the nodes of the scene; raises `InputError` where one is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         world = node_transforms(file)
@@ -163,9 +172,12 @@ def _scene_nodes(file: GltfFile, left_out: LeftOut) -> Iterator[int]:
     for i in range(len(scenes)):
         if i != chosen:
             left_out.add("other scenes", label(scenes, i))
-    pending = roots[::-1]
+    pending, seen = roots[::-1], set()
     while pending:
         index = pending.pop()
         node = file.item("nodes", index)
+        if index in seen:
+            continue
+        seen.add(index)
         yield index
         pending += node.get("children", [])[::-1]

@@ -24,6 +24,7 @@ from translucent.materials.unity import unity_text
 from translucent.materials.unreal import unreal_text
 from translucent.materials.usd import read_usda, usda_text
 from translucent.medium import Medium
+from translucent.reading import read_text
 
 __all__ = ["TARGETS", "load_medium", "text_block"]
 
@@ -124,12 +125,7 @@ def load_medium(path: str | Path, unit: str = "m") -> Medium:
     if reader is None:
         do = f"give a {', '.join(_READERS)} file; of glTF, translucent material show tells the colors"
         raise InputError(what, f"suffix {Path(path).suffix!r}", do)
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(what, f"cannot be read ({error.strerror})", "check the path") from None
-    except ValueError:
-        raise InputError(what, "not UTF-8 text", "save it as text") from None
+    text = read_text(path, what)
     try:
         return reader(text, unit)
     except InputError as error:

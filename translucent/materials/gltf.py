@@ -151,7 +151,7 @@ class GltfMaterial:
 
 
 def read_materials(path: str | Path) -> list[GltfMaterial]:
-    """All materials of a .gltf or .glb file, in its order.
+    """All materials of a .gltf or .glb file, in its order; no file that it links to is read.
 
     Raises
     ------

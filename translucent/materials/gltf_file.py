@@ -9,7 +9,6 @@ import base64
 import binascii
 import copy
 import json
-import math
 import os
 import struct
 from dataclasses import dataclass, field
@@ -19,7 +18,8 @@ from urllib.parse import quote, unquote
 
 from translucent.errors import InputError
 from translucent.materials.gltf_pack import gather
-from translucent.paths import require_file, require_place, write_atomically
+from translucent.paths import require_place, write_atomically
+from translucent.reading import json_value, linked_file, read_bytes
 
 Json = dict[str, Any]
 
@@ -27,19 +27,23 @@ _MAGIC, _VERSION = b"glTF", 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 _LONGEST = 2**32 - 1  # bytes: the header states the length with 32 bits
-_MOST_DIGITS = 300  # of a whole number that is still in the range of float64
 _DATA_URI = "data:application/octet-stream;base64,"
 
 
 @dataclass(frozen=True)
 class GltfFile:
-    """A glTF file: its JSON as `tree`, and for .glb what follows it as `chunks`, headers included."""
+    """A glTF file: its JSON as `tree`, and for .glb what follows it as `chunks`, headers included.
+
+    Files that it links to are read from its own folder, and from elsewhere where `allow_outside` says so.
+    """
 
     path: Path
     tree: Json
     chunks: bytes = b""
+    allow_outside: bool = False
     #: The lists that have been looked through, with their lengths: once is enough, and there are many look-ups.
     _checked: dict[str, tuple[list[Json], int]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _buffers: dict[int, bytes] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def items(self, key: str) -> list[Json]:
         """The objects of a top-level list such as ``"materials"``; raises `InputError` if it is none."""
@@ -62,35 +66,58 @@ class GltfFile:
 
     def resource(self, holder: Json) -> bytes:
         """Bytes of a buffer or image: from its data URI, the file beside, its buffer view, or the binary chunk."""
-        if isinstance(uri := holder.get("uri"), str):
-            return self._linked(uri)
-        if "bufferView" in holder:
+        if "bufferView" in holder and not isinstance(holder.get("uri"), str):
             view = self.item("bufferViews", holder["bufferView"])
-            whole = self.resource(self.item("buffers", view.get("buffer")))
+            whole = self.buffer(view.get("buffer"))
             start, length = view.get("byteOffset", 0), view.get("byteLength", 0)
             if not (isinstance(start, int) and isinstance(length, int) and 0 <= start <= start + length <= len(whole)):
                 raise InputError(
                     f"glTF {str(self.path)!r}", "a buffer view leaves its buffer", "copy or export the file again"
                 )
             return whole[start : start + length]
+        return self._content(holder)
+
+    def buffer(self, index: Any) -> bytes:
+        """Bytes of a buffer, read when they are first asked for; raises `InputError` like `resource`."""
+        entry = self.item("buffers", index)
+        if index not in self._buffers:
+            self._buffers[index] = self._content(entry)
+        return self._buffers[index]
+
+    @property
+    def stored(self) -> int:
+        """Bytes that have been read so far, of the file and of what it links to, JSON apart."""
+        return len(self.chunks) + sum(map(len, self._buffers.values()))
+
+    def _content(self, holder: Json) -> bytes:
+        if isinstance(uri := holder.get("uri"), str):
+            return self._linked(uri)
         if len(self.chunks) < _CHUNK.size or _CHUNK.unpack_from(self.chunks)[1] != _BINARY_CHUNK:
             raise InputError(f"glTF {str(self.path)!r}", "it has no binary chunk", "copy or export the file again")
         return self.chunks[_CHUNK.size : _CHUNK.size + _CHUNK.unpack_from(self.chunks)[0]]
 
     def _linked(self, uri: str) -> bytes:
-        shown = uri if len(uri) < 60 else f"{uri[:57]}..."
-        try:
-            if uri.startswith("data:"):
+        asked = f"glTF {str(self.path)!r}"
+        if uri.startswith("data:"):
+            try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
-            return (self.path.parent / unquote(uri)).read_bytes()
-        except (OSError, ValueError, binascii.Error) as error:
-            raise InputError(
-                f"glTF {str(self.path)!r}", f"{shown!r} cannot be read ({error})", "keep its files together"
-            ) from error
+            except (ValueError, binascii.Error) as error:
+                raise InputError(asked, f"{uri[:57]!r}... cannot be read ({error})", "export the file again") from error
+        path = linked_file(self.path.parent, uri, asked, self.allow_outside)
+        try:
+            return read_bytes(path, "")
+        except InputError as error:
+            raise InputError(asked, f"{uri!r} cannot be read ({error})", "keep its files together") from None
 
 
-def read_gltf(path: str | Path) -> GltfFile:
+def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
     """Read a .gltf or .glb file; which of them it is says its content.
+
+    Parameters
+    ----------
+    path : path
+    allow_outside : bool
+        Whether files that it links to may lie outside its folder.
 
     Raises
     ------
@@ -99,23 +126,19 @@ def read_gltf(path: str | Path) -> GltfFile:
     """
     path = Path(path)
     asked = f"glTF {str(path)!r}"
-    require_file(path, asked)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(asked, f"it cannot be read ({error.strerror})", "check its permissions") from error
+    data = read_bytes(path, asked)
     if path.suffix.lower() not in (".glb", ".gltf") and data[:4] != _MAGIC:
         raise InputError(asked, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
     if not data:
         raise InputError(asked, "it is empty", "copy or export the file again")
     text, chunks = _split(asked, data) if data[:4] == _MAGIC else (data, b"")
     try:
-        tree = json.loads(text.decode("utf-8-sig"), parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
-    except (ValueError, RecursionError) as error:
+        tree = json_value(text.decode("utf-8-sig"))
+    except ValueError as error:
         raise InputError(asked, f"its JSON is broken ({error})", "copy or export the file again") from error
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
         raise InputError(asked, "its JSON has no asset, so it is not glTF 2.0", "give a .glb or .gltf file")
-    return GltfFile(path, tree, chunks)
+    return GltfFile(path, tree, chunks, allow_outside)
 
 
 def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
@@ -140,22 +163,6 @@ def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
     if not parts or parts[0][0] != _JSON_CHUNK:
         raise InputError(asked, "its first chunk is not JSON", "copy or export the file again")
     return data[parts[0][1] + _CHUNK.size : parts[0][2]], data[parts[0][2] : length]
-
-
-def _refuse(word: str) -> None:
-    raise ValueError(f"{word} is no JSON number")
-
-
-def _finite(text: str) -> float:
-    if math.isinf(value := float(text)):
-        raise ValueError(f"{text} is beyond the range of numbers")
-    return value
-
-
-def _whole(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
-        raise ValueError("a whole number is too long")
-    return int(text)
 
 
 def write_gltf(file: GltfFile, path: str | Path) -> None:

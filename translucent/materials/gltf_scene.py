@@ -10,7 +10,6 @@ Not read: animation, skins, morph targets, instancing extensions.
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +19,8 @@ from translucent.errors import InputError
 from translucent.materials.gltf import GltfMaterial
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.materials.gltf_texture import sample
+from translucent.reading import shown
+from translucent.unpacking import open_picture
 
 Array = npt.NDArray[np.float64]
 
@@ -165,21 +166,20 @@ def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
     InputError
         If the image is missing or cannot be read.
     """
-    from PIL import Image
-
     if material.thickness_texture is None:
         return None
     texture = file.item("textures", material.thickness_texture)
     data = file.resource(file.item("images", texture.get("source")))
+    asked = f"glTF {str(file.path)!r}: its thickness texture"
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with open_picture(data, asked, ("PNG", "JPEG"), per_pixel=40, do="export the file again") as image:
             # Pillow reads 16-bit grey as it is, and 16-bit RGB as 8-bit.
             deep = image.mode.startswith("I")
             levels = np.asarray(image if deep else image.convert("RGB"), dtype=np.float64)
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(
-            f"glTF {str(file.path)!r}", f"its thickness texture cannot be read ({error})", "export the file again"
-        ) from error
+    except InputError:
+        raise
+    except Exception as error:  # each of Pillow's decoders raises its own kinds
+        raise InputError(asked, f"it cannot be read ({shown(error)})", "export the file again") from error
     return material.thickness * (levels / 65535.0 if deep else levels[..., 1] / 255.0)
 
 

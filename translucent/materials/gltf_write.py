@@ -53,6 +53,7 @@ def write_medium(
     object_name: str | None = None,
     thickness: float | None = None,
     keep_ior: bool = False,
+    allow_outside: bool = False,
 ) -> list[int]:
     """Give a medium to the objects of a glTF file, and write the file; it is complete or not there.
 
@@ -73,6 +74,8 @@ def write_medium(
         object's box (of the largest of several).
     keep_ior : bool
         Leave each material its index of refraction instead of writing that of the medium.
+    allow_outside : bool
+        Whether files that it links to may lie outside its folder; a .glb holds a copy of them.
 
     Returns
     -------
@@ -89,10 +92,10 @@ def write_medium(
     check_gltf_output(Path(path_out))
     if thickness is not None and not 0 < thickness < math.inf:
         raise InputError(f"thickness {thickness!r}", "not above 0 and finite", "give a length, for example 0.02")
-    file = read_gltf(path_in)
+    file = read_gltf(path_in, allow_outside)
     entered = {material.index for material in materials_of(file) if material.transmission > 0}
     tree = copy.deepcopy(file.tree)
-    edited = GltfFile(file.path, tree, file.chunks)
+    edited = GltfFile(file.path, tree, file.chunks, file.allow_outside)
     targets = _own_materials(edited, object_name, entered)
     for index, sizes in targets.items():
         _give(edited, index, medium, distance, thickness, sizes, keep_ior)

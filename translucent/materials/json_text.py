@@ -11,6 +11,7 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.medium import Medium
+from translucent.reading import json_value
 
 _TRIPLES = ("absorption", "scattering", "emission")
 _NUMBERS = ("anisotropy", "ior")
@@ -31,8 +32,8 @@ def read_json(text: str) -> Medium:
         If the text is no JSON object, or has unknown fields or values that a medium cannot have.
     """
     try:
-        values = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        values = json_value(text)
+    except ValueError as error:
         raise InputError("medium as JSON", f"it is broken ({error})", "write it again") from error
     if not isinstance(values, dict):
         raise InputError("medium as JSON", "not an object", "write it again")

@@ -124,9 +124,11 @@ def write_shader(shader: Shader, medium: Medium, distance: float | None, name: s
 def read_shader(shader: Shader, text: str, unit: str) -> Medium:
     """The medium of the first such shader in a MaterialX document."""
     what = f"{shader.title} document"
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(what, "it declares entities, which may unpack into anything", "export it without a DOCTYPE")
     try:
         root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, ValueError) as error:
         raise InputError(what, f"its XML is broken ({error})", "export it again") from error
     surface = next(root.iter(shader.node), None)
     if surface is None:
@@ -139,7 +141,8 @@ def read_shader(shader: Shader, text: str, unit: str) -> Medium:
         if key in inputs
     }
     version = surface.get("version", "")
-    newer = shader.last_version is not None and tuple(map(int, re.findall(r"\d+", version)[:2])) > shader.last_version
+    stated_version = tuple(map(int, re.findall(r"\d{1,9}", version)[:2]))
+    newer = shader.last_version is not None and stated_version > shader.last_version
     if newer and np.any(stated.get(shader.scatter, 0.0)):
         raise InputError(what, f"version {version}, whose scatter color means another thing", "export version 1.1")
     return medium_of(shader, stated, metres_per_unit(unit))

@@ -28,12 +28,16 @@ _SHADERS = {f"ND_{shader.node}_surfaceshader": shader for shader in (SHADER, STA
 _SPACES = {"lin_rec709_scene": "lin_rec709", "raw": "none", "srgb_rec709_scene": "srgb_texture"}
 _CENTIMETER = 0.01
 
-# Strings of four kinds, then comments, then paths and assets, whose signs mean nothing, then signs and words.
+# Strings of four kinds, then comments, then paths and assets, whose signs mean nothing, then signs and words. What is
+# never closed ends with the text: each character is looked at once, whatever the text.
 _TOKENS = re.compile(
-    r"""('{3}(?:\\.|[^\\])*?'{3}|"{3}(?:\\.|[^\\])*?"{3}|'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*")"""
-    r"""|\#[^\n]*|<[^>]*>|@[^@]*@|([(){}\[\]=,;]|[^\s(){}\[\]=,;"'\#<@]+)""",
+    r"""('{3}(?:\\.|[^\\])*?(?:'{3}|\\?\Z)|"{3}(?:\\.|[^\\])*?(?:"{3}|\\?\Z)"""
+    r"""|'(?:\\.|[^'\\])*+(?:'|\\?\Z)|"(?:\\.|[^"\\])*+(?:"|\\?\Z))"""
+    r"""|\#[^\n]*|<[^>]*+(?:>|\Z)|@[^@]*+(?:@|\Z)|([(){}\[\]=,;]|[^\s(){}\[\]=,;"'\#<@]+)""",
     re.DOTALL,
 )
+#: Braces within each other.
+_MAX_DEPTH = 100
 
 
 def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent") -> str:
@@ -107,6 +111,8 @@ def _blocks(tokens: list[str]) -> Iterator[_Block]:
         token, following = tokens[index], tokens[index + 1 : index + 3]
         index += 1
         if token == "{":
+            if len(stack) > _MAX_DEPTH:
+                raise InputError("USD layer", f"more than {_MAX_DEPTH} levels of braces", "export it again")
             stack.append(_Block())
         elif token == "}" and len(stack) > 1:
             yield stack.pop()
@@ -127,7 +133,10 @@ def _list(tokens: list[str], index: int) -> tuple[list[str], int]:
     """The tokens of a value from here on, without parentheses and commas, and where they end."""
     if tokens[index : index + 1] != ["("]:
         return tokens[index : index + 1], index + 1
-    end = tokens.index(")", index) if ")" in tokens[index:] else len(tokens)
+    try:
+        end = tokens.index(")", index)
+    except ValueError:
+        end = len(tokens)
     return [token for token in tokens[index + 1 : end] if token != ","], end + 1
 
 

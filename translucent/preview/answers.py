@@ -69,4 +69,7 @@ def _save_medium(desk: Desk, path: str) -> None:
         do = "copy the medium as glTF, or export the model as .glb first"
         return desk.work.refuse(InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do))
     medium = medium_of(material)
-    return desk.work.write(path, lambda to: write_medium(source, to, medium, distance=material.distance))
+    outside = desk.work.allow_outside
+    return desk.work.write(
+        path, lambda to: write_medium(source, to, medium, distance=material.distance, allow_outside=outside)
+    )

@@ -55,6 +55,7 @@ def run(
     scale: float = 1.0,
     script: Script | None = None,
     screenshot: str | None = None,
+    allow_outside: bool = False,
 ) -> Workspace:
     """Open the window, and come back when it is closed.
 
@@ -69,6 +70,8 @@ def run(
         Does what it says, one action a frame, and then closes the window.
     screenshot : str, optional
         A .png of the window as it was at the end.
+    allow_outside : bool
+        Whether models may link to files outside their folders.
 
     Raises
     ------
@@ -78,7 +81,7 @@ def run(
     require_display()
     from imgui_bundle import hello_imgui
 
-    window = _Window(document, script)
+    window = _Window(document, script, allow_outside)
     params = window.params(size, scale)
     with _told_as_messages(window.work):
         try:
@@ -126,9 +129,9 @@ def _told_as_messages(work: Workspace) -> Iterator[None]:
 class _Window:
     """Callbacks of the window."""
 
-    def __init__(self, document: Document, script: Script | None) -> None:
+    def __init__(self, document: Document, script: Script | None, allow_outside: bool) -> None:
         # The model is read while the window opens.
-        self.work = Workspace(document)
+        self.work = Workspace(document, allow_outside)
         self.script = script
         self.failure: BaseException | None = None
         self.desk: Any = None

@@ -38,7 +38,7 @@ class Loaded:
         return sum(len(item.mesh.faces) for item in self.scene.objects)
 
 
-def load(model: Model) -> Loaded:
+def load(model: Model, allow_outside: bool = False) -> Loaded:
     """Read a model, and work out all that would hold up its first picture.
 
     Raises
@@ -52,11 +52,11 @@ def load(model: Model) -> Loaded:
     from translucent.showcase import showcase
 
     if Path(model.path).suffix.lower() in SUFFIXES:
-        scene: Scene = load_scene(model.path, model.unit)
+        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
     elif model.path in mesh_names() and not Path(model.path).exists():
         scene = showcase(load_mesh(mesh_path(model.path)))
     else:
-        scene = showcase(load_mesh(model.path, unit=model.unit))
+        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside))
     for item in scene.objects:
         _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
         if item.has_interface or item.surface is not None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError, RenderError
 from translucent.paths import write_atomically
 from translucent.preview.document import Document, Orbit, checked
+from translucent.reading import read_text, toml_value
 
 #: Of the format; a later one that this cannot read would raise it.
 VERSION = 1
@@ -96,9 +96,8 @@ def load_session(path: str | Path) -> Document:
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     """The table in a file; `what` is what errors call it."""
+    text = read_text(path, what)
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(what, f"cannot be read ({error.strerror})", "check the path") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        return toml_value(text)
+    except ValueError as error:
         raise InputError(what, f"no TOML: {error}", "correct the file") from None

@@ -57,6 +57,8 @@ class Workspace:
     Attributes
     ----------
     history : History
+    allow_outside : bool
+        Whether models may link to files outside their folders.
     loaded : Loaded, optional
         The model on show: that of the document, or the one before while that is being read.
     messages : deque of Message
@@ -75,8 +77,9 @@ class Workspace:
         Compiles shaders in the background, for a stage that waits for them.
     """
 
-    def __init__(self, document: Document | None = None) -> None:
+    def __init__(self, document: Document | None = None, allow_outside: bool = False) -> None:
         self.history = History(document or Document())
+        self.allow_outside = allow_outside
         self.loaded: Loaded | None = None
         self.messages: deque[Message] = deque(maxlen=MAX_MESSAGES)
         self.failure: Exception | None = None
@@ -338,7 +341,7 @@ class Workspace:
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
             try:
-                return load(model)
+                return load(model, self.allow_outside)
             except InputError:
                 self._refused = model
                 raise
