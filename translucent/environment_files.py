@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from translucent.color import srgb_to_linear
 from translucent.environment_map import EnvironmentMap
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError
+from translucent.extras import require_package
 from translucent.paths import require_file
 from translucent.radiance_hdr import read_radiance
 
@@ -43,12 +44,7 @@ def read_environment_map(path: str | Path) -> EnvironmentMap:
 
 
 def _read_exr(path: Path) -> Pixels:
-    try:
-        import OpenEXR
-    except ImportError:
-        raise RenderError(
-            f"environment {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
-        ) from None
+    OpenEXR = require_package("OpenEXR", f"environment {str(path)!r}")
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}

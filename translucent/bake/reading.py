@@ -10,7 +10,8 @@ import numpy.typing as npt
 from translucent.bake.encoding import Encoding
 from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
-from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.errors import InputError, TranslucentError
+from translucent.extras import require_package
 from translucent.paths import require_file
 
 Array = npt.NDArray[np.float64]
@@ -53,12 +54,7 @@ _Stored = tuple[float, float, npt.NDArray[np.generic]]
 
 
 def _read_exr(path: Path) -> _Stored:
-    try:
-        import OpenEXR
-    except ImportError:
-        raise RenderError(
-            f"thickness map {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
-        ) from None
+    OpenEXR = require_package("OpenEXR", f"thickness map {str(path)!r}")
     with OpenEXR.File(str(path), separate_channels=True) as file:
         header, channels = file.header(), file.channels()
         return float(header["scale"]), float(header["offset"]), np.array(channels["Y"].pixels)

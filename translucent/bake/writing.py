@@ -30,6 +30,7 @@ import numpy as np
 from translucent.bake.encoding import Encoding
 from translucent.bake.record import DEFINITIONS, Record, describe, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
+from translucent.extras import require_package
 from translucent.frame import write_atomically
 from translucent.paths import require_place
 
@@ -112,10 +113,7 @@ def check_map_output(
     if suffix == ".glb" and (normalize or invert):
         raise InputError(asked, "glTF stores t / max and the max", "leave --normalize and --invert out")
     if suffix == ".exr":
-        try:
-            import OpenEXR  # noqa: F401
-        except ImportError:
-            raise RenderError(asked, "the OpenEXR package is not installed", "pip install openexr") from None
+        require_package("OpenEXR", asked, "write .npy or .png")
     return suffix
 
 
