@@ -73,7 +73,8 @@ def bake_thickness(
     mode : str
         As above.
     rays : int
-        From each point, >= 2; powers of 2 are best. Mode "normal" casts one; "inscribed" begins with them.
+        From each point, >= 2; powers of 2 are best. Mode "normal" casts one, whatever is given, and takes 1, too;
+        "inscribed" begins with them.
     spread : float
         Full angle of the cone in degrees, 0 < spread <= 180.
     seed : int

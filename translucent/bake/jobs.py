@@ -2,20 +2,21 @@
 
 A job holds what JSON can hold, so it can be kept, sent and hashed:
 
-=============  ==========================================================================================
-``model``      path of a mesh or glTF file
-``output``     path of the file to write; its record goes beside it
-``unit``       of the model's coordinates (default m)
-``settings``   arguments of `bake_thickness` by name: mode, size, rays, ...; ``max_distance``, ``tolerance`` and
-               ``high_distance`` in metres, or as shares of the mesh's diagonal, such as ``"10%"``
-``medium``     extinction (r, g, b) in 1/m, for mode ``transmittance``
-``high``       path of the mesh that the details come from, and ``cage`` that of a cage around it, in the unit
-``vertices``   True: thickness per vertex instead of a map
-``unwrap``     True: new UVs, whatever the model has
-``normalize``  True: store shares of the largest value; ``invert``: 1 minus them
-``resume``     True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
-``threads``    how many (default: all processors); results do not depend on it
-=============  ==========================================================================================
+===============  ==========================================================================================
+``model``        path of a mesh or glTF file
+``output``       path of the file to write; its record goes beside it
+``unit``         of the model's coordinates (default m)
+``settings``     arguments of `bake_thickness` by name: mode, size, rays, ...; ``max_distance``, ``tolerance`` and
+                 ``high_distance`` in metres, or as shares of the mesh's diagonal, such as ``"10%"``
+``medium``       extinction (r, g, b) in 1/m, for mode ``transmittance``
+``high``         path of the mesh that the details come from, and ``cage`` that of a cage around it, in the unit
+``vertices``     True: thickness per vertex instead of a map
+``unwrap``       True: new UVs, whatever the model has
+``normalize``    True: store shares of the largest value; ``invert``: 1 minus them
+``resume``       True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
+``threads``      how many (default: all processors); results do not depend on it
+``max_escaped``  of `bake_many`: share of rays without an exit above which a map is suspect (default 0.05)
+===============  ==========================================================================================
 
 Only ``model`` and ``output`` are needed.
 """
@@ -47,10 +48,10 @@ Progress = Callable[[float, int], None]
 
 KEYS = {
     "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
-    "resume", "threads",
+    "resume", "threads", "max_escaped",
 }  # fmt: skip
 #: Keys that do not change what is written into the file.
-_HOW = {"output", "model", "high", "cage", "resume", "threads"}
+_HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped"}
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
 #: What has no meaning for vertices: a mistake, and what merely has a default.
 _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
@@ -63,6 +64,8 @@ def check_job(job: Job) -> None:
     if missing := [key for key in ("model", "output") if not isinstance(job.get(key), str)]:
         raise InputError("bake job", f"no {missing[0]}", "give a path as text")
     metres_per_unit(job.get("unit", "m"))
+    if not 0 <= (share := job.get("max_escaped", 0)) <= 1:
+        raise InputError(f"max_escaped {share!r}", "not in 0..1", "give a share of the rays, for example 0.05")
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
     normalize, invert = bool(job.get("normalize")), bool(job.get("invert"))
     output = Path(job["output"])
