@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
 from translucent.bake.local_pool import in_processes
-from translucent.bake.record import Record, read_record
+from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
 from translucent.version import VERSION
@@ -66,6 +66,7 @@ def asset_line(asset: Record, width: int = 0) -> str:
         return f"{told}  {asset['error']}"
     if found := asset.get("range"):
         told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
+        told += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
     turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
     return told + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
 
@@ -184,7 +185,7 @@ def run_job(job: Job, version: str | None = None) -> Record:
         told = f"unexpected {type(error).__name__}; {error or 'no details'}"
         return _entry(job, "failed", time.perf_counter() - started, error=told)
     seconds, doubts = time.perf_counter() - started, _doubts(job, record)
-    return _judged(job, "baked", seconds, doubts, **told_of(record, results))
+    return _judged(job, "baked", seconds, doubts, **told_of(record, results, Path(job["output"]).parent))
 
 
 def _judged(job: Job, status: Status, seconds: float, doubts: list[str], **more: Any) -> Record:
@@ -205,20 +206,14 @@ def _doubts(job: Job, record: Record) -> list[str]:
     return found
 
 
-def parts_of(record: Record) -> list[Record]:
-    """The records of the maps, or of the primitives with thickness at their vertices, that a record tells of."""
-    found: list[Record] = record.get("maps") or record.get("primitives") or [record]
-    return found
-
-
 def _entry(job: Job, status: Status, seconds: float, error: str | None = None, **more: Any) -> Record:
     entry = {"model": job["model"], "output": job["output"], "status": status, "seconds": seconds, "error": error}
     return {**entry, **more}
 
 
-def told_of(record: Record, results: Any) -> Record:
-    """Range, unit, rays and warnings of a bake, of all its parts together."""
-    parts = parts_of(record)
+def told_of(record: Record, results: Any, folder: Path) -> Record:
+    """Files, range, unit, rays and warnings of a bake, of all its parts together."""
+    parts, files = parts_of(record), files_of(record)
     ranges = [part["range"] for part in parts if part["range"] is not None]
     warnings = [line for part in parts for line in (*part["report"]["warnings"], *part.get("warnings", []))]
     repairs = [line for result in results.values() for line in result.mesh.repairs]
@@ -231,6 +226,9 @@ def told_of(record: Record, results: Any) -> Record:
         "range": whole,
         "rays": sum(part["report"]["rays"] for part in parts),
         "parts": len(parts),
+        "files": [str(folder / one["file"]) for one in files],
+        "uv_file": str(folder / record["uv_file"]["file"]) if "uv_file" in record else None,
+        "left_out": record.get("left_out", []),
         "warnings": list(dict.fromkeys(warnings)),
         "repairs": list(dict.fromkeys(repairs)),
         "hash": record.get("hash"),

@@ -30,7 +30,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from translucent.bake.record import Record, file_hash, read_record, sidecar_of
+from translucent.bake.record import Record, file_hash, files_of, read_record, sidecar_of
 from translucent.bake.thickness_map import ThicknessMap, VertexThickness
 from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output, save_map, save_vertices
 from translucent.errors import InputError
@@ -50,6 +50,10 @@ KEYS = {
     "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
     "resume", "threads", "max_escaped",
 }  # fmt: skip
+#: Which files a bake writes, of which objects; another number makes them anew.
+FILES = 2
+#: How far a part of a body may be from its surface, as a share of the diagonal: as far as rounding can lead.
+ON_SURFACE = 1e-4
 #: Keys that do not change what is written into the file.
 _HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped"}
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
@@ -95,7 +99,7 @@ def _settings(job: Job, diagonal: float) -> Job:
     if job.get("medium") is not None:
         given["medium"] = Medium(absorption=job["medium"])
     # A glTF material may bring the medium that this mode needs.
-    late = given.get("mode") == "transmittance" and stays_gltf(job) and "medium" not in given
+    late = given.get("mode") == "transmittance" and has_parts(job) and "medium" not in given
     BakeSettings(**({**given, "medium": Medium(absorption=1.0)} if late else given))
     return given
 
@@ -108,6 +112,11 @@ def _share(key: str, text: str) -> float:
     if not 0 < share < float("inf"):
         raise InputError(f"{key} {text!r}", "not a share such as '10%'", "give one, or a number of metres")
     return share
+
+
+def has_parts(job: Job) -> bool:
+    """Whether the objects of the model are baked one by one; of other models, and of vertices, all are one mesh."""
+    return Path(job["model"]).suffix.lower() in SUFFIXES and (stays_gltf(job) or not job.get("vertices"))
 
 
 def stays_gltf(job: Job) -> bool:
@@ -125,7 +134,7 @@ def content_hash(job: Job) -> str:
     """
     meant = {key: value for key, value in job.items() if key not in _HOW}
     meant["suffix"] = Path(job["output"]).suffix.lower()
-    digest = hashlib.sha256(json.dumps([VERSION, meant], sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps([VERSION, FILES, meant], sort_keys=True).encode())
     for key in ("model", "high", "cage"):
         if job.get(key) is not None:
             for data in _parts(Path(job[key])):
@@ -150,15 +159,19 @@ def _parts(path: Path) -> list[bytes]:
 
 
 def is_done(job: Job, content: str) -> bool:
-    """Whether the job's output is there, whole, and of this content."""
+    """Whether the job's files are there, whole, and of this content."""
     output = Path(job["output"])
     record = read_record(output)
     return (
         record is not None
         and record.get("hash") == content
-        and output.is_file()
-        and record.get("sha256") == file_hash(output)
+        and bool(files := files_of(record))
+        and all(_is_whole(output.with_name(one["file"]), one.get("sha256")) for one in files)
     )
+
+
+def _is_whole(path: Path, sha256: object) -> bool:
+    return path.is_file() and file_hash(path) == sha256
 
 
 Results = dict[tuple[int, int], Any]
@@ -179,6 +192,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
         As it was written beside the output.
     results : dict
         A `ThicknessMap` or `VertexThickness` per mesh and primitive of a glTF file; else one, for (0, 0).
+        Maps that are files of their own are in the space of the scene, those in a glTF file in that of their meshes.
 
     Raises
     ------
@@ -192,7 +206,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     for path in (output, sidecar_of(output)):
         remove_partial(path)
     about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
-    if stays_gltf(job):
+    if has_parts(job):
         from translucent.bake.gltf_bake import bake_gltf
 
         return bake_gltf(job, about, progress)
@@ -209,7 +223,12 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
 
 
 def bake_one(
-    job: Job, mesh: Mesh, medium: Medium | None = None, progress: Progress | None = None, part: str = ""
+    job: Job,
+    mesh: Mesh,
+    medium: Medium | None = None,
+    progress: Progress | None = None,
+    part: str = "",
+    around: Mesh | None = None,
 ) -> ThicknessMap | VertexThickness:
     """Bake one mesh as a job asks for.
 
@@ -222,6 +241,8 @@ def bake_one(
     progress : callable, optional
     part : str
         Tells the parts of a job apart that keep what is finished.
+    around : Mesh, optional
+        The body of whose surface the mesh is a part.
     """
     from translucent.bake.bake import bake_thickness
     from translucent.bake.vertices import bake_vertex_thickness
@@ -229,6 +250,8 @@ def bake_one(
     given = _settings(job, mesh.diagonal)
     if given.get("mode") == "transmittance":
         given.setdefault("medium", medium)
+    if around is not None and not (job.get("vertices") or job.get("high")):
+        given |= {"high": around, "high_distance": ON_SURFACE * around.diagonal}
     for key in ("high", "cage"):
         if job.get(key) is not None:
             given[key] = load_mesh(job[key], unit=job.get("unit", "m"))

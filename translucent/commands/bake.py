@@ -83,7 +83,7 @@ def _bake_one(job: Job, check: bool, as_json: bool) -> None:
         raise InputError("--check", "mode 'local' is no length", "choose another mode")
     with _progress(Path(job["model"]).name) as progress:
         record, results = bake_file(job, progress)
-    told = {"output": job["output"], **told_of(record, results)}
+    told = {"output": job["output"], **told_of(record, results, Path(job["output"]).parent)}
     checks = _check(job, record, results) if check else {}
     if as_json:
         click.echo(json.dumps({**told, "record": record, **checks}))
@@ -116,13 +116,19 @@ def _progress(label: str) -> Iterator[Progress | None]:
 
 def _lines(record: Record, told: Record) -> Iterator[str]:
     """What a bake was, for people."""
-    size = "x".join(map(str, record["size"])) + ", " if "size" in record else ""
-    found, unit = told["range"], "" if told["unit"] == "1" else f" {told['unit']}"
-    yield f"{told['output']}: {size}{record['mode']}, {found['min']:.4g} to {found['max']:.4g}{unit}"
-    parts = record.get("maps") or record.get("primitives") or [record]
+    from translucent.bake.record import parts_of
+
+    parts = parts_of(record)
+    unit = "" if told["unit"] == "1" else f" {told['unit']}"
+    in_files = len(parts) > 1 and "file" in parts[0]
+    if not in_files:
+        yield _size_line(told["output"], record, told["range"], unit)
     for part in parts:
         report, encoding = part["report"], part["encoding"]
         name = f"{part['mesh']['name']}: " if len(parts) > 1 else ""
+        if in_files:
+            file = str(Path(told["output"]).with_name(part["file"]))
+            yield _size_line(file, part, part["range"] or told["range"], unit)
         if part.get("warnings"):
             yield f"{name}{'; '.join(part['warnings'])}"
             continue
@@ -132,6 +138,14 @@ def _lines(record: Record, told: Record) -> Iterator[str]:
             f"{name}{report['rays'] / 1e6:.3g} million rays in {report['seconds']:.1f} s, standard error "
             f"{report['mean_standard_error']:.2g} on average, {report['max_standard_error']:.2g} at most{factor}{step}"
         )
+    if told["uv_file"]:
+        yield f"{told['uv_file']}: the model with the UVs that were made for this map"
+    yield from (f"left out, {line}" for line in told["left_out"])
+
+
+def _size_line(file: str, record: Record, found: Record, unit: str) -> str:
+    size = "x".join(map(str, record["size"])) + ", " if "size" in record else ""
+    return f"{file}: {size}{record['mode']}, {found['min']:.4g} to {found['max']:.4g}{unit}"
 
 
 def _check(job: Job, record: Record, results: Results) -> dict[str, Any]:
@@ -141,10 +155,11 @@ def _check(job: Job, record: Record, results: Results) -> dict[str, Any]:
 
     checks = check_output(job, record, results)
     path = Path(f"{job['output']}.check.png")
-    write_picture(list(checks.values()), path)
-    lines = [line for name, one in checks.items() for line in (f"check of {name!r}:", *str(one).split("\n"))]
+    write_picture([one for one in checks.values() if one is not None], path)
+    hidden = "it is hidden behind other parts of its body"
+    lines = [line for name, one in checks.items() for line in (f"check of {name!r}:", *str(one or hidden).split("\n"))]
     return {
-        "check": {name: one.summary() for name, one in checks.items()},
+        "check": {name: None if one is None else one.summary() for name, one in checks.items()},
         "check_picture": str(path),
         "lines": [*lines, f"{path}: with the map, true, difference"],
     }
