@@ -245,16 +245,21 @@ def _read(path: Path) -> tuple[Array, npt.NDArray[np.int32], Array | None]:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             scene = trimesh.load_scene(path, process=False)
-            geometry = scene.to_mesh()
+            parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
     except Exception as error:  # each of trimesh's readers raises its own kinds
         raise InputError(
             asked, f"it cannot be read ({type(error).__name__}: {error})", "export the mesh again"
         ) from error
-    if len(geometry.faces) == 0:
+    if not parts:
         raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
-    coordinates = getattr(geometry.visual, "uv", None)
-    uv = None if coordinates is None or len(coordinates) != len(geometry.vertices) else np.array(coordinates)
-    return np.array(geometry.vertices, dtype=np.float64), np.array(geometry.faces, dtype=np.int32), uv
+    # Not by trimesh's to_mesh(), which packs the textures of several materials and moves the uv along.
+    vertices = np.concatenate([part.vertices for part in parts]).astype(np.float64)
+    first = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    faces = np.concatenate([part.faces + begin for part, begin in zip(parts, first, strict=True)]).astype(np.int32)
+    coordinates: list[Any] = [getattr(part.visual, "uv", None) for part in parts]
+    if any(uv is None or len(uv) != len(part.vertices) for uv, part in zip(coordinates, parts, strict=True)):
+        return vertices, faces, None
+    return vertices, faces, np.concatenate(coordinates).astype(np.float64)
 
 
 def mended(raw: Mesh) -> Mesh:
