@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError
+from translucent.extras import require_package
 from translucent.film import write_film
 from translucent.frame import make_folder, write_png
 from translucent.paths import require_folder, require_place, write_atomically
@@ -46,12 +47,7 @@ def check_animation(path: Path, fps: float) -> None:
         )
     require_place(path, asked)
     if path.suffix.lower() == ".mp4":
-        try:
-            import imageio_ffmpeg  # noqa: F401
-        except ImportError:
-            raise RenderError(
-                asked, "the imageio-ffmpeg package is not installed", "pip install imageio-ffmpeg"
-            ) from None
+        require_package("imageio_ffmpeg", asked, "use .webp or .gif")
 
 
 def write_animation(path: str | Path, frames: Iterable[Pixels], fps: float = DEFAULT_FPS) -> None:

@@ -17,11 +17,12 @@ from translucent.gpu.renderer import SHADER_STORAGE
 
 #: Packages beside the core, and what each is for.
 OPTIONAL = {
-    "OpenEXR": "writing .exr files (pip install openexr)",
-    "imgui-bundle": "the window of translucent preview (pip install imgui-bundle tomli-w)",
-    "xatlas": "baking meshes without texture coordinates (pip install xatlas)",
-    "matplotlib": "the page of translucent report (pip install matplotlib jinja2)",
-    "distributed": "baking on a Dask cluster (pip install distributed)",
+    "OpenEXR": "writing .exr files (pip install 'translucent-shading[exr]')",
+    "imgui-bundle": "the window of translucent preview (pip install 'translucent-shading[ui]')",
+    "xatlas": "baking meshes without texture coordinates (pip install 'translucent-shading[bake]')",
+    "matplotlib": "the page of translucent report (pip install 'translucent-shading[report]')",
+    "distributed": "baking on a Dask cluster (pip install 'translucent-shading[cluster]')",
+    "imageio-ffmpeg": "turntables as .mp4 (pip install 'translucent-shading[video]')",
     "lavavu-osmesa": "a software OpenGL where the system has none (pip install --no-deps lavavu-osmesa)",
 }
 CORE = ("numpy", "scipy", "trimesh", "moderngl", "glcontext", "pillow", "click", "pyrender", "embreex")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.color import srgb_to_linear
 from translucent.environment_map import EnvironmentMap
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError
 from translucent.paths import require_file
 from translucent.radiance_hdr import read_radiance
 from translucent.reading import read_bytes, shown
@@ -45,12 +45,6 @@ def read_environment_map(path: str | Path) -> EnvironmentMap:
 
 
 def _read_exr(path: Path) -> Pixels:
-    try:
-        import OpenEXR  # noqa: F401
-    except ImportError:
-        raise RenderError(
-            f"environment {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
-        ) from None
     _, channels = read_exr(path, f"environment {str(path)!r}")
     for names in ("RGB", "YYY"):
         if set(names) <= channels.keys():

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from translucent.color import exposure_scale, linear_to_srgb
 from translucent.errors import InputError, RenderError
+from translucent.extras import require_package
 from translucent.paths import require_folder, require_place, write_atomically
 from translucent.render_plan import RenderPlan
 from translucent.tone import tone_curve
@@ -274,11 +275,4 @@ def check_output(path: Path) -> None:
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
     require_place(path, f"output {str(path)!r}")
     if path.suffix.lower() == ".exr":
-        try:
-            import OpenEXR  # noqa: F401
-        except ImportError:
-            raise RenderError(
-                f"output {str(path)!r}",
-                "the OpenEXR package is not installed",
-                "pip install openexr",
-            ) from None
+        require_package("OpenEXR", f"output {str(path)!r}")

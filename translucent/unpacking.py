@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.extras import require_package
 from translucent.reading import open_file, require_room, shown
 
 if TYPE_CHECKING:
@@ -129,8 +130,7 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
     InputError
         If it is none, is damaged, or has too many pixels for its file.
     """
-    import OpenEXR
-
+    OpenEXR = require_package("OpenEXR", asked)
     with open_file(path, asked) as stream:
         stored = os.fstat(stream.fileno()).st_size
     try:

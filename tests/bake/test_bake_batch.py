@@ -175,7 +175,7 @@ def test_a_batch_is_what_one_by_one_is(make_jobs: Any, tmp_path: Path) -> None:
     whole(together)
     again = bake_many(together, Serial())
     assert again.count("skipped") == 4
-    assert "0 baked, 4 skipped, 0 failed" in str(again)
+    assert "0 baked, 0 suspect, 4 skipped, 0 failed" in str(again)
     json.dumps(report.summary(), allow_nan=False)
 
 
@@ -188,7 +188,7 @@ def test_a_bad_asset_stops_no_other(make_jobs: Any, tmp_path: Path) -> None:
     assert [asset["status"] for asset in report.assets] == ["baked", "failed", "baked", "failed"]
     assert "it has no faces" in report.assets[1]["error"] or "cannot be read" in report.assets[1]["error"]
     assert report.assets[3]["error"] == f"mesh {jobs[3]['model']!r}; no such file; check the path"
-    assert "2 baked, 0 skipped, 2 failed" in str(report)
+    assert "2 baked, 0 suspect, 0 skipped, 2 failed" in str(report)
     whole([jobs[0], jobs[2]])
 
 

@@ -153,7 +153,8 @@ def test_the_medium_of_the_material_is_that_of_the_mode(run: Run, ball_glb: Path
         (["bear", "-o", "{}/t.tif"], r"suffix '\.tif'", 2),
         (["bear", "-o", "{}/no/t.exr"], "no folder", 2),
         (["bear", "-o", "{}/t.exr", "--size", "0"], "size 0; not a whole number in 1", 2),
-        (["bear", "-o", "{}/t.exr", "--rays", "0"], "rays 0; not a whole number in 2", 2),
+        (["bear", "-o", "{}/t.exr", "--rays", "1"], "rays 1; not a whole number in 2", 2),
+        (["bear", "-o", "{}/t.exr", "--rays", "0", "--mode", "normal"], "rays 0; not a whole number in 1", 2),
         (["bear", "-o", "{}/t.exr", "--spread", "0"], "spread 0.0; not in 0 < spread", 2),
         (["bear", "-o", "{}/t.exr", "--max-distance", "far"], "--max-distance 'far'; length 'far'", 2),
         (["bear", "-o", "{}/t.exr", "--max-distance", "-1cm"], "--max-distance '-1cm'; .*not positive", 2),
@@ -175,7 +176,10 @@ def test_the_medium_of_the_material_is_that_of_the_mode(run: Run, ball_glb: Path
         (["bear", "-o", "{}/t.glb", "--mode", "local"], "mode 'local' has no unit", 2),
         (["bear", "-o", "{}/t.glb", "--tile", "1001"], "glTF has no tiles", 2),
         (["bear", "-o", "{}/t.exr", "--jobs", "2"], "--jobs 2; it is for many models", 2),
-        (["bear", "--out-dir", "{}/maps", "--jobs", "0"], "no folder|0 processes", 2),
+        (["bear", "-o", "{}/t.exr", "--max-escaped", "2%"], "--max-escaped 2%; it is for many models", 2),
+        (["bear", "--out-dir", "{}/maps", "--max-escaped", "2"], "--max-escaped '2'; not a share", 2),
+        (["bear", "--out-dir", "{}/maps", "--max-escaped", "few"], "--max-escaped 'few'; not a share", 2),
+        (["bear", "--out-dir", "{}/maps/deep", "--jobs", "0", "--format", "npy"], "0 processes", 2),
         (["bear", "--out-dir", "{}", "--check"], "it looks at one model", 2),
         (["bear", "--out-dir", "{}", "--dask", "tcp://x:1", "--jobs", "2"], "--dask is given, too", 2),
         (["bear", "-o", "{}/t.ply", "--vertices", "--check"], "it looks at maps", 2),
@@ -217,22 +221,57 @@ def test_many_models_and_a_bad_one(run: Run, make_ball: Any, tmp_path: Path) -> 
     for model in models:
         make_ball(1).export(model)
     models[1].write_text("nothing")
-    out = tmp_path / "maps"
-    out.mkdir()
-    arguments = (*models, "--out-dir", out, "--format", "png", *QUICK, "--jobs", 2)
+    out = tmp_path / "maps" / "of today"
+    arguments = ("nobody", *models, "--out-dir", out, "--format", "png", *QUICK, "--jobs", 2)
     result = run(*arguments)
     assert result.code == 1
-    assert result.err.startswith("error: 1 of 3 models failed; the others are done")
-    rows = result.out.splitlines()
-    assert [row.split()[:2] for row in rows[:3]] == [["a.obj", "baked"], ["b.obj", "failed"], ["c.obj", "baked"]]
-    assert rows[3].startswith("2 baked, 0 skipped, 1 failed in ")
+    assert result.err.startswith("error: 2 of 4 models failed; the others are done")
+    *rows, total = result.out.splitlines()
+    assert [row.split()[0] for row in rows] == ["1/4", "2/4", "3/4", "4/4"]
+    assert all("left" in row for row in rows[:3])
+    assert "left" not in rows[3]
+    told = sorted(row.split()[1:3] for row in rows)
+    assert told == [["a.obj", "baked"], ["b.obj", "failed"], ["c.obj", "baked"], ["nobody", "failed"]]
+    assert "mesh 'nobody'; no file and no mesh of the toolkit" in rows[3]
+    assert total.startswith("2 baked, 0 suspect, 0 skipped, 2 failed in ")
     assert sorted(path.name for path in out.iterdir()) == ["a.png", "a.png.json", "c.png", "c.png.json"]
     models[1].unlink()
     make_ball(1).export(models[1])
-    found = json.loads(run(*arguments[:-1], 1, "--json").out)
+    result = run(*arguments[1:-1], 1, "--json")
+    found = json.loads(result.out)
     assert [asset["status"] for asset in found["assets"]] == ["skipped", "baked", "skipped"]
-    assert found["failed"] == 0
+    assert (found["failed"], result.code) == (0, 0)
+    assert [line.split()[0] for line in result.err.splitlines()] == ["1/3", "2/3", "3/3"]
     refused(run(*models, ball_twin(tmp_path), "--out-dir", out), "rename one of them")
+
+
+@pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")  # of the holes
+def test_maps_that_cannot_be_right_are_suspect(run: Run, make_ball: Any, tmp_path: Path) -> None:
+    """Twice: a map that is there already is as suspect as it was."""
+    whole, opened, sheet = make_ball(1), make_ball(1), make_ball(1)
+    opened.faces, sheet.faces = opened.faces[8:], sheet.faces[:1]
+    for name, mesh in (("whole", whole), ("opened", opened), ("sheet", sheet)):
+        mesh.export(tmp_path / f"{name}.obj")
+    models = [tmp_path / f"{name}.obj" for name in ("whole", "opened", "sheet")]
+    arguments = (*models, "--out-dir", tmp_path / "maps", "--format", "npy", *QUICK, "--jobs", 1)
+    for again in ("baked", "skipped"):
+        result = run(*arguments)
+        assert result.code == 0, result.err
+        rows = {row.split()[1]: row for row in result.out.splitlines()[:3]}
+        assert [rows[f"{name}.obj"].split()[2] for name in ("whole", "opened", "sheet")] == [again, *2 * ["suspect"]]
+        assert re.search(r"\d+% of the rays have no exit, more than 0\.05", rows["opened.obj"])
+        assert "the thickness is 0 everywhere" in rows["sheet.obj"]
+    found = json.loads(run(*arguments, "--max-escaped", "100%", "--json").out)
+    assert [asset["status"] for asset in found["assets"]] == ["skipped", "skipped", "suspect"]
+    assert found["suspect"] == 1
+
+
+def test_lines_come_one_by_one(run: Run, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is there, for a pipe as well, when the next asset is not done yet."""
+    flushed = []
+    monkeypatch.setattr("sys.stdout.flush", lambda: flushed.append(True), raising=False)
+    assert run(ball, "none.obj", "--out-dir", tmp_path / "maps", "--format", "npy", *QUICK, "--jobs", 1).code == 1
+    assert len(flushed) >= 2
 
 
 def ball_twin(folder: Path) -> Path:
@@ -256,9 +295,6 @@ def test_a_terminal_shows_rate_and_time_left(ball: Path, tmp_path: Path, monkeyp
     shown = screen.getvalue()
     assert "ball.obj" in shown
     assert re.search(r"100%.*Mrays/s", shown)
-    screen.truncate(0)
-    assert main(["bake", str(ball), "--out-dir", str(tmp_path), "--format", "npz", *QUICK, "--jobs", "1"]) == 0
-    assert "ball.obj baked" in screen.getvalue()
 
 
 def test_a_pipe_shows_no_bar(run: Run, ball: Path, tmp_path: Path) -> None:

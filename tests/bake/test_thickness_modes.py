@@ -183,3 +183,14 @@ def test_a_cavity_ends_the_first_length_and_not_the_total() -> None:
     assert np.allclose(
         tl.bake_vertex_thickness(shell, "normal", gaps="total", max_distance=0.03).values[outer], 0.004, rtol=0.02
     )
+
+
+def test_along_the_normal_one_ray_is_enough() -> None:
+    mesh = Sphere(radius=0.03).tessellate(24)
+    one, many = (tl.bake_thickness(mesh, 16, mode="normal", rays=rays) for rays in (1, 64))
+    np.testing.assert_array_equal(one.values, many.values)
+    assert one.report.rays == many.report.rays
+    vertices = [tl.bake_vertex_thickness(mesh, mode="normal", rays=rays).values for rays in (1, 64)]
+    np.testing.assert_array_equal(*vertices)
+    with pytest.raises(tl.InputError, match="rays 1; not a whole number in 2"):
+        tl.bake_thickness(mesh, 16, rays=1)

@@ -228,3 +228,19 @@ def test_text_in_latin_1_is_read(tmp_path: Path) -> None:
         "# modèle\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n".encode("latin-1")
     )
     assert load_mesh(path).diagnosis.solid
+
+
+def test_texture_coordinates_of_several_materials_stay_as_they_are(tmp_path: Path) -> None:
+    from PIL import Image
+
+    for name in "ab":
+        Image.new("RGB", (8, 8), (9, 8, ord(name))).save(tmp_path / f"{name}.png")
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n")
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.1 0.2\nvt 0.9 0.2\nvt 0.1 0.8\n"
+    faces = "usemtl a\nf 1/1 3/2 2/3\nf 1/1 2/2 4/3\nusemtl b\nf 1/1 4/2 3/3\nf 2/1 3/2 4/3\n"
+    (tmp_path / "m.obj").write_text(f"mtllib m.mtl\n{corners}{faces}")
+    mesh = tl.load_mesh(tmp_path / "m.obj")
+    assert mesh.diagnosis.solid
+    assert mesh.uv is not None
+    np.testing.assert_allclose(mesh.uv[mesh.faces].min(axis=(0, 1)), [0.1, 0.2])
+    np.testing.assert_allclose(mesh.uv[mesh.faces].max(axis=(0, 1)), [0.9, 0.8])

@@ -120,12 +120,14 @@ def test_the_pieces_of_a_gltf_become_one_chunk(in_pieces: Path, tmp_path: Path) 
     assert all(view["byteOffset"] % 4 == 0 for view in new[1:])
     (buffer,) = after.items("buffers")
     assert (buffer["name"], set(buffer)) == ("first", {"name", "byteLength"})
-    # Of each buffer as many bytes as it says, in steps of 4: 6, 40, 28; then the image.
-    assert (new[3]["byteOffset"], buffer["byteLength"]) == (8 + 40 + 28, 76 + new[3]["byteLength"])
+    # Of each buffer as many bytes as it says, in steps of 4: 6, 40, 28; then the images.
+    assert new[3]["byteOffset"] == 8 + 40 + 28
+    assert buffer["byteLength"] == new[4]["byteOffset"] + new[4]["byteLength"]
     inside, beside = after.items("images")
     assert (inside["name"], inside["mimeType"], inside["bufferView"]) == ("inside", "image/png", 3)
-    assert after.resource(inside) == before.resource(before.items("images")[0])
-    assert beside == {"uri": "in/beside.png"}
+    assert beside == {"mimeType": "image/png", "bufferView": 4}
+    for index, image in enumerate((inside, beside)):
+        assert after.resource(image) == before.resource(before.items("images")[index])
     kept = ("materials", "meshes", "accessors", "textures", "nodes")
     assert [after.tree[key] for key in kept] == [before.tree[key] for key in kept]
     loaded = [next(iter(trimesh.load_scene(path).geometry.values())) for path in (in_pieces, tmp_path / "out.glb")]
@@ -168,6 +170,41 @@ def test_pieces_that_are_broken_are_refused(tmp_path: Path, change: Json, messag
     with pytest.raises(tl.InputError, match=message):
         write_gltf(GltfFile(tmp_path / "a.gltf", gltf({}, **change)), tmp_path / "a.glb")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_glb_holds_its_images_wherever_they_were(two_boxes: Path, tmp_path: Path) -> None:
+    """Of a .glb with links, too, whose other chunks stay behind; the same bytes without their folder."""
+    for folder in ("deep/model", "textures"):
+        (tmp_path / folder).mkdir(parents=True)
+    Image.new("RGB", (2, 1), (9, 8, 7)).save(tmp_path / "textures" / "a b.jpg")
+    linked = read_gltf(two_boxes)
+    linked.tree["images"] = [{"uri": "../../textures/a%20b.jpg", "name": "kept"}]
+    linked = GltfFile(tmp_path / "deep" / "model" / "boxes.glb", linked.tree, linked.chunks)
+    write_gltf(linked, tmp_path / "out.glb")
+    file = read_gltf(tmp_path / "out.glb")
+    (image,) = file.items("images")
+    assert (image["name"], image["mimeType"], "uri" in image) == ("kept", "image/jpeg", False)
+    assert file.resource(image) == (tmp_path / "textures" / "a b.jpg").read_bytes()
+    assert file.chunks.endswith(b"more")
+    assert file.resource({"bufferView": 0}) == read_gltf(two_boxes).resource({"bufferView": 0})
+    write_gltf(linked, tmp_path / "out.gltf")
+    assert read_gltf(tmp_path / "out.gltf").tree["images"][0]["uri"] == "textures/a%20b.jpg"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("gone.png", None, "'gone.png' cannot be read.*; the image stays a link"),
+        ("secret.txt", b"root:x:0", "'secret.txt' is no picture that glTF knows; it stays a link"),
+    ],
+)
+def test_what_is_no_picture_is_not_copied(tmp_path: Path, name: str, content: bytes | None, message: str) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    tree = gltf({}, images=[{"uri": name}, {"uri": "https://example.org/a.png"}])
+    with pytest.warns(tl.TranslucentWarning, match=message):
+        write_gltf(GltfFile(tmp_path / "a.gltf", tree), tmp_path / "a.glb")
+    assert read_gltf(tmp_path / "a.glb").tree == tree
 
 
 def test_an_image_without_a_kind_stays_as_it_is(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.bake.canvas import Canvas, Checkpoint, bake_key
 from translucent.bake.high_low import Projection
@@ -24,6 +25,10 @@ from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentWarning
 from translucent.medium import Medium
 from translucent.mesh import Mesh
+
+#: Share of the surface that may have no texel of its own before a warning says so, and how many texels per face a map
+#: has that could show all.
+MOST_HIDDEN, ENOUGH_TEXELS = 0.1, 4
 
 
 def bake_thickness(
@@ -73,7 +78,8 @@ def bake_thickness(
     mode : str
         As above.
     rays : int
-        From each point, >= 2; powers of 2 are best. Mode "normal" casts one; "inscribed" begins with them.
+        From each point, >= 2; powers of 2 are best. Mode "normal" casts one, whatever is given, and takes 1, too;
+        "inscribed" begins with them.
     spread : float
         Full angle of the cone in degrees, 0 < spread <= 180.
     seed : int
@@ -191,6 +197,13 @@ def _strips(mesh: Mesh, unwrapped: Unwrapped, settings: BakeSettings, high: Mesh
     return Strips(low, shown, atlas, Measure.of(detailed, settings), projection)
 
 
+def _share_of_area(strips: Strips, chosen: npt.NDArray[np.bool_]) -> float:
+    """The share that the chosen ones of the faces that are shown have in their area."""
+    a, b, c = strips.low.corners[strips.shown].transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return float(area[chosen].sum() / area.sum())
+
+
 def _report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, seconds: float) -> BakeReport:
     cast, samples = max(canvas.count("cast"), 1), max(canvas.count("samples"), 1)
     errors = canvas.errors[canvas.valued]
@@ -201,6 +214,11 @@ def _report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, s
     said += escape_warnings(escaped, source is None or source.diagnosis.closed)
     if overlapping := canvas.count("overlapping"):
         said.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
+    hidden = ~canvas.owners[strips.shown]
+    share = _share_of_area(strips, hidden)
+    if share > MOST_HIDDEN and canvas.size**2 > ENOUGH_TEXELS * len(hidden):
+        count = f"{hidden.sum()} of {len(hidden)} faces, {share:.0%} of the surface,"
+        said.append(f"{count} have no texel: they are too small in UV, or lie below others there")
     if missed:
         said.append(f"{missed:.2%} of the samples found no surface of the high mesh; they get the value beside them")
     if degenerate:
@@ -214,7 +232,7 @@ def _report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, s
         samples=canvas.count("samples"),
         texels=int(canvas.coverage.sum()),
         overlapping_texels=overlapping,
-        faces_without_texel=len(strips.shown) - int(canvas.owners.sum()),
+        faces_without_texel=int(hidden.sum()),
         degenerate_faces=degenerate,
         udim_tiles=tuple(tile for tile in unwrapped.tiles if tile),
         uv_from=unwrapped.made_by,

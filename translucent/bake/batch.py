@@ -11,12 +11,15 @@ from typing import Any, Literal, get_args
 
 from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
 from translucent.bake.local_pool import in_processes
-from translucent.bake.record import Record
+from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentError
 from translucent.version import VERSION
 
-Status = Literal["baked", "skipped", "failed"]
+Status = Literal["baked", "suspect", "skipped", "failed"]
+
+#: Share of rays without an exit above which a map is suspect.
+MAX_ESCAPED = 0.05
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,9 @@ class BatchReport:
     Attributes
     ----------
     assets : tuple of dict
-        Per job, in the order in which they were given: ``model``, ``output``, ``status`` (baked, skipped or failed),
-        ``seconds``, ``error`` (None, or one line) and of baked ones ``range``, ``rays`` and ``warnings``.
+        Per job, in the order in which they were given: ``model``, ``output``, ``status`` (baked, suspect, skipped or
+        failed), ``seconds``, ``error`` (None, or one line), of baked and suspect ones ``range``, ``rays`` and
+        ``warnings``, and of suspect ones ``doubts``. What is suspect is written, and stays so when it is done already.
     seconds : float
         From the first to the last.
     """
@@ -46,19 +50,25 @@ class BatchReport:
 
     def __str__(self) -> str:
         name = max((len(Path(asset["model"]).name) for asset in self.assets), default=0)
-        lines = [_line(asset, name) for asset in self.assets]
-        total = f"{self.count('baked')} baked, {self.count('skipped')} skipped, {self.count('failed')} failed"
-        return "\n".join([*lines, f"{total} in {self.seconds:.1f} s"])
+        return "\n".join([*(asset_line(asset, name) for asset in self.assets), self.total])
+
+    @property
+    def total(self) -> str:
+        """How many have which status, in one line."""
+        counts = ", ".join(f"{self.count(status)} {status}" for status in get_args(Status))
+        return f"{counts} in {self.seconds:.1f} s"
 
 
-def _line(asset: Record, width: int) -> str:
+def asset_line(asset: Record, width: int = 0) -> str:
+    """What became of one asset, its name `width` characters wide."""
     told = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
     if asset["status"] == "failed":
         return f"{told}  {asset['error']}"
     if found := asset.get("range"):
         told += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
+        told += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
     turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
-    return told + "".join(f"; {line}" for line in [*turned, *asset.get("warnings", [])])
+    return told + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
 
 
 def bake_many(
@@ -146,6 +156,11 @@ def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
             future.cancel()
 
 
+def failed_entry(job: Job, error: str) -> Record:
+    """The entry of a job that nobody could begin."""
+    return _entry(job, "failed", 0.0, error=error)
+
+
 def _lost(job: Job) -> Record:
     return _entry(job, "failed", 0.0, error="its process died; out of memory, or a crash; try a smaller --size")
 
@@ -161,14 +176,34 @@ def run_job(job: Job, version: str | None = None) -> Record:
     try:
         content = content_hash(job)
         if is_done(job, content):
-            return _entry(job, "skipped", time.perf_counter() - started)
+            doubts = _doubts(job, read_record(Path(job["output"])) or {})
+            return _judged(job, "skipped", time.perf_counter() - started, doubts)
         record, results = bake_file(job)
     except TranslucentError as error:
         return _entry(job, "failed", time.perf_counter() - started, error=str(error))
     except Exception as error:  # noqa: BLE001 - a defect of ours, or a full memory: the others go on
         told = f"unexpected {type(error).__name__}; {error or 'no details'}"
         return _entry(job, "failed", time.perf_counter() - started, error=told)
-    return _entry(job, "baked", time.perf_counter() - started, **told_of(record, results))
+    seconds, doubts = time.perf_counter() - started, _doubts(job, record)
+    return _judged(job, "baked", seconds, doubts, **told_of(record, results, Path(job["output"]).parent))
+
+
+def _judged(job: Job, status: Status, seconds: float, doubts: list[str], **more: Any) -> Record:
+    if not doubts:
+        return _entry(job, status, seconds, **more)
+    return _entry(job, "suspect", seconds, doubts=doubts, **more)
+
+
+def _doubts(job: Job, record: Record) -> list[str]:
+    """Why the maps of a record are suspect."""
+    most, found = job.get("max_escaped", MAX_ESCAPED), []
+    for part in parts_of(record):
+        name = f"{part['mesh']['name']}: " if "maps" in record else ""
+        if (escaped := part["report"]["escaped"]) > most:
+            found.append(f"{name}{escaped:.0%} of the rays have no exit, more than {most:.3g}")
+        if part["range"] is None or part["range"]["max"] == 0:
+            found.append(f"{name}the thickness is 0 everywhere")
+    return found
 
 
 def _entry(job: Job, status: Status, seconds: float, error: str | None = None, **more: Any) -> Record:
@@ -176,9 +211,9 @@ def _entry(job: Job, status: Status, seconds: float, error: str | None = None, *
     return {**entry, **more}
 
 
-def told_of(record: Record, results: Any) -> Record:
-    """Range, unit, rays and warnings of a bake, of all its parts together."""
-    parts = record.get("maps") or record.get("primitives") or [record]
+def told_of(record: Record, results: Any, folder: Path) -> Record:
+    """Files, range, unit, rays and warnings of a bake, of all its parts together."""
+    parts, files = parts_of(record), files_of(record)
     ranges = [part["range"] for part in parts if part["range"] is not None]
     warnings = [line for part in parts for line in (*part["report"]["warnings"], *part.get("warnings", []))]
     repairs = [line for result in results.values() for line in result.mesh.repairs]
@@ -191,6 +226,9 @@ def told_of(record: Record, results: Any) -> Record:
         "range": whole,
         "rays": sum(part["report"]["rays"] for part in parts),
         "parts": len(parts),
+        "files": [str(folder / one["file"]) for one in files],
+        "uv_file": str(folder / record["uv_file"]["file"]) if "uv_file" in record else None,
+        "left_out": record.get("left_out", []),
         "warnings": list(dict.fromkeys(warnings)),
         "repairs": list(dict.fromkeys(repairs)),
         "hash": record.get("hash"),

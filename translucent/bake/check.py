@@ -32,6 +32,13 @@ from translucent.showcase import showcase
 
 Array = npt.NDArray[np.float64]
 
+#: What is this close, as a share of the diagonal, is one surface.
+SAME_PLACE = 1e-4
+
+
+class NotSeenError(InputError):
+    """No pixel shows the surface that a map is for."""
+
 
 @dataclass(frozen=True, eq=False)
 class MapCheck:
@@ -46,6 +53,8 @@ class MapCheck:
         True one, over the same pixels, in metres.
     background : (h, w, 3)
         Radiance without the body.
+    empty : float
+        Share of these pixels at which the map has no value.
     """
 
     baked: Frame
@@ -54,6 +63,7 @@ class MapCheck:
     transmittance: Errors
     mean_thickness: float
     background: Array
+    empty: float = 0.0
 
     def summary(self) -> dict[str, Any]:
         """The errors in values that JSON can hold."""
@@ -61,16 +71,18 @@ class MapCheck:
             "thickness": dataclasses.asdict(self.thickness),
             "transmittance": dataclasses.asdict(self.transmittance),
             "mean_thickness": self.mean_thickness,
+            "empty": self.empty,
         }
 
     def __str__(self) -> str:
         share = 100.0 / self.mean_thickness
         found, passed = self.thickness, self.transmittance
+        bare = f"\n{self.empty:.1%} of what is seen has no value in the map" if self.empty else ""
         return (
             f"thickness      rms {found.rms:.4g} m, {share * found.rms:.3g} % of the mean {self.mean_thickness:.4g} m; "
             f"median {found.median:.4g} m, p99 {found.p99:.4g} m, bias {found.bias:+.4g} m\n"
             f"transmittance  rms {passed.rms:.4g}, median {passed.median:.4g}, p99 {passed.p99:.4g}, "
-            f"bias {passed.bias:+.4g}"
+            f"bias {passed.bias:+.4g}{bare}"
         )
 
 
@@ -80,6 +92,7 @@ def check_map(
     medium: Medium | None = None,
     size: tuple[int, int] = (480, 480),
     camera: Camera | None = None,
+    body: Mesh | None = None,
 ) -> MapCheck:
     """Compare the look of a thickness map with the truth.
 
@@ -95,15 +108,17 @@ def check_map(
         Of the picture in pixels.
     camera : Camera, optional
         Default: from the front right and above, the whole mesh in view.
+    body : Mesh, optional
+        The closed body that the mesh is a part of; pixels that show other parts of it do not count.
 
     Raises
     ------
     InputError
-        If the mesh has no uv, or no pixel shows both.
+        If the mesh has no uv, or no pixel shows both; `NotSeenError` if the rest of the body hides the mesh.
     RenderError
         If embreex is missing.
     """
-    scene = showcase(mesh, medium, size, camera)
+    scene = showcase(body or mesh, medium, size, camera)
     renderer = CpuRenderer()
     true = renderer.render(scene, size, plan(scene, None, renderer.capabilities), 1)
     renderer.close()
@@ -112,8 +127,10 @@ def check_map(
     inside = scene.bodies[0].medium
     assert inside is not None  # a showcase has one
     seen = true.coverage & true.valid
-    found = first_uv(mesh, scene.camera, size)
+    found = first_uv(mesh, scene.camera, size, body)
     covered = seen & np.isfinite(found).all(axis=-1)
+    if body is not None and not covered.any():
+        raise NotSeenError(f"check of {mesh.name!r}", "other parts of its body hide it", "give another camera")
     thickness = np.zeros(covered.shape)
     thickness[covered] = look_up(mesh, values, found[covered])
     with np.errstate(under="ignore"):
@@ -129,7 +146,8 @@ def check_map(
     )
     errors = [compare(baked, true, quantity) for quantity in ("thickness", "transmittance")]
     mean = float(true.thickness[covered].mean(dtype=np.float64))
-    return MapCheck(baked, true, errors[0], errors[1], mean, background)
+    empty = float(np.mean(thickness[covered] == 0))
+    return MapCheck(baked, true, errors[0], errors[1], mean, background, empty)
 
 
 def look_up(mesh: Mesh, values: npt.ArrayLike, uv: Array) -> Array:
@@ -138,8 +156,10 @@ def look_up(mesh: Mesh, values: npt.ArrayLike, uv: Array) -> Array:
     return sample(np.asarray(values, dtype=np.float64), coordinates, wrapping(mesh))
 
 
-def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> Array:
+def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | None = None) -> Array:
     """(h, w, 2): uv where the ray of each pixel first meets the mesh, v upwards; NaN where it does not.
+
+    Nor where other parts of the body are in front of it.
 
     Raises
     ------
@@ -148,19 +168,28 @@ def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> Array:
     """
     if mesh.uv is None:
         raise InputError(f"mesh {mesh.name!r}", "it has no uv", "bake a map first; its mesh has them")
+    face, distance = _first_hits(mesh, camera, size)
+    hit = face >= 0
+    if body is not None:
+        with np.errstate(invalid="ignore"):
+            hit &= distance <= _first_hits(body, camera, size)[1] + SAME_PLACE * body.diagonal
+    origins, directions = (part.reshape(-1, 3)[hit] for part in camera.rays(size))
+    corners = mesh.faces[face[hit]]
+    weights = _barycentric(mesh.vertices[corners], origins + distance[hit, None] * directions)
+    found = np.full((len(hit), 2), np.nan)
+    found[hit] = np.einsum("kc,kci->ki", weights, mesh.uv[corners])
+    return found.reshape(size[1], size[0], 2)
+
+
+def _first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], Array]:
+    """(k,), (k,): the face that the ray of each pixel first meets, and the way to it in metres; -1 and inf for none."""
     traced = EmbreeMesh(mesh)
     origins, directions = (part.reshape(-1, 3) for part in camera.rays(size))
     starts = (origins - traced.center) / traced.radius
     # A far eye costs float32 its digits; begin where the ray comes near.
     ahead = np.maximum(-np.einsum("ki,ki->k", starts, directions) - 1.01, 0.0)
     face, distance = traced.first_hits(starts + ahead[:, None] * directions, directions)
-    hit = face >= 0
-    points = origins[hit] + traced.radius * (np.asarray(ahead[hit]) + distance[hit])[:, None] * directions[hit]
-    corners = mesh.faces[face[hit]]
-    weights = _barycentric(mesh.vertices[corners], points)
-    found = np.full((len(origins), 2), np.nan)
-    found[hit] = np.einsum("kc,kci->ki", weights, mesh.uv[corners])
-    return found.reshape(size[1], size[0], 2)
+    return face, np.where(face >= 0, traced.radius * (ahead + distance), np.inf)
 
 
 def _barycentric(corners: Array, points: Array) -> Array:

@@ -23,7 +23,8 @@ import numpy.typing as npt
 
 from translucent.bake.encoding import Encoding
 from translucent.bake.glb_builder import GlbBuilder
-from translucent.bake.gltf_targets import Place, Target
+from translucent.bake.gltf_bodies import Place
+from translucent.bake.gltf_targets import Target
 from translucent.bake.record import Record, describe, shared, unit_of, write_record
 from translucent.bake.thickness_map import ThicknessMap
 from translucent.errors import InputError

@@ -2,7 +2,8 @@
 
 Those whose material lets light in, but for open meshes that it makes thin walls: they have no inside. Where no material
 lets light in, all triangles, whose materials then will. Each is baked in the mesh's own space, as glTF states
-thickness, so nodes that share a mesh share the map, whatever their scale.
+thickness, so nodes that share a mesh share the map, whatever their scale. What is open by itself belongs to a body that
+others close, see `translucent.bake.gltf_bodies`.
 
 The UVs are those that the material reads its thickness texture at (KHR_texture_transform included, as long as it keeps
 them in 0..1), else TEXCOORD_0, else new ones as the next set.
@@ -18,22 +19,17 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.bake.glb_builder import INDICES, GlbBuilder
+from translucent.bake.gltf_bodies import Bodies, Place, primitive_name, read_primitive, triangle_primitives
 from translucent.bake.unwrap import unwrap
 from translucent.errors import InputError
 from translucent.gltf.accessors import COMPONENTS, Accessors
-from translucent.gltf.geometry import primitive_mesh
 from translucent.materials.color_distance import extinction_at
 from translucent.materials.gltf import GltfMaterial, materials_of
 from translucent.materials.gltf_file import GltfFile, Json
-from translucent.materials.gltf_scene import primitives
 from translucent.materials.gltf_texture import TextureTransform
 from translucent.medium import Medium
 from translucent.mesh import Mesh
 
-#: Mesh and primitive of a file.
-Place = tuple[int, int]
-
-_TRIANGLES = (4, 5, 6)
 _COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -53,6 +49,10 @@ class Target:
         Whether the UVs are those after the transform of the thickness texture that the material has.
     medium : Medium, optional
         What its material states to be inside.
+    made_uv : bool
+        Whether the UVs were made for it, and are nowhere but in the builder.
+    around : Mesh, optional
+        The body that it and others bound, where it is open by itself.
     """
 
     place: Place
@@ -60,10 +60,18 @@ class Target:
     tex_coord: int = 0
     keeps_transform: bool = False
     medium: Medium | None = None
+    made_uv: bool = False
+    around: Mesh | None = None
 
 
 def find_targets(
-    builder: GlbBuilder, metres: float = 1.0, *, needs_uv: bool = True, new_uv: bool = False, size: int = 1024
+    builder: GlbBuilder,
+    metres: float = 1.0,
+    *,
+    needs_uv: bool = True,
+    new_uv: bool = False,
+    plain_uv: bool = False,
+    size: int = 1024,
 ) -> list[Target]:
     """The primitives that get thickness; those without UVs get new ones in the builder.
 
@@ -76,6 +84,8 @@ def find_targets(
         Whether UVs are wanted at all.
     new_uv : bool
         Make new UVs for all of them.
+    plain_uv : bool
+        Take UVs as they are, without the transform of the thickness texture that a material has.
     size : int
         Texels along each side of the map to come, which the gaps between new charts depend on.
 
@@ -88,71 +98,69 @@ def find_targets(
     required = file.tree.get("extensionsRequired", [])
     if packed := [name for name in _COMPRESSIONS if name in required]:
         raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
-    materials = materials_of(file)
+    materials, bodies = materials_of(file), Bodies(file, metres)
+    lit = {place: _material(materials, builder.primitive(*place)) for place in _places(file, materials)}
+    # All that is read of the file as it is, before anything is added to it.
+    chosen = {place: bodies.around(place) for place, material in lit.items() if not _is_sheet(material, place, bodies)}
     found: list[Target] = []
-    walls: list[str] = []
-    for place in _places(file, materials):
-        primitive = builder.primitive(*place)
-        material = materials[primitive["material"]] if "material" in primitive else None
-        name = _name(file, place)
-        if material is not None and material.kind == "thin wall":
-            outline = _read(builder.file(), primitive, name, metres, None)
-            if not outline.diagnosis.closed:
-                walls.append(name)
-                continue
+    for place, around in chosen.items():
+        material, medium = lit[place], _medium(lit[place], metres)
         if not needs_uv:
-            mesh = _read(builder.file(), primitive, name, metres, None)
-            found.append(Target(place, mesh, medium=_medium(material, metres)))
+            found.append(Target(place, read_primitive(file, place, metres), medium=medium))
             continue
-        tex_coord = None if new_uv else _tex_coord(primitive, material)
-        if tex_coord is None:
-            tex_coord = add_uv(builder, primitive, name, size)
-            material = None if material is None else dataclasses.replace(material, thickness_texture=None)
-        mesh = _read(builder.file(), primitive, name, metres, tex_coord)
-        mesh, keeps = _transformed(mesh, material, tex_coord)
-        found.append(Target(place, mesh, tex_coord, keeps, _medium(material, metres)))
+        tex_coord, keeps = None if new_uv else _tex_coord(builder.primitive(*place), material), False
+        if made := tex_coord is None:
+            tex_coord = add_uv(builder, place, size)
+        mesh = read_primitive(builder.file() if made else file, place, metres, tex_coord)
+        if not (made or plain_uv):
+            mesh, keeps = _transformed(mesh, material, tex_coord)
+        if around is not None:
+            mesh = bodies.wound(place, mesh)
+        found.append(Target(place, mesh, tex_coord, keeps, medium, made, around))
     if not found:
-        told = f"all that lets light in are thin walls without an inside: {', '.join(walls)}"
+        told = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
         raise InputError(f"glTF {str(file.path)!r}", told, "give one of them a volume, or a closed mesh")
     return found
 
 
+def _material(materials: list[GltfMaterial], primitive: Json) -> GltfMaterial | None:
+    return materials[primitive["material"]] if "material" in primitive else None
+
+
+def left_out(file: GltfFile, targets: list[Target]) -> list[str]:
+    """What gets no thickness beside the targets, a line for each reason."""
+    materials, chosen = materials_of(file), {target.place for target in targets}
+    reasons: dict[str, list[Place]] = {}
+    for place, primitive in triangle_primitives(file).items():
+        if place not in chosen:
+            material = _material(materials, primitive)
+            sheet = material is not None and material.transmits
+            reasons.setdefault("thin walls without an inside" if sheet else "opaque", []).append(place)
+    return [f"{reason}: {', '.join(_names(file, places))}" for reason, places in reasons.items()]
+
+
+def _names(file: GltfFile, places: list[Place]) -> list[str]:
+    return [primitive_name(file, place) for place in places]
+
+
+def _is_sheet(material: GltfMaterial | None, place: Place, bodies: Bodies) -> bool:
+    """Whether a primitive is an open mesh that its material makes a thin wall."""
+    return material is not None and material.kind == "thin wall" and not bodies.is_closed(place)
+
+
 def _places(file: GltfFile, materials: list[GltfMaterial]) -> list[Place]:
     """Triangles of meshes that nodes use: with a material that lets light in, or all."""
-    used = {node["mesh"] for node in file.items("nodes") if "mesh" in node}
-    everything = {
-        (index, i): primitive.get("material")
-        for index, mesh in enumerate(file.items("meshes"))
-        if index in used
-        for i, primitive in enumerate(primitives(file, mesh))
-        if primitive.get("mode", 4) in _TRIANGLES
-    }
+    everything = {place: primitive.get("material") for place, primitive in triangle_primitives(file).items()}
     if not everything:
         raise InputError(f"glTF {str(file.path)!r}", "no node has triangles", "give a file with a mesh")
     lit = [place for place, index in everything.items() if index is not None and materials[index].transmits]
     return lit or list(everything)
 
 
-def _name(file: GltfFile, place: Place) -> str:
-    mesh = file.item("meshes", place[0])
-    users = [node for node in file.items("nodes") if node.get("mesh") == place[0] and node.get("name")]
-    name = str(mesh.get("name") or (users[0]["name"] if users else f"mesh {place[0]}"))
-    return name + (f"[{place[1]}]" if len(mesh["primitives"]) > 1 else "")
-
-
 def _tex_coord(primitive: Json, material: GltfMaterial | None) -> int | None:
     """Set of UVs for the thickness texture, if the primitive has one."""
     wanted = material.thickness_transform.tex_coord if material and material.has_thickness_texture else 0
     return next((n for n in (wanted, 0) if f"TEXCOORD_{n}" in primitive["attributes"]), None)
-
-
-def _read(file: GltfFile, primitive: Json, name: str, metres: float, tex_coord: int | None) -> Mesh:
-    attributes = {"POSITION": primitive["attributes"].get("POSITION")}
-    if tex_coord is not None:
-        attributes["TEXCOORD_0"] = primitive["attributes"][f"TEXCOORD_{tex_coord}"]
-    mesh = primitive_mesh(Accessors(file), {**primitive, "attributes": attributes}, name)
-    assert mesh is not None  # its mode is one of triangles
-    return mesh if metres == 1.0 else dataclasses.replace(mesh, vertices=mesh.vertices * metres)
 
 
 def _transformed(mesh: Mesh, material: GltfMaterial | None, tex_coord: int) -> tuple[Mesh, bool]:
@@ -175,7 +183,7 @@ def _medium(material: GltfMaterial | None, metres: float) -> Medium | None:
     return Medium(absorption=extinction_at(material.attenuation_color, material.attenuation_distance) / metres)
 
 
-def add_uv(builder: GlbBuilder, primitive: Json, name: str, size: int) -> int:
+def add_uv(builder: GlbBuilder, place: Place, size: int) -> int:
     """Give a primitive new UVs as its next set; vertices on seams are repeated with all that belongs to them.
 
     Raises
@@ -183,8 +191,8 @@ def add_uv(builder: GlbBuilder, primitive: Json, name: str, size: int) -> int:
     InputError
         If it is a strip or fan, or compressed, or xatlas is missing.
     """
-    file = builder.file()
-    accessors = Accessors(file)
+    file, primitive = builder.file(), builder.primitive(*place)
+    accessors, name = Accessors(file), primitive_name(file, place)
     asked = f"new UVs for {name!r} of {str(file.path)!r}"
     if primitive.get("mode", 4) != 4:
         raise InputError(asked, "it is a strip or fan", "export it as a list of triangles, or with UVs")

@@ -12,7 +12,7 @@ import numpy as np
 
 from translucent.bake.encoding import Encoding
 from translucent.bake.glb_builder import GlbBuilder
-from translucent.bake.gltf_targets import Place
+from translucent.bake.gltf_bodies import Place
 from translucent.bake.record import Record, describe, shared, unit_of, write_record
 from translucent.bake.thickness_map import VertexThickness
 from translucent.gltf.accessors import Accessors

@@ -2,7 +2,6 @@
 
 A job holds what JSON can hold, so it can be kept, sent and hashed:
 
-=============  ==========================================================================================
 ``model``      path of a mesh or glTF file
 ``output``     path of the file to write; its record goes beside it
 ``unit``       of the model's coordinates (default m)
@@ -17,6 +16,23 @@ A job holds what JSON can hold, so it can be kept, sent and hashed:
 ``resume``     True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
 ``threads``    how many (default: all processors); results do not depend on it
 =============  ==========================================================================================
+=======
+===============  ==========================================================================================
+``model``        path of a mesh or glTF file
+``output``       path of the file to write; its record goes beside it
+``unit``         of the model's coordinates (default m)
+``settings``     arguments of `bake_thickness` by name: mode, size, rays, ...; ``max_distance``, ``tolerance`` and
+                 ``high_distance`` in metres, or as shares of the mesh's diagonal, such as ``"10%"``
+``medium``       extinction (r, g, b) in 1/m, for mode ``transmittance``
+``high``         path of the mesh that the details come from, and ``cage`` that of a cage around it, in the unit
+``vertices``     True: thickness per vertex instead of a map
+``unwrap``       True: new UVs, whatever the model has
+``normalize``    True: store shares of the largest value; ``invert``: 1 minus them
+``outside``      True: read files that a glTF model links to wherever they are, not only below its folder
+``resume``       True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
+``threads``      how many (default: all processors); results do not depend on it
+``max_escaped``  of `bake_many`: share of rays without an exit above which a map is suspect (default 0.05)
+===============  ==========================================================================================
 
 Only ``model`` and ``output`` are needed.
 """
@@ -30,7 +46,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from translucent.bake.record import Record, file_hash, read_record
+from translucent.bake.record import Record, file_hash, files_of, read_record
 from translucent.bake.thickness_map import ThicknessMap, VertexThickness
 from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output, save_map, save_vertices
 from translucent.errors import InputError
@@ -47,10 +63,14 @@ Progress = Callable[[float, int], None]
 
 KEYS = {
     "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
-    "resume", "threads", "outside",
+    "resume", "threads", "max_escaped", "outside",
 }  # fmt: skip
+#: Which files a bake writes, of which objects; another number makes them anew.
+FILES = 2
+#: How far a part of a body may be from its surface, as a share of the diagonal: as far as rounding can lead.
+ON_SURFACE = 1e-4
 #: Keys that do not change what is written into the file.
-_HOW = {"output", "model", "high", "cage", "resume", "threads", "outside"}
+_HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped", "outside"}
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
 #: What has no meaning for vertices: a mistake, and what merely has a default.
 _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
@@ -63,6 +83,8 @@ def check_job(job: Job) -> None:
     if missing := [key for key in ("model", "output") if not isinstance(job.get(key), str)]:
         raise InputError("bake job", f"no {missing[0]}", "give a path as text")
     metres_per_unit(job.get("unit", "m"))
+    if not 0 <= (share := job.get("max_escaped", 0)) <= 1:
+        raise InputError(f"max_escaped {share!r}", "not in 0..1", "give a share of the rays, for example 0.05")
     suffixes = VERTEX_SUFFIXES if job.get("vertices") else MAP_SUFFIXES
     normalize, invert = bool(job.get("normalize")), bool(job.get("invert"))
     output = Path(job["output"])
@@ -92,7 +114,7 @@ def _settings(job: Job, diagonal: float) -> Job:
     if job.get("medium") is not None:
         given["medium"] = Medium(absorption=job["medium"])
     # A glTF material may bring the medium that this mode needs.
-    late = given.get("mode") == "transmittance" and stays_gltf(job) and "medium" not in given
+    late = given.get("mode") == "transmittance" and has_parts(job) and "medium" not in given
     BakeSettings(**({**given, "medium": Medium(absorption=1.0)} if late else given))
     return given
 
@@ -105,6 +127,11 @@ def _share(key: str, text: str) -> float:
     if not 0 < share < float("inf"):
         raise InputError(f"{key} {text!r}", "not a share such as '10%'", "give one, or a number of metres")
     return share
+
+
+def has_parts(job: Job) -> bool:
+    """Whether the objects of the model are baked one by one; of other models, and of vertices, all are one mesh."""
+    return Path(job["model"]).suffix.lower() in SUFFIXES and (stays_gltf(job) or not job.get("vertices"))
 
 
 def stays_gltf(job: Job) -> bool:
@@ -122,7 +149,7 @@ def content_hash(job: Job) -> str:
     """
     meant = {key: value for key, value in job.items() if key not in _HOW}
     meant["suffix"] = Path(job["output"]).suffix.lower()
-    digest = hashlib.sha256(json.dumps([VERSION, meant], sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps([VERSION, FILES, meant], sort_keys=True).encode())
     for key in ("model", "high", "cage"):
         if job.get(key) is not None:
             for data in _parts(Path(job[key]), bool(job.get("outside"))):
@@ -143,15 +170,19 @@ def _parts(path: Path, allow_outside: bool) -> list[bytes]:
 
 
 def is_done(job: Job, content: str) -> bool:
-    """Whether the job's output is there, whole, and of this content."""
+    """Whether the job's files are there, whole, and of this content."""
     output = Path(job["output"])
     record = read_record(output)
     return (
         record is not None
         and record.get("hash") == content
-        and output.is_file()
-        and record.get("sha256") == file_hash(output)
+        and bool(files := files_of(record))
+        and all(_is_whole(output.with_name(one["file"]), one.get("sha256")) for one in files)
     )
+
+
+def _is_whole(path: Path, sha256: object) -> bool:
+    return path.is_file() and file_hash(path) == sha256
 
 
 Results = dict[tuple[int, int], Any]
@@ -172,6 +203,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
         As it was written beside the output.
     results : dict
         A `ThicknessMap` or `VertexThickness` per mesh and primitive of a glTF file; else one, for (0, 0).
+        Maps that are files of their own are in the space of the scene, those in a glTF file in that of their meshes.
 
     Raises
     ------
@@ -183,7 +215,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     check_job(job)
     output = Path(job["output"])
     about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
-    if stays_gltf(job):
+    if has_parts(job):
         from translucent.bake.gltf_bake import bake_gltf
 
         return bake_gltf(job, about, progress)
@@ -200,7 +232,12 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
 
 
 def bake_one(
-    job: Job, mesh: Mesh, medium: Medium | None = None, progress: Progress | None = None, part: str = ""
+    job: Job,
+    mesh: Mesh,
+    medium: Medium | None = None,
+    progress: Progress | None = None,
+    part: str = "",
+    around: Mesh | None = None,
 ) -> ThicknessMap | VertexThickness:
     """Bake one mesh as a job asks for.
 
@@ -213,6 +250,8 @@ def bake_one(
     progress : callable, optional
     part : str
         Tells the parts of a job apart that keep what is finished.
+    around : Mesh, optional
+        The body of whose surface the mesh is a part.
     """
     from translucent.bake.bake import bake_thickness
     from translucent.bake.vertices import bake_vertex_thickness
@@ -220,6 +259,8 @@ def bake_one(
     given = _settings(job, mesh.diagonal)
     if given.get("mode") == "transmittance":
         given.setdefault("medium", medium)
+    if around is not None and not (job.get("vertices") or job.get("high")):
+        given |= {"high": around, "high_distance": ON_SURFACE * around.diagonal}
     for key in ("high", "cage"):
         if job.get(key) is not None:
             given[key] = load_mesh(job[key], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))

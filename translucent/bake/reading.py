@@ -11,7 +11,7 @@ import numpy.typing as npt
 from translucent.bake.encoding import Encoding
 from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
-from translucent.errors import InputError, RenderError, TranslucentError
+from translucent.errors import InputError, TranslucentError
 from translucent.paths import require_file
 from translucent.reading import open_file, read_bytes
 from translucent.unpacking import open_picture, read_array, read_arrays, read_exr
@@ -56,12 +56,6 @@ _Stored = tuple[float, float, npt.NDArray[np.generic]]
 
 
 def _read_exr(path: Path) -> _Stored:
-    try:
-        import OpenEXR  # noqa: F401
-    except ImportError:
-        raise RenderError(
-            f"thickness map {str(path)!r}", "the OpenEXR package is not installed", "pip install openexr"
-        ) from None
     header, channels = read_exr(path, f"thickness map {str(path)!r}")
     return float(header["scale"]), float(header["offset"]), channels["Y"]
 

@@ -105,10 +105,33 @@ def write_record(path: Path, record: Record) -> Record:
 
     It is written after the file, so that a record whose hash is that of its file vouches for both.
     """
-    full = {"file": path.name, "sha256": file_hash(path), **record, "provenance": provenance()}
+    return write_common_record(path, {**fingerprint(path), **record})
+
+
+def write_common_record(path: Path, record: Record) -> Record:
+    """Write the record of several files where that of the file at `path` would be; what was written."""
+    full = {**record, "provenance": provenance()}
     text = json.dumps(full, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_text_atomically(sidecar_of(path), text)
     return full
+
+
+def fingerprint(path: Path) -> Record:
+    """Name and hash of a file, as records have them."""
+    return {"file": path.name, "sha256": file_hash(path)}
+
+
+def parts_of(record: Record) -> list[Record]:
+    """The records of the maps, or of the primitives with thickness at their vertices, that a record tells of."""
+    found: list[Record] = record.get("maps") or record.get("primitives") or [record]
+    return found
+
+
+def files_of(record: Record) -> list[Record]:
+    """Names and hashes of the files that a record vouches for: maps, and meshes with new UVs."""
+    maps, uv_file = record.get("maps"), record.get("uv_file")
+    parts = [record, *(maps if isinstance(maps, list) else []), uv_file]
+    return [part for part in parts if isinstance(part, dict) and isinstance(part.get("file"), str)]
 
 
 def file_hash(path: Path) -> str:

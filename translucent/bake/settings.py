@@ -54,8 +54,8 @@ class BakeSettings:
         _check_choice("weighting", self.weighting, Weighting)
         _check_choice("gaps", self.gaps, Gaps)
         _check_count("size", self.size, 1, MAX_SIZE, "give the texels along a side, for example 1024")
-        # One ray tells no error, and none tells nothing.
-        _check_count("rays", self.rays, 2, MAX_RAYS, "give for example 64")
+        # One ray of many tells no error; mode "normal" has only one.
+        _check_count("rays", self.rays, 1 if self.mode == "normal" else 2, MAX_RAYS, "give for example 64")
         _check_count("supersample", self.supersample, 1, 16, "give 1 for none, or for example 2")
         _check_count("padding", self.padding, 0, MAX_SIZE, "give the texels around each chart, for example 16")
         _check_count("seed", self.seed, 0, 2**63 - 1, "give a whole number, for example 0")

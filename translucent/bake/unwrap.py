@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.extras import require_package
 from translucent.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
@@ -18,6 +19,9 @@ CHART_GAP, GAP_SHARE = 4, 1 / 128
 
 #: Texture coordinates this close to a whole number are that number: float32 near 1 rounds by half of it.
 WHOLE = 1e-7
+
+#: What to do about texture coordinates that no map can have.
+ANEW = "make new ones with --unwrap (in Python, leave out the uv), or unwrap it in a modelling tool"
 
 #: The most tiles that one triangle may cover; more repeat a texture, which no thickness does.
 MOST_TILES = 4.0
@@ -78,14 +82,7 @@ def in_tile(uv: Array, tile: int) -> npt.NDArray[np.bool_]:
 
 
 def _new_uv(mesh: Mesh, size: int) -> tuple[Mesh, Integers]:
-    try:
-        import xatlas
-    except ImportError:
-        raise InputError(
-            f"mesh {mesh.name!r}",
-            "it has no texture coordinates, and xatlas, which makes them, is not installed",
-            "unwrap it in a modelling tool, or pip install 'translucent-shading[bake]'",
-        ) from None
+    xatlas = require_package("xatlas", f"new texture coordinates for {mesh.name!r}", "unwrap it in a modelling tool")
     mesh.require_finite()
     unit = ((mesh.vertices - mesh.center) / (0.5 * mesh.diagonal)).astype(np.float32)
     gap = max(1, min(CHART_GAP, round(GAP_SHARE * size)))
@@ -101,7 +98,7 @@ def _new_uv(mesh: Mesh, size: int) -> tuple[Mesh, Integers]:
 
 def _check(mesh: Mesh, uv: Array) -> None:
     if bad := int((~np.isfinite(uv)).any(axis=1).sum()):
-        raise InputError(f"mesh {mesh.name!r}", f"{bad} texture coordinates are not finite", "export the mesh again")
+        raise InputError(f"mesh {mesh.name!r}", f"{bad} texture coordinates are not finite", ANEW)
     corners = uv[mesh.faces]
     span = corners.max(axis=1) - corners.min(axis=1)
     if float(span.max()) > MOST_TILES:
@@ -109,14 +106,12 @@ def _check(mesh: Mesh, uv: Array) -> None:
         raise InputError(
             f"mesh {mesh.name!r}",
             f"face {face} covers {span.max():.3g} tiles in UV: a texture repeats on it",
-            "give texture coordinates that use each place of the map once, or none",
+            ANEW,
         )
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     with np.errstate(under="ignore"):
         if not (a[:, 0] * b[:, 1] != a[:, 1] * b[:, 0]).any():
-            raise InputError(
-                f"mesh {mesh.name!r}", "no face has an area in UV", "unwrap it in a modelling tool, or leave out the uv"
-            )
+            raise InputError(f"mesh {mesh.name!r}", "no face has an area in UV", ANEW)
 
 
 def _tiles(uv: Array) -> tuple[Integers, npt.NDArray[np.bool_]]:

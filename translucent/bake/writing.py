@@ -11,6 +11,8 @@ file        holds
 .ply        of thickness per vertex: the mesh with a float property ``thickness``
 ==========  =========================================================================================
 
+Where the UVs were made for the map, ``thickness.exr.uv.glb`` is the mesh that has them, in metres.
+
 Row 0 is the top of the image. How stored numbers become metres: `translucent.bake.encoding`. The record
 (``thickness.exr.json``): `translucent.bake.record`.
 """
@@ -28,15 +30,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from translucent.bake.encoding import Encoding
-from translucent.bake.record import DEFINITIONS, Record, describe, plain, unit_of, write_record
+from translucent.bake.record import DEFINITIONS, Record, describe, fingerprint, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
-from translucent.paths import require_place, write_atomically
+from translucent.extras import require_package
+from translucent.paths import remove_partial, require_place, write_atomically
 
 if TYPE_CHECKING:
     from translucent.bake.thickness_map import ThicknessMap, VertexThickness
+    from translucent.materials.gltf_file import GltfFile
 
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
+
+#: After the name of a map: the mesh with the UVs that were made for it.
+UV_SUFFIX = ".uv.glb"
 
 #: Largest level of a 16-bit PNG.
 PNG_LEVELS = 65535
@@ -58,7 +65,7 @@ def save_map(
     invert: bool = False,
     about: Record | None = None,
 ) -> Record:
-    """Write a thickness map, and its record beside it.
+    """Write a thickness map, and beside it its record and, if it has new UVs, the mesh with them.
 
     Parameters
     ----------
@@ -94,8 +101,23 @@ def save_map(
         return write_maps(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
     levels = PNG_LEVELS if suffix == ".png" else 0
     encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=unit)
+    about = dict(about or {})
+    if result.report.uv_from == "xatlas":
+        from translucent.bake.gltf_export import mesh_file
+
+        about["uv_file"] = write_uv_file(mesh_file(result.mesh), path)
     write_atomically(path, partial(_WRITERS[suffix], _Task(result, encoding)))
-    return write_record(path, {**(about or {}), **describe(result, encoding)})
+    return write_record(path, {**about, **describe(result, encoding)})
+
+
+def write_uv_file(model: GltfFile, path: Path) -> Record:
+    """Write a model with new UVs beside the map at `path` that belongs to them; its name and hash."""
+    from translucent.materials.gltf_file import write_gltf
+
+    place = path.with_name(f"{path.name}{UV_SUFFIX}")
+    remove_partial(place)
+    write_gltf(model, place)
+    return fingerprint(place)
 
 
 def check_map_output(
@@ -111,10 +133,7 @@ def check_map_output(
     if suffix == ".glb" and (normalize or invert):
         raise InputError(asked, "glTF stores t / max and the max", "leave --normalize and --invert out")
     if suffix == ".exr":
-        try:
-            import OpenEXR  # noqa: F401
-        except ImportError:
-            raise RenderError(asked, "the OpenEXR package is not installed", "pip install openexr") from None
+        require_package("OpenEXR", asked, "write .npy or .png")
     return suffix
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from translucent.bench.files import write_csv, write_report
@@ -12,11 +14,15 @@ from translucent.bench.page.figure import require_packages
 from translucent.bench.page.overview import has_overview, write_overview
 from translucent.bench.record import Report
 from translucent.errors import RenderError
+from translucent.folders import made_folder
 from translucent.paths import require_folder
 
 
-def check_folder(folder: Path) -> None:
+@contextmanager
+def checked_folder(folder: Path) -> Iterator[None]:
     """Make the folder if it is not there, and raise before any work is done where nothing could be written into it.
+
+    After an error a folder that was made and is empty is removed.
 
     Raises
     ------
@@ -27,16 +33,17 @@ def check_folder(folder: Path) -> None:
     """
     require_folder(folder, f"output {str(folder)!r}")
     require_packages()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise RenderError(
-            f"output {str(folder)!r}",
-            f"it is no folder that can be written to ({error.strerror or error})",
-            "check its permissions",
-        ) from error
+    with made_folder(folder):
+        try:
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+        except OSError as error:
+            raise RenderError(
+                f"output {str(folder)!r}",
+                f"it is no folder that can be written to ({error.strerror or error})",
+                "check its permissions",
+            ) from error
+        yield
 
 
 def write_outputs(report: Report, folder: Path) -> list[Path]:

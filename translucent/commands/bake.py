@@ -15,7 +15,9 @@ import click
 from translucent.commands.bake_options import FORMATS, bake_options, read_job
 from translucent.commands.common import common_options, overwrite_option
 from translucent.commands.console import echo
+from translucent.commands.model import mesh_file
 from translucent.errors import InputError, RenderError, TranslucentError, printable
+from translucent.extras import require_package
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -63,11 +65,11 @@ def bake(
     if out_dir is not None:
         if check:
             raise InputError("--check", "it looks at one model", "give one MODEL and -o")
-        _bake_many([(m, out_dir / f"{Path(m).stem}.{suffix}") for m in models], given, jobs, dask, as_json)
+        _bake_many(models, out_dir, suffix, given, jobs, dask, as_json)
         return
     if len(models) > 1 or output is None:
         raise InputError(f"-o {output}", f"{len(models)} models", "give --out-dir instead, or one model")
-    for option, value in (("--jobs", jobs), ("--dask", dask)):
+    for option, value in (("--jobs", jobs), ("--dask", dask), ("--max-escaped", given["max_escaped"])):
         if value is not None:
             raise InputError(f"{option} {value}", "it is for many models", "add --out-dir, or leave it out")
     _bake_one(read_job(models[0], output, given), check, as_json)
@@ -83,7 +85,7 @@ def _bake_one(job: Job, check: bool, as_json: bool) -> None:
         raise InputError("--check", "mode 'local' is no length", "choose another mode")
     with _progress(Path(job["model"]).name) as progress:
         record, results = bake_file(job, progress)
-    told = {"output": job["output"], **told_of(record, results)}
+    told = {"output": job["output"], **told_of(record, results, Path(job["output"]).parent)}
     checks = _check(job, record, results) if check else {}
     if as_json:
         echo(json.dumps({**told, "record": record, **checks}))
@@ -116,13 +118,19 @@ def _progress(label: str) -> Iterator[Progress | None]:
 
 def _lines(record: Record, told: Record) -> Iterator[str]:
     """What a bake was, for people."""
-    size = "x".join(map(str, record["size"])) + ", " if "size" in record else ""
-    found, unit = told["range"], "" if told["unit"] == "1" else f" {told['unit']}"
-    yield f"{told['output']}: {size}{record['mode']}, {found['min']:.4g} to {found['max']:.4g}{unit}"
-    parts = record.get("maps") or record.get("primitives") or [record]
+    from translucent.bake.record import parts_of
+
+    parts = parts_of(record)
+    unit = "" if told["unit"] == "1" else f" {told['unit']}"
+    in_files = len(parts) > 1 and "file" in parts[0]
+    if not in_files:
+        yield _size_line(told["output"], record, told["range"], unit)
     for part in parts:
         report, encoding = part["report"], part["encoding"]
         name = f"{part['mesh']['name']}: " if len(parts) > 1 else ""
+        if in_files:
+            file = str(Path(told["output"]).with_name(part["file"]))
+            yield _size_line(file, part, part["range"] or told["range"], unit)
         if part.get("warnings"):
             yield f"{name}{'; '.join(part['warnings'])}"
             continue
@@ -132,6 +140,14 @@ def _lines(record: Record, told: Record) -> Iterator[str]:
             f"{name}{report['rays'] / 1e6:.3g} million rays in {report['seconds']:.1f} s, standard error "
             f"{report['mean_standard_error']:.2g} on average, {report['max_standard_error']:.2g} at most{factor}{step}"
         )
+    if told["uv_file"]:
+        yield f"{told['uv_file']}: the model with the UVs that were made for this map"
+    yield from (f"left out, {line}" for line in told["left_out"])
+
+
+def _size_line(file: str, record: Record, found: Record, unit: str) -> str:
+    size = "x".join(map(str, record["size"])) + ", " if "size" in record else ""
+    return f"{file}: {size}{record['mode']}, {found['min']:.4g} to {found['max']:.4g}{unit}"
 
 
 def _check(job: Job, record: Record, results: Results) -> dict[str, Any]:
@@ -141,47 +157,82 @@ def _check(job: Job, record: Record, results: Results) -> dict[str, Any]:
 
     checks = check_output(job, record, results)
     path = Path(f"{job['output']}.check.png")
-    write_picture(list(checks.values()), path)
-    lines = [line for name, one in checks.items() for line in (f"check of {name!r}:", *str(one).split("\n"))]
+    write_picture([one for one in checks.values() if one is not None], path)
+    hidden = "it is hidden behind other parts of its body"
+    lines = [line for name, one in checks.items() for line in (f"check of {name!r}:", *str(one or hidden).split("\n"))]
     return {
-        "check": {name: one.summary() for name, one in checks.items()},
+        "check": {name: None if one is None else one.summary() for name, one in checks.items()},
         "check_picture": str(path),
         "lines": [*lines, f"{path}: with the map, true, difference"],
     }
 
 
 def _bake_many(
-    files: list[tuple[str, Path]], given: dict[str, Any], jobs: int | None, dask: str | None, as_json: bool
+    models: tuple[str, ...],
+    out_dir: Path,
+    suffix: str,
+    given: dict[str, Any],
+    jobs: int | None,
+    dask: str | None,
+    as_json: bool,
 ) -> None:
-    from translucent.bake.batch import bake_many
+    from translucent.bake.batch import BatchReport, bake_many
+    from translucent.folders import made_folder
 
     if jobs is not None and dask is not None:
         raise InputError(f"--jobs {jobs}", "--dask is given, too", "its workers are as many as they are; leave one out")
     if dask is not None and given["resume"]:
         raise InputError("--resume", "--dask is given, too", "a job is done again from its start; leave --resume out")
-    wanted = [read_job(model, output, given) for model, output in files]
-    with _executor(dask) as executor, _counting(len(wanted)) as progress:
-        report = bake_many(wanted, executor, jobs, progress)
-    echo(json.dumps(report.summary()) if as_json else str(report))
-    if failed := report.count("failed"):
-        raise TranslucentError(f"{failed} of {len(wanted)} models failed", "the others are done", "see above")
+    wanted, nothing = _wanted([(model, out_dir / f"{Path(model).stem}.{suffix}") for model in models], given)
+    tell = _teller([*wanted, *nothing], as_json)
+    with made_folder(out_dir), _executor(dask) as executor:
+        report = bake_many(wanted, executor, jobs, tell)
+        for entry in nothing:
+            tell(entry)
+        report = BatchReport((*report.assets, *nothing), report.seconds)
+        echo(json.dumps(report.summary()) if as_json else report.total)
+        if failed := report.count("failed"):
+            raise TranslucentError(f"{failed} of {len(models)} models failed", "the others are done", "see above")
 
 
-@contextlib.contextmanager
-def _counting(total: int) -> Iterator[Callable[[Record], None] | None]:
-    """A bar of assets on a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    last = ""
-    with click.progressbar(range(total), label="bake", file=sys.stderr, item_show_func=lambda _: last) as bar:
+def _wanted(files: list[tuple[str, Path]], given: dict[str, Any]) -> tuple[list[Job], list[Record]]:
+    """The jobs of the models, and the entries of those whose name is that of nothing."""
+    from translucent.bake.batch import failed_entry
 
-        def tell(entry: Record) -> None:
-            nonlocal last
-            last = printable(f"{Path(entry['model']).name} {entry['status']}")
-            bar.update(1)
+    wanted, nothing = [], []
+    for model, output in files:
+        try:
+            mesh_file(model, given["unit"])
+        except InputError as error:
+            nothing.append(failed_entry({"model": model, "output": str(output)}, str(error)))
+        else:
+            wanted.append(read_job(model, output, given))
+    return wanted, nothing
 
-        yield tell
+
+def _teller(assets: list[Record], as_json: bool) -> Callable[[Record], None]:
+    """Prints a line for each asset when it is done, with the time left; not between the lines of a JSON result."""
+    from translucent.bake.batch import asset_line
+
+    width = max(len(Path(asset["model"]).name) for asset in assets)
+    began, told, worked = time.perf_counter(), 0, 0
+
+    def tell(entry: Record) -> None:
+        nonlocal told, worked
+        told += 1
+        worked += entry["status"] != "skipped"
+        left = len(assets) - told
+        after = ""
+        if left and worked:
+            after = f"; about {_duration((time.perf_counter() - began) / worked * left)} left"
+        echo(f"{told:>{len(str(len(assets)))}}/{len(assets)}  {asset_line(entry, width)}{after}", err=as_json)
+
+    return tell
+
+
+def _duration(seconds: float) -> str:
+    minutes = seconds / 60
+    return f"{seconds:.0f} s" if minutes < 2 else f"{minutes:.0f} min" if minutes < 120 else f"{minutes / 60:.1f} h"
 
 
 @contextlib.contextmanager
@@ -190,13 +241,9 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
     if address is None:
         yield None
         return
+    distributed = require_package("distributed", f"--dask {address}", "leave it out to bake on this machine")
     try:
-        from distributed import Client
-    except ImportError:
-        what, do = f"--dask {address}", "pip install 'translucent-shading[cluster]'"
-        raise RenderError(what, "the package distributed is not installed", do) from None
-    try:
-        client = Client(address, timeout="10s")
+        client = distributed.Client(address, timeout="10s")
     except (OSError, ValueError) as error:
         found = f"no scheduler answers ({error or type(error).__name__})"
         raise RenderError(f"--dask {address}", found, "check the address") from error

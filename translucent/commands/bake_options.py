@@ -73,6 +73,7 @@ _OPTIONS = [
     click.option("--vertices", is_flag=True, help="Thickness per vertex, into a .ply, .glb or .npy file."),
     click.option("--normalize", is_flag=True, help="Store shares of the largest value instead of metres."),
     click.option("--invert", is_flag=True, help="Store 1 - t / max, the translucency that some engines want."),
+    click.option("--max-escaped", metavar="%", help="Of --out-dir: more rays without an exit are suspect. [5%]"),
     click.option("--resume", is_flag=True, help="Keep finished parts beside the output, and go on from there."),
 ]
 
@@ -113,7 +114,19 @@ def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
     refuse_overwriting(output, job["model"], job.get("high"), job.get("cage"))
     if given["allow_outside"]:
         job["outside"] = True
+    if given["max_escaped"] is not None:
+        job["max_escaped"] = _read_share("max_escaped", given["max_escaped"])
     return job | {name: True for name in _FLAGS if given[name]}
+
+
+def _read_share(name: str, text: str) -> float:
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= 1:
+        raise InputError(f"{_option(name)} {text!r}", "not a share", "write for example 5%")
+    return share
 
 
 def _read_length(name: str, text: str, unit: str) -> float | str:

@@ -7,6 +7,7 @@ import io
 import json
 import shlex
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,7 @@ def report(
     """
     from translucent.bench.comparison import compare_reports, machines_differ
     from translucent.bench.files import read_report
-    from translucent.bench.output import check_folder, write_outputs
+    from translucent.bench.output import checked_folder, write_outputs
     from translucent.bench.table import table
 
     if source is not None and (models or quick or size or methods or backend or color or distance or preset_name):
@@ -91,11 +92,10 @@ def report(
         raise InputError(given, "no MODEL to fill; the toolkit's scenes keep their media", "add a MODEL")
     before = None if old is None else read_report(old)
     made = None if source is None else read_report(source)
-    if output is not None:
-        check_folder(output)
-    if made is None:
-        made = _measured(models, medium, output, quick, size, methods, unit, backend, allow_outside)
-    files = [] if output is None else write_outputs(made, output)
+    with nullcontext() if output is None else checked_folder(output):
+        if made is None:
+            made = _measured(models, medium, output, quick, size, methods, unit, backend, allow_outside)
+        files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
         echo(f"warning: times of two machines are compared: {difference}", err=True)

@@ -11,13 +11,14 @@ import copy
 import json
 import os
 import struct
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
-from translucent.errors import InputError
-from translucent.materials.gltf_pack import gather
+from translucent.errors import InputError, TranslucentWarning
+from translucent.materials.gltf_pack import embed_images, gather, is_link
 from translucent.paths import require_place, write_atomically
 from translucent.reading import json_value, linked_file, read_bytes
 
@@ -168,8 +169,9 @@ def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
 def write_gltf(file: GltfFile, path: str | Path) -> None:
     """Write a file as .glb or .gltf, by its suffix; the file is complete or not there.
 
-    A .glb turned into .gltf holds its binary chunk as a data URI; a .gltf turned into .glb has its buffers in one, see
-    `translucent.materials.gltf_pack`. Links to files beside are made relative to the new folder.
+    A .glb turned into .gltf holds its binary chunk as a data URI; a .gltf turned into .glb has its buffers in one, and
+    every .glb holds its images, see `translucent.materials.gltf_pack`. What links there are in a .gltf is made relative
+    to the new folder.
 
     Raises
     ------
@@ -177,6 +179,11 @@ def write_gltf(file: GltfFile, path: str | Path) -> None:
         If the suffix is another one, or a .gltf has buffers that cannot be read.
     RenderError
         If the file cannot be written.
+
+    Warns
+    -----
+    TranslucentWarning
+        If an image cannot be read, and so stays a link in a .glb.
     """
     path = Path(path)
     check_gltf_output(path)
@@ -199,11 +206,6 @@ def check_gltf_output(path: Path) -> None:
     require_place(path, f"output {str(path)!r}")
 
 
-def _is_link(holder: Json) -> bool:
-    uri = holder.get("uri")
-    return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
-
-
 def _relocated(file: GltfFile, path: Path) -> Json:
     """The JSON with links that hold in the folder of `path`."""
     old, new = file.path.parent.resolve(), path.parent.resolve()
@@ -212,7 +214,7 @@ def _relocated(file: GltfFile, path: Path) -> Json:
     tree = copy.deepcopy(file.tree)
     moved = GltfFile(file.path, tree)
     for holder in [*moved.items("buffers"), *moved.items("images")]:
-        if _is_link(holder):
+        if is_link(holder):
             holder["uri"] = quote(Path(os.path.relpath(old / unquote(holder["uri"]), new)).as_posix())
     return tree
 
@@ -228,12 +230,30 @@ def _packed(file: GltfFile, tree: Json) -> bytes:
     chunks = file.chunks
     if not chunks:
         tree, binary = gather(file, tree)
-        if binary:
-            binary += b"\0" * (-len(binary) % 4)
-            chunks = _CHUNK.pack(len(binary), _BINARY_CHUNK) + binary
+        chunks = _binary_chunk(binary)
+    if any(map(is_link, file.items("images"))):
+        tree, chunks = _with_images(file, copy.deepcopy(tree), chunks)
     text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
     length = _HEADER.size + _CHUNK.size + len(text) + len(chunks)
     if length > _LONGEST:
         raise InputError(f"output .glb of {str(file.path)!r}", "more than 4 GiB, which no .glb holds", "write a .gltf")
     return _HEADER.pack(_MAGIC, _VERSION, length) + _CHUNK.pack(len(text), _JSON_CHUNK) + text + chunks
+
+
+def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes]:
+    """JSON and chunks with the images in the binary one."""
+    size, kind = _CHUNK.unpack_from(chunks) if len(chunks) >= _CHUNK.size else (0, None)
+    end = _CHUNK.size + size if kind == _BINARY_CHUNK else 0
+    binary = bytearray(chunks[_CHUNK.size : end])
+    if not binary and tree.get("buffers"):
+        told = f"glTF {str(file.path)!r}: its first buffer is a link, so its images stay links, too"
+        warnings.warn(told, TranslucentWarning, stacklevel=4)
+        return tree, chunks
+    embed_images(file, tree, binary)
+    return tree, _binary_chunk(bytes(binary)) + chunks[end:]
+
+
+def _binary_chunk(binary: bytes) -> bytes:
+    binary += b"\0" * (-len(binary) % 4)
+    return _CHUNK.pack(len(binary), _BINARY_CHUNK) + binary if binary else b""

@@ -2,7 +2,7 @@
 
 A .glb has room for one buffer. Buffers with bytes, linked or embedded, are laid one behind the other, and the views of
 them move along, those of mesh compression, too; a buffer without bytes (the fallback of a compressed one) stays. Images
-in data URIs become views of that buffer; linked images stay beside the file, as glTF allows.
+in data URIs and in files become views of that buffer, so that a .glb is whole wherever it is copied to.
 
 Lost: names and extras of all buffers but the first. Source: glTF 2.0, sections 3.6 (buffers) and 4.4 (GLB).
 """
@@ -10,14 +10,18 @@ Lost: names and extras of all buffers but the first. Source: glTF 2.0, sections 
 from __future__ import annotations
 
 import copy
+import warnings
 from typing import TYPE_CHECKING
 
-from translucent.errors import InputError
+from translucent.errors import InputError, TranslucentWarning
 
 if TYPE_CHECKING:
     from translucent.materials.gltf_file import GltfFile, Json
 
 _ALIGNMENT = 4  # bytes: the size of the largest component of an accessor
+
+#: How pictures begin that glTF and its extensions know; nothing else is copied into a file.
+_PICTURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"\xabKTX 20\xbb": "image/ktx2"}
 
 
 def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
@@ -91,6 +95,53 @@ def _embedded_images(file: GltfFile, binary: bytearray) -> dict[int, tuple[int, 
                 data = file.resource(image)
                 found[index] = (_append(binary, data), len(data), kind)
     return found
+
+
+def is_link(holder: Json) -> bool:
+    """Whether a buffer or an image is a file beside the glTF file."""
+    uri = holder.get("uri")
+    return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
+
+
+def _picture_kind(data: bytes) -> str | None:
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "image/webp"
+    return next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
+
+
+def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
+    """Put the images that are files into the binary, and make them views of it in the JSON.
+
+    What cannot be read, or is no picture, stays a link, with a `TranslucentWarning`.
+
+    Parameters
+    ----------
+    file : GltfFile
+        As it was read: its links hold in its own folder.
+    tree : dict
+        Its JSON, whose first buffer is the binary; it is changed.
+    binary : bytearray
+        It grows.
+    """
+    for index, image in enumerate(file.items("images")):
+        if not is_link(image):
+            continue
+        try:
+            data = file.resource(image)
+        except InputError as error:
+            warnings.warn(f"{error}; the image stays a link", TranslucentWarning, stacklevel=4)
+            continue
+        if (kind := _picture_kind(data)) is None:
+            told = f"glTF {str(file.path)!r}: {image['uri']!r} is no picture that glTF knows; it stays a link"
+            warnings.warn(told, TranslucentWarning, stacklevel=4)
+            continue
+        start, views = _append(binary, data), tree.setdefault("bufferViews", [])
+        del tree["images"][index]["uri"]
+        tree["images"][index] |= {"bufferView": len(views), "mimeType": kind}
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data)})
+    if binary:
+        buffers = tree.setdefault("buffers", [{}])
+        buffers[0]["byteLength"] = len(binary)
 
 
 def _move(file: GltfFile, old: Json, new: Json, places: dict[int, tuple[int, int]]) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import RenderError
+from translucent.extras import require_package
 from translucent.preview.document import Document
 from translucent.preview.script import Script
 from translucent.preview.workspace import Workspace
@@ -42,11 +43,7 @@ def require_display() -> None:
     without = "without a window: translucent render MODEL -o picture.png"
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise RenderError("preview", "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)", without)
-    try:
-        import imgui_bundle  # noqa: F401
-    except ImportError:
-        found = "the package imgui-bundle is missing"
-        raise RenderError("preview", found, f"pip install 'translucent-shading[ui]', or {without}") from None
+    require_package("imgui_bundle", "preview", without)
 
 
 def run(

@@ -6,7 +6,8 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError
+from translucent.extras import require_package
 from translucent.paths import write_atomically
 from translucent.preview.document import Document, Orbit, checked
 from translucent.reading import read_text, toml_value
@@ -69,11 +70,7 @@ def save_session(path: str | Path, document: Document) -> None:
     RenderError
         If the file cannot be written, or the package that writes TOML is missing.
     """
-    try:
-        import tomli_w
-    except ImportError:
-        what = f"session {str(path)!r}"
-        raise RenderError(what, "the package tomli-w is missing", "pip install 'translucent-shading[ui]'") from None
+    tomli_w = require_package("tomli_w", f"session {str(path)!r}")
     text = tomli_w.dumps(to_table(document))
     write_atomically(Path(path), lambda file: _write_text(file, text))
 

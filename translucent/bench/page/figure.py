@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 from translucent.bench.page.theme import COLORS, css_variables, placeholder
-from translucent.errors import RenderError
+from translucent.extras import require_package
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,15 +31,8 @@ _HALO = "text { paint-order: stroke; stroke: var(--paper); stroke-width: 3px; st
 
 def require_packages() -> None:
     """Raise `RenderError` if what draws the page is not installed."""
-    try:
-        import jinja2  # noqa: F401
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise RenderError(
-            "the page of the report",
-            f"the package {error.name} is not installed",
-            "pip install 'translucent-shading[report]'",
-        ) from None
+    for module in ("markupsafe", "jinja2", "matplotlib"):
+        require_package(module, "the page of the report")
 
 
 def drawing(draw: Callable[Arguments, str]) -> Callable[Arguments, str]:

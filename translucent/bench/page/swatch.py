@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
-
-from markupsafe import Markup
+from typing import TYPE_CHECKING
 
 from translucent.bench.page.theme import style_of
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 #: SVG path commands by matplotlib's path codes, with how many points each takes.
 _COMMANDS = {1: ("M", 1), 2: ("L", 1), 3: ("Q", 2), 4: ("C", 3), 79: ("Z", 1)}
@@ -15,6 +17,8 @@ _COMMANDS = {1: ("M", 1), 2: ("L", 1), 3: ("Q", 2), 4: ("C", 3), 79: ("Z", 1)}
 @cache
 def swatch(family: str, filled: bool = True) -> Markup:
     """The symbol of a family as a small ``<svg>``, hollow for counter-examples."""
+    from markupsafe import Markup
+
     style = style_of(family)
     color = f"var(--{style.color})"
     fill = color if filled else "none"

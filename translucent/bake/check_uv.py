@@ -1,0 +1,110 @@
+"""Whether a map belongs to the texture coordinates of the file that it is for, which is read again for that."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bake.gltf_bodies import Bodies, first_transforms, transformed
+from translucent.bake.record import Record
+from translucent.errors import RenderError, TranslucentWarning
+from translucent.gltf.accessors import Accessors
+from translucent.materials.gltf import GltfMaterial
+from translucent.materials.gltf_file import GltfFile
+from translucent.mesh import Mesh
+
+Array = npt.NDArray[np.float64]
+#: Positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
+Corners = tuple[Array, Array | None]
+
+#: Positions, as shares of the diagonal, and texture coordinates that differ by less than this are the same.
+SAME = 1e-4
+#: Share of the vertices that may have others: of seams that a repair has closed.
+MOST_OTHERS = 0.01
+
+
+def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
+    """Raise unless a map of `mesh` can be read with the texture coordinates in a file.
+
+    Parameters
+    ----------
+    corners
+        Of the file.
+    mesh : Mesh
+        As it was baked.
+    path : Path
+        The file, for the error.
+
+    Raises
+    ------
+    RenderError
+        If its vertices are not in the file, or have other texture coordinates there.
+    """
+    from scipy.spatial import cKDTree
+
+    positions, uv = corners
+    asked = f"check of the map of {mesh.name!r}"
+    if uv is None:
+        raise RenderError(asked, f"{str(path)!r} has no texture coordinates", "bake it again with --unwrap")
+    assert mesh.uv is not None
+    with np.errstate(under="ignore"):
+        known = cKDTree(np.column_stack([(positions - mesh.center) / mesh.diagonal, uv]))
+        used = np.unique(mesh.faces)
+        wanted = np.column_stack([(mesh.vertices[used] - mesh.center) / mesh.diagonal, mesh.uv[used]])
+        distance, _ = known.query(wanted, p=np.inf)
+    others = float(np.mean(distance > SAME))
+    if others > MOST_OTHERS:
+        found = f"{others:.0%} of its vertices have other texture coordinates in {str(path)!r}"
+        raise RenderError(asked, found, "the map does not belong to that file; bake it again with --unwrap")
+
+
+def own_corners(file: GltfFile, part: Record, metres: float, material: GltfMaterial | None = None) -> Corners:
+    """Those of a primitive in its own space; with a material, at which its thickness texture is read."""
+    accessors = Accessors(file)
+    mesh, primitive = part["place"]
+    attributes = file.item("meshes", mesh)["primitives"][primitive]["attributes"]
+    tex_coord = part.get("tex_coord", 0) if material is None else material.thickness_transform.tex_coord
+    positions = metres * accessors.vectors(attributes["POSITION"], "VEC3")
+    if f"TEXCOORD_{tex_coord}" not in attributes:
+        return positions, None
+    uv = accessors.vectors(attributes[f"TEXCOORD_{tex_coord}"], "VEC2")
+    if material is not None:
+        uv = material.thickness_transform.apply(uv)
+    return positions, np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+
+
+def placed_corners(file: GltfFile, part: Record, metres: float) -> Corners:
+    """Those of a primitive where the first node puts it."""
+    matrix = _matrix(file, part)
+    positions, uv = own_corners(file, part, metres)
+    return positions @ matrix[:3, :3].T + metres * matrix[:3, 3], uv
+
+
+def placed_around(file: GltfFile, part: Record, metres: float) -> Mesh | None:
+    """The body that a primitive bounds with others, where the first node puts it."""
+    around = Bodies(file, metres).around((part["place"][0], part["place"][1]))
+    return None if around is None else transformed(around, _matrix(file, part), metres)
+
+
+def _matrix(file: GltfFile, part: Record) -> Array:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TranslucentWarning)  # the bake has told them
+        return first_transforms(file).get(part["place"][0], np.eye(4))
+
+
+def mesh_corners(path: Path, metres: float) -> Corners:
+    """Those of any other file, as they stand in it."""
+    import trimesh
+
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        parts = trimesh.load_scene(path, process=False).dump()
+    uv = [getattr(part.visual, "uv", None) for part in parts]
+    known = [(np.asarray(part.vertices), one) for part, one in zip(parts, uv, strict=True) if one is not None]
+    if not known:
+        return np.zeros((0, 3)), None
+    positions, coordinates = (np.concatenate(arrays) for arrays in zip(*known, strict=True))
+    return metres * positions, np.asarray(coordinates, dtype=np.float64)

@@ -1,0 +1,102 @@
+"""The maps of a glTF file as images of their own, one for each primitive that light enters, in its own UVs.
+
+Of one map ``thickness.exr`` is the file; of several it is ``thickness-NAME.exr`` for each, NAME being that of its
+material (and of its mesh where that is not enough), each with its record. ``thickness.exr.json`` is the record of all.
+
+Where UVs were made, the mesh that has them is beside the map, as ``thickness.exr.uv.glb``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+
+from translucent.bake.glb_builder import GlbBuilder
+from translucent.bake.gltf_bodies import Place, primitive_name
+from translucent.bake.gltf_targets import Target
+from translucent.bake.record import Record, shared, write_common_record
+from translucent.bake.thickness_map import ThicknessMap
+from translucent.bake.writing import save_map, write_uv_file
+from translucent.frame import remove_partial
+from translucent.materials.gltf_file import GltfFile
+
+#: Most characters of the name of a map, and what beside letters and digits neither file systems nor shells mind.
+_LONGEST, _SAFE = 60, "._-"
+
+
+def save_maps(
+    builder: GlbBuilder,
+    output: Path,
+    results: Mapping[Place, ThicknessMap],
+    targets: Mapping[Place, Target],
+    *,
+    normalize: bool = False,
+    invert: bool = False,
+    about: Record,
+) -> Record:
+    """Write the maps of a file, and their record beside them.
+
+    Parameters
+    ----------
+    builder : GlbBuilder
+        The file, with the UVs that were made for it.
+    output : Path
+        As for one map.
+    results, targets : mapping of (mesh, primitive)
+    normalize, invert : bool
+        As for `save_map`.
+    about : dict
+        More for the records.
+
+    Returns
+    -------
+    dict
+        The record of the only map, or that of all of them under ``maps``.
+
+    Raises
+    ------
+    InputError, RenderError
+        As `save_map`.
+    """
+    file = builder.file()
+    made = {place: target.tex_coord for place, target in targets.items() if target.made_uv}
+    if made:
+        about = {**about, "uv_file": write_uv_file(file, output)}
+    told: list[Record] = []
+    paths = _paths(file, output, list(results)) if len(results) > 1 else dict.fromkeys(results, output)
+    for place, result in results.items():
+        remove_partial(paths[place])
+        one: Record = {**about, "place": list(place), "tex_coord": targets[place].tex_coord}
+        told.append(save_map(result, paths[place], normalize=normalize, invert=invert, about=one))
+    if len(told) == 1:
+        return told[0]
+    return write_common_record(output, {**about, **shared(told), "maps": told})
+
+
+def _paths(file: GltfFile, output: Path, places: list[Place]) -> dict[Place, Path]:
+    """A file for each of several maps; names are never the same but for case."""
+    materials = {place: _material_name(file, place) for place in places}
+    count = Counter(materials.values())
+    taken: set[str] = set()
+    paths = {}
+    for place, material in materials.items():
+        unique = bool(material) and count[material] == 1
+        name = _safe(material if unique else f"{material} {primitive_name(file, place)}")
+        number = 2
+        while (free := name if name.casefold() not in taken else f"{name}_{number}").casefold() in taken:
+            number += 1
+        taken.add(free.casefold())
+        paths[place] = output.with_name(f"{output.stem}-{free}{output.suffix}")
+    return paths
+
+
+def _material_name(file: GltfFile, place: Place) -> str:
+    index = file.item("meshes", place[0])["primitives"][place[1]].get("material")
+    return "" if index is None else str(file.item("materials", index).get("name") or f"material {index}")
+
+
+def _safe(name: str) -> str:
+    """A name as a part of the name of a file."""
+    kept = "".join(character if character.isalnum() or character in _SAFE else " " for character in name)
+    return "_".join(kept.split())[:_LONGEST].strip("._-") or "map"
