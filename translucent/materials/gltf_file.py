@@ -24,6 +24,11 @@ from translucent.paths import require_file, require_place
 
 Json = dict[str, Any]
 
+
+class UnreadableError(InputError):
+    """A file that a glTF file links to is missing or cannot be read."""
+
+
 _MAGIC, _VERSION = b"glTF", 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
@@ -80,7 +85,7 @@ class GltfFile:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             return (self.path.parent / unquote(uri)).read_bytes()
         except (OSError, ValueError, binascii.Error) as error:
-            raise InputError(
+            raise UnreadableError(
                 f"glTF {str(self.path)!r}", f"{shown!r} cannot be read ({error})", "keep its files together"
             ) from error
 
