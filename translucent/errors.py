@@ -61,6 +61,10 @@ class InputError(TranslucentError, ValueError):
     """The input cannot be used: a bad file, a value out of its range, an unknown name."""
 
 
+class UnreadableError(InputError):
+    """A file, or a picture in one, is missing or damaged."""
+
+
 class RenderError(TranslucentError, RuntimeError):
     """The input is fine, yet the work failed: no OpenGL, a shader that does not compile, a full disk."""
 

@@ -48,6 +48,8 @@ class Mesh(Frozen):
         What messages call the mesh.
     repairs : tuple of str
         What `load_mesh` has mended, for the record.
+    colors : array_like (n, 4), optional
+        Linear RGB and opacity of the vertices, 0 to 1, which multiply those of a surface.
 
     Raises
     ------
@@ -60,6 +62,7 @@ class Mesh(Frozen):
     uv: Array | None = None
     name: str = "mesh"
     repairs: tuple[str, ...] = ()
+    colors: Array | None = None
 
     def __post_init__(self) -> None:
         vertices = self._array("vertices", self.vertices, np.float64, 3)
@@ -75,13 +78,18 @@ class Mesh(Frozen):
             )
         self._freeze("vertices", vertices)
         self._freeze("faces", faces)
-        if self.uv is not None:
-            uv = self._array("uv", self.uv, np.float64, 2)
-            if len(uv) != len(vertices):
-                raise InputError(
-                    f"mesh {self.name!r}", f"{len(uv)} uv for {len(vertices)} vertices", "give one per vertex"
-                )
-            self._freeze("uv", uv)
+        for field, columns in (("uv", 2), ("colors", 4)):
+            if (given := getattr(self, field)) is None:
+                continue
+            values = self._array(field, given, np.float64, columns)
+            if len(values) != len(vertices):
+                found = f"{len(values)} {field} for {len(vertices)} vertices"
+                raise InputError(f"mesh {self.name!r}", found, "give one per vertex")
+            self._freeze(field, values)
+        if self.colors is not None and not ((self.colors >= 0) & (self.colors <= 1)).all():
+            raise InputError(
+                f"mesh {self.name!r}", "a color of a vertex is not in 0 to 1", "give linear RGB and opacity"
+            )
 
     def _array(self, field: str, value: Any, dtype: Any, columns: int) -> npt.NDArray[Any]:
         try:
@@ -275,11 +283,11 @@ def mended(raw: Mesh) -> Mesh:
     split_faces = np.where(reversed_face[:, None], raw.faces[:, ::-1], raw.faces)
     repairs = []
     positions = raw.vertices[same]
-    if raw.uv is None:
-        index, vertices, uv = same, positions, None
-    else:
-        groups = equal_rows(np.column_stack([same, raw.uv]))
-        index, vertices, uv = groups.first[groups.of], positions, raw.uv
+    carried = [values for values in (raw.uv, raw.colors) if values is not None]
+    index, vertices, uv, colors = same, positions, raw.uv, raw.colors
+    if carried:
+        groups = equal_rows(np.column_stack([same, *carried]))
+        index = groups.first[groups.of]
     kept = used_vertices(index[split_faces])
     renumbered = np.zeros(len(index), dtype=np.int32)
     renumbered[kept] = np.arange(len(kept))
@@ -301,4 +309,5 @@ def mended(raw: Mesh) -> Mesh:
         None if uv is None else uv[kept],
         name=raw.name,
         repairs=tuple(repairs),
+        colors=None if colors is None else colors[kept],
     )

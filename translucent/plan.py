@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from translucent.errors import InputError
 from translucent.plan_borders import border_passes, check_borders, with_one_border
+from translucent.plan_layers import layer_passes
 from translucent.plan_limits import (
     MAX_SCATTER_LIGHTS,
     closed_sheet_limits,
@@ -56,6 +57,7 @@ COSTS = {
     "resolve": 0.4,
     "interfaces": 4.0,
     "surfaces": 8.0,
+    "layers": 3.0,
 }
 
 #: Layers of a body that is not convex, for want of a better guess: cost estimates are made before anything is drawn.
@@ -371,7 +373,8 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
         reason = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
     else:
         reason = "Beer-Lambert: what is behind, through exp(-optical depth)"
-    passes = [*passes, *borders[:1], PassSpec("transmittance", reason, cost=COSTS["resolve"]), *borders[1:]]
+    resolve = PassSpec("transmittance", reason, cost=COSTS["resolve"])
+    passes = [*passes, *borders[:1], resolve, *borders[1:], *layer_passes(scene, COSTS["layers"])]
     scatters = any(step.name == "light_views" for step in passes)
     limits = [*limits, *mesh_limits(scene, method)]
     unmodelled = unmodelled_effects(scene, scatters=scatters, borders=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from translucent.density import DensityGrid
 from translucent.errors import InputError
+from translucent.plan_layers import layer_effects
 from translucent.render_plan import Capabilities, RenderPlan
 from translucent.scene import Object, Scene, object_names
 from translucent.thickness import (
@@ -177,7 +178,7 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
             )
         else:
             effects.append(LIGHTS_LEFT_OUT if scene.lights else ONLY_REMOVES)
-    elif scene.lights and not scene.opaque:
+    elif scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
         effects.append("lights: they shine on nothing, since no medium scatters and nothing is opaque")
     bent = [body for body in scene.bodies if body.has_interface]
     if bent and borders:
@@ -191,6 +192,7 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
         effects.append(f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits")
     if not borders and (finished := [item for item in scene.opaque if item.surface is not None]):
         effects.append(f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each")
+    effects += layer_effects(scene, borders=borders)
     if scene.opaque:
         effects.append("shadows: light reaches opaque objects through everything")
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
@@ -200,7 +202,13 @@ def unmodelled_effects(scene: Scene, *, scatters: bool, borders: bool = False) -
 
 def _is_invisible(body: Object) -> bool:
     medium = body.medium
-    return medium is not None and not body.has_interface and not (medium.extinction > 0).any() and not medium.emits
+    return (
+        medium is not None
+        and not body.covers
+        and not body.has_interface
+        and not (medium.extinction > 0).any()
+        and not medium.emits
+    )
 
 
 def with_ambient_told(plan: RenderPlan) -> RenderPlan:

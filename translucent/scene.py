@@ -98,15 +98,21 @@ class Object(Frozen):
             if self.medium is None or self.sheet_thickness is not None:
                 what = "opaque" if self.medium is None else "a sheet, which has no inside"
                 raise InputError(f"density of {self.mesh.name!r}", f"it is {what}", "give it a medium to fill, or none")
-
         if self.surface is not None:
-            _require_type("surface of an object", self.surface, Surface, "use tl.Surface")
-            if self.mesh.uv is None and any(self.surface.textures):
-                raise InputError(
-                    f"surface of {self.mesh.name!r}",
-                    "it has textures, and the mesh no texture coordinates",
-                    "unwrap it",
-                )
+            self._check_surface(self.surface)
+
+    def _check_surface(self, surface: Surface) -> None:
+        _require_type("surface of an object", surface, Surface, "use tl.Surface")
+        if self.mesh.uv is None and any(surface.textures):
+            raise InputError(
+                f"surface of {self.mesh.name!r}",
+                "it has textures, and the mesh no texture coordinates",
+                "unwrap it",
+            )
+        if surface.opacity is not None and (self.medium is None or self.sheet_thickness is None):
+            what = "opaque" if self.medium is None else "a solid"
+            do = "give it a clear medium and a sheet_thickness, or no opacity"
+            raise InputError(f"opacity of {self.mesh.name!r}", f"it is {what}, and only thin sheets cover", do)
 
     def __repr__(self) -> str:
         return f"Object({self.mesh!r}, {self.medium!r})"
@@ -119,9 +125,32 @@ class Object(Frozen):
     @property
     def has_interface(self) -> bool:
         """Whether light changes where it crosses the border of the medium: is bent, mirrored, tinted or spread."""
-        return self.medium is not None and (
-            self.medium.ior != 1.0 or (self.surface is not None and not self.surface.plain)
+        return (
+            self.medium is not None
+            and not self.covers
+            and (self.medium.ior != 1.0 or (self.surface is not None and not self._plain))
         )
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether it is a thin sheet in which alpha may make holes."""
+        return (
+            self.sheet_thickness is not None
+            and self.surface is not None
+            and (self.covers or self.surface.alpha_cutoff > 0)
+            and (self.surface.color_texture is not None or self.mesh.colors is not None)
+        )
+
+    @property
+    def covers(self) -> bool:
+        """Whether it is a layer that covers a share of what is behind it; see `Surface.opacity`."""
+        return self.surface is not None and self.surface.opacity is not None
+
+    @property
+    def _plain(self) -> bool:
+        """Whether neither its surface nor the colors of its vertices change what passes."""
+        assert self.surface is not None
+        return self.surface.plain and self.mesh.colors is None
 
     @property
     def matrix(self) -> Array:

@@ -113,7 +113,7 @@ def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
     """
 
     def finish(item: Object) -> Object:
-        if item.medium is None or not (item.medium.scatters or roughness is not None):
+        if item.medium is None or item.covers or not (item.medium.scatters or roughness is not None):
             return item
         surface = item.surface or Surface()
         surface = dataclasses.replace(
@@ -131,11 +131,21 @@ def filled(scene: AnyScene, medium: Medium) -> AnyScene:
 
     Thin sheets become bodies: they had no inside that a medium could fill.
     """
-    everything = not scene.bodies
-    objects = [
-        dataclasses.replace(item, medium=medium, sheet_thickness=None)
-        if everything or item.medium is not None
-        else item
-        for item in scene.objects
-    ]
-    return dataclasses.replace(scene, objects=objects)
+    chosen = set(map(id, fillable(scene)))
+
+    def fill(item: Object) -> Object:
+        surface = item.surface
+        if surface is not None and surface.opacity is not None:
+            surface = dataclasses.replace(surface, opacity=None)
+        return dataclasses.replace(item, medium=medium, sheet_thickness=None, surface=surface)
+
+    return dataclasses.replace(scene, objects=[fill(item) if id(item) in chosen else item for item in scene.objects])
+
+
+def fillable(scene: Scene) -> tuple[Object, ...]:
+    """The objects that a medium fills for which no object is named: those that light enters, or else all.
+
+    Layers that cover a share of what is behind them are among them only where there is nothing else.
+    """
+    bodies = tuple(body for body in scene.bodies if not body.covers)
+    return bodies or tuple(item for item in scene.objects if not item.covers) or tuple(scene.objects)

@@ -27,6 +27,20 @@ _RANGES = (
     ("metallic", 0.0, 1.0),
     ("ior", 1.0, MAX_IOR),
     ("alpha_cutoff", 0.0, 1.0),
+    ("opacity", 0.0, 1.0),
+)
+
+#: Where a layer covers less than this share, there is none.
+LEAST_COVER = 1e-4
+
+#: Fields that hold a texture.
+TEXTURE_FIELDS = (
+    "color_texture",
+    "roughness_texture",
+    "transmission_texture",
+    "normal_texture",
+    "emissive_texture",
+    "occlusion_texture",
 )
 
 
@@ -63,16 +77,23 @@ class Surface(Frozen):
     color_texture, roughness_texture, transmission_texture, normal_texture : Texture, optional
         Multiply the values above, over the texture coordinates of the mesh: RGB, G (and B of `metallic`), R; a normal
         map is in tangent space, with green upwards.
+    occlusion_texture : Texture, optional
+        R multiplies the light of the environment, and not that of lights.
     metallic : float
         Of an opaque object, 0 to 1: share of it that is metal, whose mirror images have the color.
     ior : float
         Of the coat of an opaque object, >= 1. With 1 it is Lambert's: nothing is mirrored but by metal.
     emissive : str or array_like (3,)
-        Radiance of an opaque object in the dark, linear RGB or a color as text.
+        Radiance of the surface in the dark, linear RGB or a color as text; of a body, where a ray first enters it.
     emissive_texture : Texture, optional
         Multiplies it.
     alpha_cutoff : float
-        Of an opaque object, 0 to 1: where the opacity of `color_texture` is less, there is a hole.
+        0 to 1: where the opacity of `color_texture`, times that of the vertices, is less, an opaque object or a thin
+        sheet has a hole. A solid has none: what is inside would be open.
+    opacity : float, optional
+        Makes of a thin sheet a layer that covers this share of what is behind it, 0 to 1, whatever the angle, times the
+        opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would, painted
+        over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its borders bend nothing.
     double_sided : bool
         Whether an opaque object is seen from the inside, too.
 
@@ -99,10 +120,13 @@ class Surface(Frozen):
     emissive_texture: Texture | None = None
     alpha_cutoff: float = 0.0
     double_sided: bool = True
+    occlusion_texture: Texture | None = None
+    opacity: float | None = None
 
     def __post_init__(self) -> None:
         for field, least, most in _RANGES:
-            value = getattr(self, field)
+            if (value := getattr(self, field)) is None and field == "opacity":
+                continue
             if not isinstance(value, int | float | np.floating) or not least <= value <= most:
                 raise InputError(
                     f"surface {field} {value!r}", f"not in {least:g} to {most:g}", "give a number in that range"
@@ -111,13 +135,7 @@ class Surface(Frozen):
         for field in ("color", "diffuse_transmission_color"):
             object.__setattr__(self, field, _color(field, getattr(self, field), 1.0))
         object.__setattr__(self, "emissive", _color("emissive", self.emissive, MAX_RADIANCE))
-        for field in (
-            "color_texture",
-            "roughness_texture",
-            "transmission_texture",
-            "normal_texture",
-            "emissive_texture",
-        ):
+        for field in TEXTURE_FIELDS:
             if not isinstance(value := getattr(self, field), Texture | None):
                 raise InputError(f"surface {field}", f"of type {type(value).__name__}", "use tl.Texture")
 
@@ -130,18 +148,18 @@ class Surface(Frozen):
             and self.color_texture is None
             and bool((np.asarray(self.color) == 1.0).all())
             and not self.multiple_scattering
+            and not self.glows
         )
 
     @property
+    def glows(self) -> bool:
+        """Whether it sends out light of its own."""
+        return bool((np.asarray(self.emissive) > 0).any())
+
+    @property
     def textures(self) -> tuple[Texture | None, ...]:
-        """Color, roughness, transmission, normal and emissive texture."""
-        return (
-            self.color_texture,
-            self.roughness_texture,
-            self.transmission_texture,
-            self.normal_texture,
-            self.emissive_texture,
-        )
+        """Color, roughness, transmission, normal, emissive and occlusion texture."""
+        return tuple(getattr(self, field) for field in TEXTURE_FIELDS)
 
 
 def _color(field: str, color: ColorLike, most: float) -> Array:

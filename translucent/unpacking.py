@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.errors import InputError
+from translucent.errors import InputError, UnreadableError
 from translucent.extras import require_package
 from translucent.reading import open_file, require_room, shown
 
@@ -105,7 +105,7 @@ def open_picture(
     Raises
     ------
     InputError
-        If it is no such picture, or has too many pixels for its file.
+        If it has too many pixels for its file, or, as `UnreadableError`, is no such picture.
     """
     from PIL import Image
 
@@ -116,7 +116,8 @@ def open_picture(
     except Image.DecompressionBombError:
         raise InputError(asked, "it has too many pixels", "make it smaller") from None
     except Exception as error:  # each of Pillow's readers raises its own kinds
-        raise InputError(asked, f"it is not an image that can be read: none of {', '.join(formats)}", do) from error
+        found = f"it is not an image that can be read: none of {', '.join(formats)}"
+        raise UnreadableError(asked, found, do) from error
     width, height = image.size
     require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, len(data))
     return image

@@ -5,6 +5,10 @@
 in vec3 offset;
 in vec3 corner_normal;  // smooth
 in vec2 uv;
+#if VERTEX_COLORS
+in vec4 corner_color;
+out vec4 vertex_color;
+#endif
 
 out float axial;
 out vec3 world_normal;
@@ -19,4 +23,7 @@ void main() {
     world_normal = mat3(world_from_normal) * corner_normal;
     from_eye = (eye_from_offset * vec4(offset, 1.0)).xyz;
     surface_uv = uv;
+#if VERTEX_COLORS
+    vertex_color = corner_color;
+#endif
 }

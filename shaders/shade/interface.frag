@@ -1,6 +1,6 @@
 // The border of a body where a ray first enters it, or first leaves one: its normal, place and material.
 // BACK: where it leaves; BEYOND: farther than what has been entered, or else ahead of the eye; EXITS: where the intervals
-// say that it leaves all bodies.
+// say that it leaves all bodies. HOLES: of a sheet whose alpha makes some.
 
 #include <constants>
 #include <View>
@@ -25,11 +25,19 @@ in float axial;
 in vec3 world_normal;
 in vec3 from_eye;
 in vec2 surface_uv;
+#if VERTEX_COLORS
+in vec4 vertex_color;
+#else
+const vec4 vertex_color = vec4(1.0);
+#endif
+#if HOLES
+uniform float hole_below;
+#endif
 
 layout(location = 0) out vec4 out_normal;  // unit; w: place
 layout(location = 1) out vec4 out_surface;  // object, roughness, transmission, variance of normals
 #if !BACK
-layout(location = 2) out vec4 out_color;
+layout(location = 2) out vec4 out_color;  // w: share of the light of the environment that reaches it
 #endif
 
 void main() {
@@ -39,7 +47,11 @@ void main() {
     float roughness = surface_roughness * texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, surface_uv)).g;
     float transmission = surface_color.w * texture(transmission_texture, picture_place(TRANSMISSION_TEXTURE, surface_uv)).r;
 #if !BACK
-    vec3 tint = surface_color.rgb * texture(color_texture, picture_place(COLOR_TEXTURE, surface_uv)).rgb;
+    vec4 painted = vertex_color * texture(color_texture, picture_place(COLOR_TEXTURE, surface_uv));
+    vec4 tint = vec4(surface_color.rgb * painted.rgb, unoccluded(surface_uv));
+#if HOLES
+    if (painted.a < hole_below) { discard; }
+#endif
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
     float place = axial * place_scale + place_start;
@@ -62,6 +74,6 @@ void main() {
     out_normal = vec4(normal, place);
     out_surface = vec4(float(object), clamp(roughness, 0.0, 1.0), transmission, variance);
 #if !BACK
-    out_color = vec4(tint, 1.0);
+    out_color = tint;
 #endif
 }

@@ -19,6 +19,11 @@ in vec3 world_normal;
 in vec3 from_eye;
 #if SURFACE
 in vec2 surface_uv;
+#if VERTEX_COLORS
+in vec4 vertex_color;
+#else
+const vec4 vertex_color = vec4(1.0);
+#endif
 #endif
 
 layout(location = 0) out float opaque_place;
@@ -54,7 +59,7 @@ vec3 diffuse_radiance(vec3 normal) {
 
 void main() {
 #if SURFACE
-    OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv);
+    OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
     if (finish.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture

@@ -20,17 +20,19 @@ struct OpaqueFinish {
     vec3 emitted;
     vec3 normal;        // unit, towards the side that the mesh calls outside
     float variance;     // of normals within a pixel
+    float opacity;      // of texture and vertices
+    float unoccluded;   // share of the light of the environment that reaches it
     bool is_hole;
 };
 
-// Of a fragment; takes derivatives.
-OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 place, vec2 uv) {
-    vec4 painted = texture(color_texture, picture_place(COLOR_TEXTURE, uv));
+// Of a fragment; takes derivatives. vertex: color and opacity of the mesh there.
+OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 place, vec2 uv, vec4 vertex) {
+    vec4 painted = vertex * texture(color_texture, picture_place(COLOR_TEXTURE, uv));
     vec4 rough = texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, uv));
     vec3 emitted = opaque_emissive * texture(emissive_texture, picture_place(EMISSIVE_TEXTURE, uv)).rgb;
     vec3 mapped = mapped_normal(normal, place, uv);
     return OpaqueFinish(base * painted.rgb, opaque_finish.x * rough.b, clamp(opaque_finish.y * rough.g, 0.0, 1.0), emitted,
-                        mapped, normal_variance(mapped), painted.a < opaque_finish.w);
+                        mapped, normal_variance(mapped), painted.a, unoccluded(uv), painted.a < opaque_finish.w);
 }
 
 // What the microfacets of one of the two layers mirror, relative to those without any loss.
@@ -62,9 +64,9 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) 
     float painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored.r);
     vec3 paint = finish.base * (1.0 - opaque_passed_share);
 
-    vec3 sum = mix(coat.mirrored, metal.mirrored, finish.metallic)
+    vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)
             * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + painted * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI;
+        + painted * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI);
     float alpha = highlight_alpha(finish.roughness, finish.variance);
     for (int light = 0; light < light_count; ++light) {
         vec4 at = light_place[light];

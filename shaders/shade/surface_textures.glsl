@@ -5,13 +5,17 @@ uniform sampler2D roughness_texture;
 uniform sampler2D transmission_texture;
 uniform sampler2D normal_texture;
 uniform sampler2D emissive_texture;
-uniform vec3 texture_rows[10];  // two for each, in this order: coordinates in the picture, v upwards, from (u, v, 1)
+#if OCCLUSION
+uniform sampler2D occlusion_texture;
+#endif
+uniform vec3 texture_rows[12];  // two for each, in this order: coordinates in the picture, v upwards, from (u, v, 1)
 
 const int COLOR_TEXTURE = 0;
 const int ROUGHNESS_TEXTURE = 1;
 const int TRANSMISSION_TEXTURE = 2;
 const int NORMAL_TEXTURE = 3;
 const int EMISSIVE_TEXTURE = 4;
+const int OCCLUSION_TEXTURE = 5;
 
 vec2 turned_uv(int number, vec2 uv) {
     return vec2(dot(texture_rows[2 * number], vec3(uv, 1.0)), dot(texture_rows[2 * number + 1], vec3(uv, 1.0)));
@@ -21,6 +25,15 @@ vec2 turned_uv(int number, vec2 uv) {
 vec2 picture_place(int number, vec2 uv) {
     vec2 turned = turned_uv(number, uv);
     return vec2(turned.x, 1.0 - turned.y);
+}
+
+// Share of the light of the environment that reaches a place.
+float unoccluded(vec2 uv) {
+#if OCCLUSION
+    return texture(occlusion_texture, picture_place(OCCLUSION_TEXTURE, uv)).r;
+#else
+    return 1.0;
+#endif
 }
 
 // A normal map's normal, by the directions in which the picture's coordinates grow on the surface (Schueler 2013).

@@ -45,6 +45,7 @@ struct Finish {
     float roughness;
     float transmission;
     vec3 color;
+    float unoccluded;     // share of the light of the environment that reaches it
 };
 
 Finish finish_of(int object) {
@@ -53,7 +54,7 @@ Finish finish_of(int object) {
     vec4 c = texelFetch(surface_table, ivec2(2, object), 0);
     vec4 d = texelFetch(surface_table, ivec2(3, object), 0);
     vec4 e = texelFetch(surface_table, ivec2(4, object), 0);
-    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, e.w, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0));
+    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, e.w, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0), 1.0);
 }
 
 // Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -98,8 +99,9 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
     return sum;
 }
 
-vec3 irradiance_on(vec3 point, vec3 normal) {
-    vec3 sum = environment_irradiance(normal);
+// unoccluded: share of the environment's light.
+vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
+    vec3 sum = unoccluded * environment_irradiance(normal);
     for (int light = 0; light < light_count; ++light) {
         vec3 irradiance;
         vec3 towards = towards_light(light, point, irradiance);
@@ -110,7 +112,7 @@ vec3 irradiance_on(vec3 point, vec3 normal) {
 
 // Light of lights alone; irradiance_on has the environment's, too.
 vec3 lights_on(vec3 point, vec3 normal) {
-    return irradiance_on(point, normal) - environment_irradiance(normal);
+    return irradiance_on(point, normal, 0.0);
 }
 
 // Diffuse light out of the body: as a layer gives it back, and lets it through from behind. What passes without an event
@@ -130,8 +132,8 @@ vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3
 }
 
 vec3 paint(Finish finish, vec3 point, vec3 normal) {
-    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal);
-    return (front + finish.painted_through * irradiance_on(point, -normal)) / PI;
+    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal, finish.unoccluded);
+    return (front + finish.painted_through * irradiance_on(point, -normal, finish.unoccluded)) / PI;
 }
 
 struct Crossing {
@@ -230,7 +232,11 @@ void main() {
     Finish finish = finish_of(int(surface.x + 0.5));
     finish.roughness = surface.y;
     finish.transmission = surface.z;
-    if (!starts_inside) { finish.color = texelFetch(surface_color, texel, 0).rgb; }
+    if (!starts_inside) {
+        vec4 tint = texelFetch(surface_color, texel, 0);
+        finish.color = tint.rgb;
+        finish.unoccluded = tint.a;
+    }
 
     vec3 normal = front.xyz;
     float place = starts_inside ? surface_eye_place : front.w;
@@ -248,7 +254,7 @@ void main() {
     }
     vec3 mirrored = vec3(0.0);
     if (reflectance > 0.0) {
-        mirrored = mirrored_share * environment_light(reflected_direction(ray, normal), finish.roughness)
+        mirrored = finish.unoccluded * mirrored_share * environment_light(reflected_direction(ray, normal), finish.roughness)
             + highlights(point, normal, ray, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
     }
 

@@ -10,6 +10,9 @@
 
 in float axial;
 in vec3 world_normal;
+#if HOLES
+#include "thickness/holes.glsl"
+#endif
 
 #if SPECTRAL
 layout(location = 0) out vec4 optical_depth_and_count;
@@ -19,6 +22,9 @@ layout(location = 0) out vec2 path_and_count;
 #endif
 
 void main() {
+#if HOLES
+    if (is_hole()) { discard; }
+#endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
 #if OPAQUE
     // What lies on an opaque surface is seen, also where rounding puts it behind.

@@ -77,11 +77,12 @@ def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
 
 
 def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:
-    model = write_scene(tmp_path / "scene.glb", {"extensions": GLASS, "alphaMode": "BLEND", "name": "Glass"})
+    coated = GLASS | {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
+    model = write_scene(tmp_path / "scene.glb", {"extensions": coated, "name": "Glass"})
     with warnings.catch_warnings():
         warnings.simplefilter("always")  # pytest turns warnings into errors, which nothing else does
         result = run("explain", model, "--json")
-    lost = "transparency by alphaMode BLEND ('Glass')"
+    lost = "clear coats ('Glass')"
     assert result.err.splitlines() == [f"warning: scene 'scene.glb': left out: {lost}"]
     assert strict_json(result.out)["left_out"] == [lost]
 

@@ -33,7 +33,8 @@ def intervals(*rows: tuple[int, float, float, int, int]) -> Intervals:
 
 def crossings(*rows: tuple[int, float, float, int]) -> Crossings:
     pixel, distance, path, body = np.reshape(np.array(rows, dtype=np.float64), (-1, 4)).T
-    return Crossings(pixel.astype(np.int64), distance, path, body.astype(np.int64))
+    nothing = np.zeros(len(path)), np.zeros((len(path), 3))
+    return Crossings(pixel.astype(np.int64), distance, path, body.astype(np.int64), *nothing)
 
 
 def rows(found: Segments) -> list[tuple[float, ...]]:

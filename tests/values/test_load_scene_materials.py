@@ -9,9 +9,9 @@ import pytest
 
 import translucent as tl
 from tests.values.gltf_writer import COLOR, WINE, Json, Writer, glass, load, material_scene
-from translucent.gltf.objects import WALL_SHARE
+from translucent.gltf.objects import BLENDED, WALL_SHARE
 
-BLENDED = "blending by alphaMode BLEND, drawn as holes where a texture's opacity is below 0.5"
+HALF = {"baseColorFactor": [1.0, 1.0, 1.0, 0.5]}
 
 
 def test_a_volume_is_a_body_whose_attenuation_no_scale_changes(tmp_path: Path) -> None:
@@ -62,13 +62,13 @@ def test_everything_else_is_opaque_in_its_base_color(tmp_path: Path, extensions:
 @pytest.mark.parametrize(
     ("material", "line"),
     [
-        ({"alphaMode": "BLEND"}, f"{BLENDED} ('Stuff')"),
-        ({"alphaMode": "MASK", "extensions": glass()}, "transparency by alphaMode MASK ('Stuff')"),
+        ({"alphaMode": "BLEND", "pbrMetallicRoughness": HALF}, f"{BLENDED} ('Stuff')"),
         (
-            {"emissiveFactor": [0.0, 0.5, 0.0], "extensions": glass()},
-            "glowing surfaces of translucent objects ('Stuff')",
+            {"alphaMode": "BLEND", "pbrMetallicRoughness": HALF, "extensions": glass()},
+            "alphaMode BLEND of translucent objects ('Stuff')",
         ),
-        ({"occlusionTexture": {"index": 0}}, "occlusion textures ('Stuff')"),
+        ({"extensions": {"KHR_materials_clearcoat": {}}}, "clear coats ('Stuff')"),
+        ({"extensions": glass() | {"KHR_materials_iridescence": {}}}, "iridescence ('Stuff')"),
         (
             {
                 "extensions": {
@@ -97,14 +97,18 @@ def test_what_a_material_loses_is_told(tmp_path: Path, material: Json, line: str
 def test_losses_are_listed_once_and_shortly(tmp_path: Path) -> None:
     writer = Writer()
     for i in range(6):
-        blend = writer.material(name=f"Blend {min(i, 4)}", alphaMode="BLEND")
+        coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
+        blend = writer.material(
+            name=f"Blend {min(i, 4)}", alphaMode="BLEND", pbrMetallicRoughness=HALF, extensions=coat
+        )
         writer.add("nodes", mesh=writer.mesh(writer.primitive(material=blend)))
     writer.tree["extensionsUsed"] = ["KHR_materials_clearcoat", "KHR_materials_volume", "EXT_mesh_gpu_instancing"]
     writer.add("animations", channels=[])
     with pytest.warns(tl.TranslucentWarning):
         scene = load(writer, tmp_path)
     assert scene.left_out == (
-        "extensions (KHR_materials_clearcoat, EXT_mesh_gpu_instancing)",
+        "extensions (EXT_mesh_gpu_instancing)",
+        "clear coats ('Blend 0', 'Blend 1', 'Blend 2' and 2 more)",
         f"{BLENDED} ('Blend 0', 'Blend 1', 'Blend 2' and 2 more)",
         "animations (1)",
     )

@@ -333,13 +333,6 @@ def test_what_its_alpha_hides_is_left_out(tmp_path: Path) -> None:
         (base_color(), None, "textures 0 is not one of 0"),
         (base_color(index=3), b"", "textures 3 is not one of 1"),
         (base_color(texCoord=-1), b"", "texCoord is -1, not a whole number"),
-        (
-            base_color(),
-            b"GIF89a no picture",
-            "image number 0 of material 'Stuff'; it is not an image that can be read: none of PNG, JPEG",
-        ),
-        (base_color(), png(PICTURE)[:-30], "image number 0 of material 'Stuff' is broken"),
-        (base_color(), b"", "it is not an image that can be read: none of PNG, JPEG"),
     ],
     ids=lambda v: v if isinstance(v, str) else "",
 )
@@ -351,9 +344,38 @@ def test_a_bad_material_is_refused_in_words(
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_picture_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match=r"'wood.png' cannot be read .*keep its files together"):
-        tl.load_scene(plate(tmp_path, base_color(), image={"uri": "wood.png"}))
+@pytest.mark.parametrize(
+    ("picture", "image", "named"),
+    [
+        (None, {"uri": "wood.png"}, "'wood.png'"),
+        (None, {"uri": "data:image/png;base64,!"}, "image number 0"),
+        (b"GIF89a no picture", None, "image number 0"),
+        (png(PICTURE)[:-30], None, "image number 0"),
+        (b"", None, "image number 0"),
+    ],
+    ids=["missing", "no base64", "another kind", "cut short", "empty"],
+)
+def test_of_a_picture_that_is_missing_or_broken_the_factors_are_left(
+    tmp_path: Path, picture: bytes | None, image: Json | None, named: str
+) -> None:
+    color = {"baseColorFactor": [0.1, 0.2, 0.3, 1.0], "baseColorTexture": {"index": 0}}
+    path = plate(tmp_path, {"pbrMetallicRoughness": color, "emissiveTexture": {"index": 0}}, picture, image=image)
+    with pytest.warns(tl.TranslucentWarning, match="textures that are missing or broken") as caught:
+        scene = tl.load_scene(path)
+    assert len(caught) == 1
+    assert scene.left_out == (f"textures that are missing or broken ({named} of material 'Stuff')",)
+    found = scene.objects[0].surface
+    assert (found.color_texture, np.asarray(found.color).tolist()) == (None, [0.1, 0.2, 0.3])
+
+
+def test_a_picture_in_a_missing_buffer_is_an_error(tmp_path: Path) -> None:
+    path = plate(tmp_path, base_color(), png(PICTURE))
+    tree = json.loads(path.read_text())
+    tree["buffers"].append({"byteLength": 9, "uri": "gone.bin"})
+    tree["bufferViews"][3]["buffer"] = 1
+    path.write_text(json.dumps(tree))
+    with pytest.raises(tl.InputError, match=r"'gone.bin' cannot be read .*keep its files together"):
+        tl.load_scene(path)
 
 
 def test_a_picture_beyond_all_measure_is_refused(tmp_path: Path) -> None:

@@ -18,8 +18,8 @@ from translucent.bake.gltf_targets import Target
 from translucent.bake.record import Record, shared, write_common_record
 from translucent.bake.thickness_map import ThicknessMap
 from translucent.bake.writing import save_map, write_uv_file
-from translucent.frame import remove_partial
 from translucent.materials.gltf_file import GltfFile
+from translucent.paths import remove_partial
 
 #: Most characters of the name of a map, and what beside letters and digits neither file systems nor shells mind.
 _LONGEST, _SAFE = 60, "._-"

@@ -86,6 +86,8 @@ def _summary(model: str, scene: Scene) -> dict[str, Any]:
 def _kind(item: Object) -> str:
     if item.medium is None:
         return "opaque"
+    if item.covers:
+        return "layer"
     return "body" if item.sheet_thickness is None else "thin wall"
 
 

@@ -147,10 +147,13 @@ def read_vector(option: str, text: str) -> list[float]:
 
 
 def medium_lines(scene: Scene) -> list[str]:
-    """What the translucent objects of a scene are filled with, and how light fares in it; a line per medium."""
+    """What the translucent objects of a scene are filled with, and how light fares in it; a line per medium.
+
+    Layers, which nothing fills, are not among them.
+    """
     users: dict[Medium, list[Object]] = {}
     for body in scene.bodies:
-        if body.medium is not None:
+        if body.medium is not None and not body.covers:
             users.setdefault(body.medium, []).append(body)
     return [_medium_text(medium, bodies, several=len(users) > 1) for medium, bodies in users.items()]
 

@@ -60,8 +60,19 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
         if len(uv) != len(positions):
             raise refused(accessors.file, f"{name!r}: {len(uv)} texture coordinates for {len(positions)} vertices")
         uv = np.column_stack([uv[used, 0], 1.0 - uv[used, 1]])  # glTF counts v downwards
-    accessors.keep(repr(name), 24 * len(used) + 8 * faces.size)
-    return Mesh(positions[used], faces.reshape(-1, 3).astype(np.int32), uv, name=name)
+    colors = None if "COLOR_0" not in attributes else _colors(accessors, attributes["COLOR_0"], len(positions), name)
+    colors = None if colors is None or (colors[used] == 1).all() else colors[used]
+    accessors.keep(repr(name), (24 if colors is None else 56) * len(used) + 8 * faces.size)
+    return Mesh(positions[used], faces.reshape(-1, 3).astype(np.int32), uv, name=name, colors=colors)
+
+
+def _colors(accessors: Accessors, index: Any, count: int, name: str) -> npt.NDArray[np.float64]:
+    """(n, 4): colors of the vertices, which are linear, and their opacity: 1 where none is stated."""
+    kind = "VEC3" if accessors.file.item("accessors", index).get("type") == "VEC3" else "VEC4"
+    colors = accessors.vectors(index, kind).clip(0.0, 1.0)
+    if len(colors) != count:
+        raise refused(accessors.file, f"{name!r}: {len(colors)} colors for {count} vertices")
+    return np.column_stack([colors, np.ones(count)]) if kind == "VEC3" else colors
 
 
 def _faces(accessors: Accessors, mode: Any, corners: Indices, name: str) -> Indices:

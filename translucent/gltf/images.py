@@ -1,6 +1,7 @@
 """Pictures of glTF materials as textures. Source: glTF 2.0, sections 3.8 and 3.9, and KHR_texture_transform.
 
-Read are PNG and JPEG, from buffer views, data URIs and files beside; all over TEXCOORD_0.
+Read are PNG and JPEG, from buffer views, data URIs and files beside; all over TEXCOORD_0. A picture that is missing or
+broken is left out, and the factors of the material stand alone.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from translucent.color import srgb_to_linear
+from translucent.errors import UnreadableError
 from translucent.gltf.fields import extension, label, number, numbers, refused, section, whole
 from translucent.gltf.left_out import LeftOut
 from translucent.materials.gltf_file import GltfFile, Json
@@ -24,6 +26,9 @@ Pixels = npt.NDArray[np.float32]
 
 #: Pixels along a side beyond which a picture is made smaller.
 MAX_SIDE = 4096
+
+#: Characters of a link that a message repeats; a longer one is told by its number.
+_LONGEST_NAME = 60
 
 _NEAREST = 9728
 _WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
@@ -42,11 +47,11 @@ class Textures:
     def __init__(self, file: GltfFile, left_out: LeftOut) -> None:
         self._file = file
         self._left_out = left_out
-        self._pictures: dict[int, Bytes] = {}
+        self._pictures: dict[int, Bytes | None] = {}
         self._made: dict[tuple[object, ...], Texture] = {}
 
     def read(
-        self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0
+        self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0, strength: float = 1.0
     ) -> Texture | None:
         """The texture that `holder` has as `key`; None if it has none, or none that is read.
 
@@ -60,11 +65,13 @@ class Textures:
             Whether the picture's colors are encoded by sRGB.
         normal_scale : float
             Of a normal map, by which the normals' x and y are multiplied.
+        strength : float
+            Share of the picture, 0 to 1, that is mixed into white.
 
         Raises
         ------
         InputError
-            If it points at nothing, its picture is missing or broken, or a value is wrong.
+            If it points at nothing, its picture is too large, or a value is wrong.
         """
         if key not in holder:
             return None
@@ -82,11 +89,12 @@ class Textures:
         if sampler.get("magFilter") == _NEAREST:
             self._left_out.add("nearest-neighbor filters of textures, drawn smooth", name)
         wraps = tuple(self._wrap(where, sampler, axis) for axis in ("wrapS", "wrapT"))
-        self._file.item("images", entry["source"])
-        made = (entry["source"], srgb, normal_scale, wraps, transform)
+        made = (entry["source"], srgb, normal_scale, strength, wraps, transform)
+        if (picture := self._picture(entry["source"], name)) is None:
+            return None
         if made not in self._made:
-            pixels = _linear(self._picture(entry["source"], name), srgb=srgb)
-            self._made[made] = _texture(_scaled_normals(pixels, normal_scale), wraps, transform)
+            pixels = _diluted(_scaled_normals(_linear(picture, srgb=srgb), normal_scale), strength)
+            self._made[made] = _texture(pixels, wraps, transform)
         return self._made[made]
 
     def _transform(self, where: str, info: Json) -> TextureTransform:
@@ -105,27 +113,46 @@ class Textures:
             raise refused(self._file, f"{where}: {axis} {code!r} is none of glTF 2.0")
         return _WRAPS[code]
 
-    def _picture(self, index: int, name: str) -> Bytes:
-        """(h, w, 4): a picture as it is encoded, made smaller if it is large; each is read once."""
+    def _picture(self, index: int, name: str) -> Bytes | None:
+        """(h, w, 4): a picture as it is encoded, made smaller if it is large; each is read once. None if unreadable."""
+        entry = self._file.item("images", index)
         if index not in self._pictures:
-            entry = self._file.item("images", index)
-            where = f"image {label(self._file.items('images'), index)} of material {name}"
-            image = self._decoded(where, self._file.resource(entry))
-            if max(image.size) > MAX_SIDE:
-                self._left_out.add(f"pixels of textures beyond {MAX_SIDE} along a side", name)
-                image.thumbnail((MAX_SIDE, MAX_SIDE), Image.Resampling.BOX)
-            self._pictures[index] = np.asarray(image)
+            try:
+                data = self._file.resource(entry)
+            except UnreadableError:
+                if "uri" not in entry:
+                    raise  # the buffer is missing, with all else that it holds
+                self._pictures[index] = None
+            else:
+                self._pictures[index] = self._read(data, index, name)
+        if self._pictures[index] is None:
+            images, uri = self._file.items("images"), entry.get("uri")
+            linked = isinstance(uri, str) and len(uri) <= _LONGEST_NAME and not uri.startswith("data:")
+            picture = repr(uri) if linked else f"image {label(images, index)}"
+            self._left_out.add("textures that are missing or broken", f"{picture} of material {name}")
         return self._pictures[index]
 
-    def _decoded(self, where: str, data: bytes) -> Image.Image:
-        do = "give a PNG or JPEG picture"
-        opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12, do=do)
+    def _read(self, data: bytes, index: int, name: str) -> Bytes | None:
+        where = f"image {label(self._file.items('images'), index)} of material {name}"
+        if (image := self._decoded(where, data)) is None:
+            return None
+        if max(image.size) > MAX_SIDE:
+            self._left_out.add(f"pixels of textures beyond {MAX_SIDE} along a side", name)
+            image.thumbnail((MAX_SIDE, MAX_SIDE), Image.Resampling.BOX)
+        return np.asarray(image)
+
+    def _decoded(self, where: str, data: bytes) -> Image.Image | None:
+        """The picture; None if it is none, or broken."""
+        try:
+            opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12)
+        except UnreadableError:
+            return None
         try:
             if opened.mode.startswith("I"):  # 16 bits of grey, which `convert` would clip
                 return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
             return opened.convert("RGBA")
-        except Exception as error:  # each of Pillow's decoders raises its own kinds
-            raise refused(self._file, f"{where} is broken ({error})", do) from error
+        except Exception:  # noqa: BLE001 - each of Pillow's decoders raises its own kinds; it is told as left out
+            return None
 
 
 def _linear(picture: Bytes, *, srgb: bool) -> Pixels:
@@ -146,6 +173,11 @@ def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     unit = normals / np.where(length > 0, length, 1.0)
     return np.concatenate([0.5 + 0.5 * unit, pixels[..., 3:]], axis=-1).clip(0.0, 1.0).astype(np.float32)
+
+
+def _diluted(pixels: Pixels, strength: float) -> Pixels:
+    """A picture mixed with white."""
+    return pixels if strength == 1.0 else (1.0 + strength * (pixels - 1.0)).astype(np.float32)
 
 
 def _texture(pixels: Pixels, wraps: tuple[str, ...], transform: TextureTransform) -> Texture:

@@ -17,7 +17,7 @@ from translucent.gltf.fields import label, refused
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.lights import LIGHTS, scene_lights
 from translucent.gltf.objects import scene_objects
-from translucent.gltf.surfaces import DIFFUSE_TRANSMISSION, UNLIT
+from translucent.gltf.surfaces import DIFFUSE_TRANSMISSION, LEFT_OUT, UNLIT
 from translucent.materials.gltf import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
 from translucent.materials.gltf_file import GltfFile, read_gltf
 from translucent.materials.gltf_scene import node_transforms
@@ -139,7 +139,7 @@ def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             raise refused(file, f"{key} is {names!r}, not a list of names")
         for name in names:
-            if name in _READ:
+            if name in _READ or name in LEFT_OUT:  # the latter is told of the materials that have it
                 continue
             if key == "extensionsRequired" and not name.startswith(_LOOKS):
                 do = "export it without compression" if name in _COMPRESSIONS else "export it without this extension"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,17 +14,27 @@ from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import label, refused
 from translucent.gltf.geometry import primitive_mesh
 from translucent.gltf.left_out import LeftOut
-from translucent.gltf.surfaces import Finish, finish_reader
+from translucent.gltf.surfaces import VERTEX_COLORED, Finish, finish_reader
 from translucent.materials.gltf_file import GltfFile, Json
 from translucent.materials.gltf_scene import primitives
+from translucent.medium import Medium
 from translucent.mesh import MIN_DIAGONAL, Mesh
 from translucent.scene import Object
-from translucent.surface import Surface
+from translucent.surface import TEXTURE_FIELDS, Surface
 
 Array = npt.NDArray[np.float64]
 
 #: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
 WALL_SHARE = 1e-5
+
+#: What fills a layer that covers a share of what is behind: nothing.
+_CLEAR = Medium()
+
+#: What is told of alphaMode BLEND.
+BLENDED = (
+    "alphaMode BLEND, drawn as thin sheets that cover a share of what is behind, sorted by object as in viewers; they "
+    "cast no shadows, and rays that bend do not meet them"
+)
 
 #: Share of metal in a texture beyond which it is no noise.
 _METAL = 0.1
@@ -52,13 +63,10 @@ def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, l
     objects: list[Object] = []
     finishes: list[Finish] = []
     for mesh, material, node in _placed_meshes(file, transforms, left_out):
-        finish = finish_of(material)
+        finish, surface = _fitted(finish_of(material), mesh, left_out)
         if finish.hidden:
             left_out.add("objects hidden by their alpha", repr(mesh.name))
             continue
-        surface = _fitting(finish.surface, mesh, left_out)
-        if surface is not None and finish.translucent and _has_metal(surface, mesh):
-            left_out.add("metal parts of translucent objects", repr(mesh.name))
         objects.append(Object(mesh, None, scale @ transforms[node], color=finish.color, surface=surface))
         finishes.append(finish)
     if not objects:
@@ -69,7 +77,57 @@ def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, l
     return [_with_medium(item, finish, wall) for item, finish in zip(objects, finishes, strict=True)]
 
 
+def _fitted(finish: Finish, mesh: Mesh, left_out: LeftOut) -> tuple[Finish, Surface | None]:
+    """What a material makes of a mesh, and the surface that the mesh can have of it."""
+    if finish.surface is None and mesh.colors is not None:
+        finish = VERTEX_COLORED
+    if finish.unlit and mesh.colors is not None and (mesh.colors[:, :3] < 1).any():
+        left_out.add("vertex colors of unlit objects", repr(mesh.name))
+    if (surface := _fitting(finish.surface, mesh, left_out)) is None:
+        return finish, None
+    if finish.blends:
+        finish = _blended(finish, surface, mesh, left_out)
+    if finish.medium is not None and not finish.hidden:
+        surface = _without_holes(surface, finish, mesh, left_out)
+    if finish.translucent and _has_metal(surface, mesh):
+        left_out.add("metal parts of translucent objects", repr(mesh.name))
+    return finish, surface
+
+
+def _blended(finish: Finish, surface: Surface, mesh: Mesh, left_out: LeftOut) -> Finish:
+    """A material of alphaMode BLEND on a mesh: opaque where its alpha is 1 all over, and hidden where it is 0."""
+    least = finish.opacity * _alpha(surface, mesh)
+    if finish.translucent:
+        if least < 1:
+            left_out.add("alphaMode BLEND of translucent objects", finish.name)
+        return finish
+    if finish.opacity == 0:
+        return dataclasses.replace(finish, hidden=True)
+    if least == 1:
+        return dataclasses.replace(finish, blends=False)
+    left_out.add(BLENDED, finish.name)
+    return finish
+
+
+def _without_holes(surface: Surface, finish: Finish, mesh: Mesh, left_out: LeftOut) -> Surface:
+    """The surface of a solid, which has no inside where it has a hole."""
+    if surface.alpha_cutoff > _alpha(surface, mesh):
+        what = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside)"
+        left_out.add(what, finish.name)
+    return dataclasses.replace(surface, alpha_cutoff=0.0)
+
+
+def _alpha(surface: Surface, mesh: Mesh) -> float:
+    """The least alpha of texture and vertices."""
+    pixels = None if surface.color_texture is None else surface.color_texture.pixels
+    least = 1.0 if pixels is None or pixels.shape[2] < 4 else float(pixels[..., 3].min())
+    return least * (1.0 if mesh.colors is None else float(mesh.colors[:, 3].min()))
+
+
 def _with_medium(item: Object, finish: Finish, wall: float) -> Object:
+    if item.surface is not None and finish.blends and not finish.translucent:
+        surface = dataclasses.replace(item.surface, opacity=finish.opacity)
+        return dataclasses.replace(item, medium=_CLEAR, sheet_thickness=wall, surface=surface)
     if finish.wall_ior is not None:
         return dataclasses.replace(item, medium=finish.wall_medium(wall), sheet_thickness=wall)
     return dataclasses.replace(item, medium=finish.medium)
@@ -80,14 +138,8 @@ def _fitting(surface: Surface | None, mesh: Mesh, left_out: LeftOut) -> Surface 
     if surface is None or mesh.uv is not None or not any(surface.textures):
         return surface
     left_out.add("textures of meshes without TEXCOORD_0", repr(mesh.name))
-    return dataclasses.replace(
-        surface,
-        color_texture=None,
-        roughness_texture=None,
-        transmission_texture=None,
-        normal_texture=None,
-        emissive_texture=None,
-    )
+    without: dict[str, Any] = dict.fromkeys(TEXTURE_FIELDS)
+    return dataclasses.replace(surface, **without)
 
 
 def _has_metal(surface: Surface, mesh: Mesh) -> bool:
@@ -136,7 +188,5 @@ def _note_losses(primitive: Json, name: str, mesh: Mesh | None, left_out: LeftOu
     if mesh is None:
         left_out.add("points and lines", repr(name))
         return
-    if "COLOR_0" in primitive["attributes"]:
-        left_out.add("vertex colors", repr(name))
     if primitive.get("targets"):
         left_out.add("morph targets", repr(name))

@@ -15,11 +15,20 @@ everything else                                    opaque: metal, or a coat over
                                                    and may let light of the other side through. A volume alone, or
                                                    with transmissionFactor 0, lets no light in
 KHR_materials_unlit                                opaque: has its base color everywhere, and mirrors nothing
+alphaMode BLEND, with an alpha below 1 somewhere   layer: a sheet that shows what the opaque object would, with alpha as
+                                                   its share, over what is behind it with the rest (the specification's
+                                                   ``over``), whatever the angle. Layers are painted object by object,
+                                                   far ones first, as viewers do. What lies behind a body is dimmed by
+                                                   all that its ray crosses, and seen straight, not bent
 =================================================  ==================================================================
 
 The tint of a wall is that of a straight view. A slanted view has it deeper, as in a pane with the wall's ior: at most
 by the 1.34th power with the ior of 1.5 that materials have by default. A wall that transmits only a share of the light
 has its tint whatever the view, like its paint.
+
+alphaMode MASK makes holes in opaque objects and walls; a body with holes would have no inside, and is drawn closed.
+Colors of vertices multiply the base color, and a mesh with them and without a material is matt. Emission adds its
+radiance where a ray first enters a body, and occlusion dims the light of the environment.
 
 Of all that, textures are read as far as `translucent.gltf.images` does; normals are those of the mesh, smooth but at
 creases, and not the file's. What of a material has no meaning here is told by `LeftOut`.
@@ -53,6 +62,9 @@ Array = npt.NDArray[np.float64]
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 UNLIT = "KHR_materials_unlit"
 
+#: Extensions of materials that are not drawn, and what messages call them.
+LEFT_OUT = {"KHR_materials_clearcoat": "clear coats", "KHR_materials_iridescence": "iridescence"}
+
 
 @dataclass(frozen=True, eq=False)
 class Finish:
@@ -70,6 +82,14 @@ class Finish:
         What its border does to light; None for an object without a material.
     hidden : bool
         Whether its alpha makes it one hole.
+    blends : bool
+        Whether alpha is a share that is painted over what is behind.
+    opacity : float
+        That of baseColorFactor.
+    unlit : bool
+        Whether nothing lights it.
+    name : str
+        Of the material, as messages call it.
     """
 
     color: npt.ArrayLike = OPAQUE_COLOR
@@ -77,6 +97,10 @@ class Finish:
     wall_ior: float | None = None
     surface: Surface | None = None
     hidden: bool = False
+    blends: bool = False
+    opacity: float = 1.0
+    unlit: bool = False
+    name: str = "none"
 
     @property
     def translucent(self) -> bool:
@@ -88,6 +112,10 @@ class Finish:
         tints = self.surface is None or (np.asarray(self.surface.color) == 1).all()
         color = self.color if tints else np.ones(3)
         return Medium(absorption=extinction_at(color, thickness), ior=self.wall_ior or DEFAULT_IOR)
+
+
+#: What a mesh is that has colors at its vertices and no material: matt.
+VERTEX_COLORED = Finish((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, ior=1.0))
 
 
 def finish_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[[int | None], Finish]:
@@ -128,12 +156,22 @@ class _Reader:
 
     def finish(self, metres: float) -> Finish:
         """What its objects are; `metres` are per unit of the file."""
+        found = self._finish(metres)
+        opacity, mode = float(self.base_color[3]), self._alpha_mode()
+        for name, what in LEFT_OUT.items():
+            if name in section(self.file, self.where, self.entry, "extensions"):
+                self.left_out.add(what, self.name)
+        return dataclasses.replace(
+            found, hidden=self._hidden(), blends=mode == "BLEND", opacity=opacity, name=self.name
+        )
+
+    def _finish(self, metres: float) -> Finish:
+        """What its objects are, but for what alpha makes of them."""
         color, diffuse = self.base_color[:3], self._extension(DIFFUSE_TRANSMISSION)
         passes = share(self.file, self.where, diffuse, "diffuseTransmissionFactor", 0.0) > 0
         medium, transmission = self.material.medium(), self.material.transmission
         if UNLIT in section(self.file, self.where, self.entry, "extensions"):
-            return Finish(color, surface=self._unlit(), hidden=self._hidden())
-        self._note("occlusionTexture", "occlusion textures")
+            return Finish(color, surface=self._unlit(), unlit=True)
         if medium is not None and (transmission > 0 or passes):
             medium = Medium(absorption=medium.extinction / metres, ior=medium.ior)
             return Finish(color, medium, surface=self._translucent(color))
@@ -141,27 +179,28 @@ class _Reader:
             whole = transmission == 1 and "transmissionTexture" not in self._extension(TRANSMISSION)
             surface = self._translucent(np.ones(3) if whole else color)
             return Finish(color, wall_ior=self.material.ior or DEFAULT_IOR, surface=surface)
-        return Finish(color, surface=self._opaque(), hidden=self._hidden())
+        return Finish(color, surface=self._opaque())
 
     def _opaque(self) -> Surface:
         return dataclasses.replace(
             self._with_sides(self._common()),
             color=self.base_color[:3],
             ior=self.material.ior or DEFAULT_IOR,
-            emissive=self.material.emissive,
-            emissive_texture=self.textures.read(self.name, self.entry, "emissiveTexture", srgb=True),
         )
 
     def _unlit(self) -> Surface:
         texture, color = self._color_texture(), self.base_color[:3]
-        black = Surface(color=(0, 0, 0), ior=1.0, emissive=color, emissive_texture=texture, color_texture=texture)
+        black = Surface(
+            color=(0, 0, 0),
+            ior=1.0,
+            emissive=color,
+            emissive_texture=texture,
+            color_texture=texture,
+            alpha_cutoff=self._cutoff(),
+        )
         return self._with_sides(black)
 
     def _translucent(self, color: Array) -> Surface:
-        if (mode := self.entry.get("alphaMode", "OPAQUE")) != "OPAQUE":
-            self.left_out.add(f"transparency by alphaMode {mode}", self.name)
-        if any(self.material.emissive):
-            self.left_out.add("glowing surfaces of translucent objects", self.name)
         if (dispersion := self.material.dispersion) > MAX_DISPERSION:
             self.left_out.add(f"dispersion above {MAX_DISPERSION:g}", self.name)
         return dataclasses.replace(
@@ -184,6 +223,10 @@ class _Reader:
             metallic=share(file, where, self.base, "metallicFactor", 1.0),
             diffuse_transmission=share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
             diffuse_transmission_color=shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
+            alpha_cutoff=self._cutoff(),
+            emissive=self.material.emissive,
+            emissive_texture=self.textures.read(self.name, self.entry, "emissiveTexture", srgb=True),
+            occlusion_texture=self._occlusion(),
             color_texture=self._color_texture(),
             roughness_texture=self.textures.read(self.name, self.base, "metallicRoughnessTexture"),
             normal_texture=self.textures.read(self.name, self.entry, "normalTexture", normal_scale=steep),
@@ -193,21 +236,28 @@ class _Reader:
         return self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
 
     def _with_sides(self, surface: Surface) -> Surface:
-        """The surface of an opaque object with what is seen of it: both sides, and where its alpha makes no holes."""
+        """The surface of an opaque object with the sides from which it is seen."""
         double_sided = self.entry.get("doubleSided", False)
         if not isinstance(double_sided, bool):
             raise refused(self.file, f"{self.where}: doubleSided is {double_sided!r}, not true or false")
-        mode, opacity, cutoff = self.entry.get("alphaMode", "OPAQUE"), self.base_color[3], 0.0
-        if mode == "MASK":
-            cutoff = min(self._alpha_cutoff() / max(opacity, 1e-9), 1.0)
-        elif mode == "BLEND":
-            cutoff = 0.5
-            self.left_out.add(
-                "blending by alphaMode BLEND, drawn as holes where a texture's opacity is below 0.5", self.name
-            )
-        elif mode != "OPAQUE":
+        return dataclasses.replace(surface, double_sided=double_sided)
+
+    def _occlusion(self) -> Texture | None:
+        info = section(self.file, self.where, self.entry, "occlusionTexture")
+        strength = share(self.file, self.where, info, "strength", 1.0)
+        return self.textures.read(self.name, self.entry, "occlusionTexture", strength=strength)
+
+    def _alpha_mode(self) -> str:
+        mode = self.entry.get("alphaMode", "OPAQUE")
+        if mode not in ("OPAQUE", "MASK", "BLEND"):
             raise refused(self.file, f"{self.where}: alphaMode {mode!r} is none of glTF 2.0")
-        return dataclasses.replace(surface, double_sided=double_sided, alpha_cutoff=cutoff)
+        return str(mode)
+
+    def _cutoff(self) -> float:
+        """What alpha of texture and vertices a hole is below: the rest of alpha is a factor."""
+        if self._alpha_mode() != "MASK":
+            return 0.0
+        return min(self._alpha_cutoff() / max(float(self.base_color[3]), 1e-9), 1.0)
 
     def _alpha_cutoff(self) -> float:
         cutoff = number(self.file, self.where, self.entry, "alphaCutoff", 0.5)
@@ -221,7 +271,3 @@ class _Reader:
 
     def _extension(self, name: str) -> Json:
         return extension(self.file, self.where, self.entry, name)
-
-    def _note(self, key: str, what: str) -> None:
-        if key in self.entry:
-            self.left_out.add(what, self.name)

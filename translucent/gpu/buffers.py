@@ -6,6 +6,7 @@ from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
+import numpy.typing as npt
 
 from translucent.corner_normals import drawn_normals
 from translucent.gpu.ledger import before_making
@@ -25,6 +26,7 @@ class MeshBuffers:
         self.indices = gl.buffer(mesh.faces)
         self._flat: moderngl.Buffer | None = None
         self._border: moderngl.Buffer | None = None
+        self._looks: dict[str, moderngl.Buffer] = {}
         self._arrays: dict[int, moderngl.VertexArray] = {}
 
     def vertex_array(self, program: moderngl.Program, mesh: Mesh) -> moderngl.VertexArray:
@@ -33,16 +35,35 @@ class MeshBuffers:
         Shared vertices; or where it asks for ``normal``, flat faces; or for ``corner_normal``, faces that look smooth.
         """
         if (array := self._arrays.get(program.glo)) is None:
-            if "corner_normal" in program:
-                names = ("offset", "corner_normal", "uv")
-                array = self._gl.vertex_array(program, [(self._smooth_faces(mesh), "3f 3f 2f", *names)])
+            if "corner_normal" in program or ("uv" in program and "normal" not in program):
+                # What only glows has no use for normals.
+                lit = "corner_normal" in program
+                layout = ("3f 3f 2f", "offset", "corner_normal", "uv") if lit else ("3f 12x 2f", "offset", "uv")
+                content = [(self._smooth_faces(mesh), *layout), *self._corner_looks(program, mesh)]
+                array = self._gl.vertex_array(program, content)
             elif "normal" in program:
-                array = self._gl.vertex_array(program, [(self._flat_faces(mesh), "3f 3f", "offset", "normal")])
+                content = [(self._flat_faces(mesh), "3f 3f", "offset", "normal")]
+                if "uv" in program:
+                    content.append((self._of_corners("uv", mesh.uv, mesh), "2f", "uv"))
+                array = self._gl.vertex_array(program, [*content, *self._corner_looks(program, mesh)])
             else:
                 content = [(self.offsets, "3f", "offset")]
                 array = self._gl.vertex_array(program, content, self.indices, index_element_size=4)
             self._arrays[program.glo] = array
         return array
+
+    def _corner_looks(self, program: moderngl.Program, mesh: Mesh) -> list[tuple[moderngl.Buffer, str, str]]:
+        """Colors of the vertices, for a program that asks for them."""
+        if "corner_color" not in program:
+            return []
+        return [(self._of_corners("colors", mesh.colors, mesh), "4f", "corner_color")]
+
+    def _of_corners(self, name: str, values: npt.NDArray[np.float64] | None, mesh: Mesh) -> moderngl.Buffer:
+        """What the vertices have, for each corner of each face; zeros if they have none."""
+        if name not in self._looks:
+            content = np.zeros((*mesh.faces.shape, 2)) if values is None else values[mesh.faces]
+            self._looks[name] = self._gl.buffer(content.astype(np.float32))
+        return self._looks[name]
 
     def _flat_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Each face with vertices of its own, which carry its normal."""
@@ -69,6 +90,8 @@ class MeshBuffers:
         for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat, self._border):
             if resource is not None:
                 resource.release()
+        for buffer in self._looks.values():
+            buffer.release()
         self._arrays.clear()
 
 

@@ -93,7 +93,7 @@ class FrameJob:
                 shade_uniforms(scene, self._expected_counts(), self._rounding(), _COVERAGE_FLOOR * scene.diagonal)
             ),
             MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self.media_range)),
-            LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque or self.has_surfaces)),
+            LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque or self.has_surfaces or self.has_layers)),
             ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
         }
         if self.has_surfaces:
@@ -140,6 +140,11 @@ class FrameJob:
     def has_surfaces(self) -> bool:
         """Whether light changes at the border of a body."""
         return any(step.name == "surfaces" for step in self.plan.passes)
+
+    @property
+    def has_layers(self) -> bool:
+        """Whether layers are painted over the picture, or borders glow: a sample is summed up after that."""
+        return any(step.name == "layers" for step in self.plan.passes)
 
     @property
     def one_border(self) -> bool:

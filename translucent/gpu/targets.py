@@ -22,6 +22,7 @@ class Targets:
         self._gl = gl
         self.size = size
         self._framebuffers: dict[str, moderngl.Framebuffer] = {}
+        self._views: dict[tuple[str, int], moderngl.Framebuffer] = {}
         self.buffers = Storage(gl, f"frame size {size[0]}x{size[1]}")
 
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:
@@ -75,6 +76,21 @@ class Targets:
     def average(self) -> moderngl.Framebuffer:
         """RGBA32F radiance and transmittance, summed over the samples of a pixel."""
         return self._get("average", (4, 4))
+
+    def layers(self) -> moderngl.Framebuffer:
+        """RGBA32F layers in front of all bodies, and those behind the first one on a ray."""
+        return self._get("layers", (4, 4))
+
+    def fronts(self) -> moderngl.Framebuffer:
+        """R32F place where a ray first meets a body, with a depth buffer."""
+        return self._get("fronts", (1,), with_depth=True)
+
+    def view(self, name: str, attachment: int) -> moderngl.Framebuffer:
+        """One attachment of the framebuffer of this name alone, to draw into."""
+        if (name, attachment) not in self._views:
+            texture = self._framebuffers[name].color_attachments[attachment]
+            self._views[name, attachment] = self._gl.framebuffer([texture])
+        return self._views[name, attachment]
 
     def depth_only(self) -> moderngl.Framebuffer:
         """A depth buffer and nothing else."""
@@ -133,6 +149,9 @@ class Targets:
 
     def release(self) -> None:
         """Free all textures and framebuffers."""
+        for view in self._views.values():
+            view.release()
+        self._views.clear()
         for framebuffer in self._framebuffers.values():
             for attachment in framebuffer.color_attachments:
                 attachment.release()

@@ -11,11 +11,8 @@ from translucent.brdf_table import brdf_table
 from translucent.errors import RenderError
 from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import set_uniform
-from translucent.surface import Surface
+from translucent.surface import TEXTURE_FIELDS, Surface
 from translucent.texture import Texture
-
-#: Fields of `Surface`, in the order of ``shaders/shade/surface_textures.glsl``.
-TEXTURE_FIELDS = ("color_texture", "roughness_texture", "transmission_texture", "normal_texture", "emissive_texture")
 
 #: In place of a texture: all values as they are, and a normal straight out.
 _WHITE = Texture(np.ones((1, 1, 3), dtype=np.float32))
@@ -23,7 +20,7 @@ _STRAIGHT = Texture(np.full((1, 1, 3), (0.5, 0.5, 1.0), dtype=np.float32))
 
 
 def texture_units(first: int) -> dict[str, int]:
-    """Units of a surface's textures by the names of their samplers."""
+    """Units of a surface's textures by the names of their samplers, as in ``shaders/shade/surface_textures.glsl``."""
     return {name: unit for unit, name in enumerate(TEXTURE_FIELDS, first)}
 
 
@@ -55,6 +52,12 @@ class TextureCache:
             rows += [tuple(row) for row in texture.rows]
         # Compilers cut an array off behind the last element that a program uses.
         set_uniform(program, "texture_rows", rows[: program["texture_rows"].array_length])
+
+    def bind_holes(self, surface: Surface, program: moderngl.Program, unit: int) -> None:
+        """Give what tells where a sheet has holes to a program that includes ``thickness/holes.glsl``."""
+        texture = surface.color_texture or _WHITE
+        self[texture].use(unit)
+        set_uniform(program, "color_rows", [tuple(row) for row in texture.rows])
 
     def __getitem__(self, texture: Texture) -> moderngl.Texture:
         if (found := self._textures.get(texture)) is None:

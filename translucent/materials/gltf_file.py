@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
-from translucent.errors import InputError, TranslucentWarning
+from translucent.errors import InputError, TranslucentWarning, UnreadableError
 from translucent.materials.gltf_pack import embed_images, gather, is_link
 from translucent.paths import require_place, write_atomically
 from translucent.reading import json_value, linked_file, read_bytes
 
 Json = dict[str, Any]
+
 
 _MAGIC, _VERSION = b"glTF", 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -103,12 +104,13 @@ class GltfFile:
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             except (ValueError, binascii.Error) as error:
-                raise InputError(asked, f"{uri[:57]!r}... cannot be read ({error})", "export the file again") from error
+                found = f"{uri[:57]!r}... cannot be read ({error})"
+                raise UnreadableError(asked, found, "export the file again") from error
         path = linked_file(self.path.parent, uri, asked, self.allow_outside)
         try:
             return read_bytes(path, "")
         except InputError as error:
-            raise InputError(asked, f"{uri!r} cannot be read ({error})", "keep its files together") from None
+            raise UnreadableError(asked, f"{uri!r} cannot be read ({error})", "keep its files together") from None
 
 
 def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:

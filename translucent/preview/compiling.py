@@ -232,7 +232,9 @@ def _boxes(mesh: Mesh) -> Mesh:
     shares = np.linspace(1.0, 0.5, BOXES)
     vertices = (mesh.center + shares[:, None, None] * size * box.vertices).reshape(-1, 3)
     faces = (box.faces + len(box.vertices) * np.arange(BOXES)[:, None, None]).reshape(-1, 3)
-    return Mesh(vertices, faces, None if mesh.uv is None else np.zeros((len(vertices), 2)), mesh.name)
+    uv = None if mesh.uv is None else np.zeros((len(vertices), 2))
+    colors = None if mesh.colors is None else np.ones((len(vertices), 4))
+    return Mesh(vertices, faces, uv, mesh.name, colors=colors)
 
 
 def _surface_like(surface: Surface) -> Surface:

@@ -158,7 +158,10 @@ def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Sce
     With `levels` given it is that of straight rays, for differences of thickness.
     """
     bent = any(item.has_interface for item in scene.objects) and levels is None
-    textured = any(item.surface is not None and any(item.surface.textures) for item in scene.objects)
+    textured = any(
+        item.mesh.colors is not None or (item.surface is not None and any(item.surface.textures))
+        for item in scene.objects
+    )
     if not bent or textured:
         return straight(scene), levels or LEVELS
     return scene, BENT_LEVELS

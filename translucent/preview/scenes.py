@@ -19,7 +19,7 @@ from translucent.medium import Medium
 from translucent.preview.document import AUTO, Document, Look, Material, Model
 from translucent.preview.orbiting import camera_of
 from translucent.scene import Object, Scene
-from translucent.showcase import DEFAULT_COLOR, DEFAULT_REACH, named_environment
+from translucent.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable, named_environment
 from translucent.surface import Surface
 from translucent.thickness import Method, ThinLayer, method_from_name
 
@@ -67,9 +67,9 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
 def material_of(scene: Scene) -> Material:
     """The material of the first body; of an opaque model, what it would be filled with."""
     diagonal = scene.diagonal or 1.0
-    if not scene.bodies:
+    body = fillable(scene)[0]
+    if body.medium is None or body.covers:
         return Material(color=DEFAULT_COLOR, distance=DEFAULT_REACH * diagonal, thickness=0.1 * diagonal)
-    body = scene.bodies[0]
     medium, surface = body.medium or Medium(), body.surface or Surface()
     reach = DEFAULT_REACH * diagonal
     # Where the showcase states it; if that is too dark or too bright to tell, where 1/e is left.
@@ -127,10 +127,8 @@ def _objects(material: Material, scene: Scene) -> tuple[Object, ...]:
     """The scene's objects with the material in its bodies; kept, so that turning the camera makes none anew."""
     if material.source == "file" and scene.bodies:
         return tuple(scene.objects)
-    medium, everything = medium_of(material), not scene.bodies
-    return tuple(
-        _filled(item, material, medium) if everything or item.medium is not None else item for item in scene.objects
-    )
+    medium, chosen = medium_of(material), set(map(id, fillable(scene)))
+    return tuple(_filled(item, material, medium) if id(item) in chosen else item for item in scene.objects)
 
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:
@@ -140,6 +138,7 @@ def _filled(item: Object, material: Material, medium: Medium) -> Object:
         transmission=material.transmission,
         dispersion=material.dispersion,
         multiple_scattering=material.multiple_scattering,
+        opacity=None,
     )
     return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
 

@@ -27,6 +27,7 @@ from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Lane, Task, problem
 from translucent.scene import Scene
+from translucent.showcase import fillable
 from translucent.thickness import Method
 
 #: Lines that the window keeps.
@@ -252,7 +253,7 @@ class Workspace:
         """Bake a map of the first body, and show it."""
         if self.loaded is None:
             return
-        body = (self.loaded.scene.bodies or tuple(self.loaded.scene.objects))[0]
+        body = fillable(self.loaded.scene)[0]
         medium = medium_of(self.document.material)
 
         def show(bake: Bake) -> None:

@@ -100,6 +100,11 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
     if paths < 2:
         raise InputError(f"{paths} paths through rough borders", "no spread without two", "use for example 64")
     for body in scene.bodies:
+        if body.covers or not body.has_interface:
+            continue
         if body.surface is not None and any(texture is not None for texture in body.surface.textures):
             what = f"reference of {body.mesh.name!r}"
             raise InputError(what, "its surface has textures", "give it a surface without, or use refraction=False")
+        if body.mesh.colors is not None:
+            what = f"reference of {body.mesh.name!r}"
+            raise InputError(what, "its vertices have colors", "give it a mesh without, or use refraction=False")

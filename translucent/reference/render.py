@@ -61,7 +61,8 @@ def render(
 
     Where light changes at the borders of bodies (`Object.has_interface`), radiance is that of rays that bend and split
     there; see `translucent.reference.bent`. All else is that of the straight rays, also then. Lights reach media
-    straight on. Of `Surface`, multiple scattering is left to `path_trace`.
+    straight on. Of `Surface`, multiple scattering is left to `path_trace`, and bodies do not glow. Layers
+    (`Surface.opacity`) have their place in the order, and what they show is matt.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def shade_hits(
         Of the scene's camera: all of a picture, or any of them.
     hits : sequence of Hits
         Of each of `Scene.objects`, as `line_hits` gives them: the surfaces behind the origins, too, and sorted.
-        `Hits.pixel` is a number among `rays`; `Hits.barycentric` is not read.
+        `Hits.pixel` is a number among `rays`.
     sheets : sequence of float or None
         Thickness in metres of the sheet that each object is, or None for a solid: see `sheet_thicknesses`.
 
@@ -243,7 +244,7 @@ def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
     counts = np.zeros(width * height, dtype=np.int64)
     for body, line in zip(scene.objects, hits, strict=True):
         if body.medium is not None:
-            crossed = line.before(end) if body.sheet_thickness is None else sheet_hits(scene, line, end)
+            crossed = line.before(end) if body.sheet_thickness is None else sheet_hits(scene, body, line, end)
             counts += np.bincount(crossed.pixel, minlength=len(counts))
     return counts.reshape(height, width)
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from translucent import optics
 from translucent.reference.hits import Hits, world_normals
+from translucent.reference.layers import layer_depth, layer_radiance, without_holes
 from translucent.reference.rays import Rays
 from translucent.scene import Object, Scene
 from translucent.thickness import Method, ThinLayer
@@ -35,12 +36,18 @@ class Crossings:
         Metres inside the sheet.
     body : (k,) int64
         Index into `Scene.objects`.
+    covered : (k,) float64
+        Optical depth of a layer there, besides that of a medium.
+    shown : (k, 3) float64
+        Radiance that the layer shows.
     """
 
     pixel: Integers
     distance: Array
     path: Array
     body: Integers
+    covered: Array
+    shown: Array
 
 
 def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float | None, ...]:
@@ -55,9 +62,10 @@ def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float
     )
 
 
-def sheet_hits(scene: Scene, hits: Hits, end: Array) -> Hits:
+def sheet_hits(scene: Scene, body: Object, hits: Hits, end: Array) -> Hits:
     """The surfaces of a sheet that rays cross before they stop at `end` (pixels,), or at most on what stops them."""
-    return hits.where((hits.distance >= 0) & (hits.distance <= end[hits.pixel] + SHEET_ON_OPAQUE * scene.diagonal))
+    last = end[hits.pixel] + SHEET_ON_OPAQUE * scene.diagonal
+    return without_holes(body, hits.where((hits.distance >= 0) & (hits.distance <= last)))
 
 
 def scene_crossings(
@@ -76,12 +84,15 @@ def scene_crossings(
     end : (n,) float64
         Where an opaque surface stops each ray, in metres; inf where none does.
     """
-    parts = [(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64))]
+    none: tuple[npt.NDArray[np.generic], ...]
+    none = (np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64), np.empty(0), np.empty((0, 3)))
+    parts = [none]
     for i, (body, metres) in enumerate(zip(scene.objects, sheets, strict=True)):
         if metres is not None:
-            seen = sheet_hits(scene, hits[i], end)
+            seen = sheet_hits(scene, body, hits[i], end)
             path = _paths(body, metres, seen, rays.directions[seen.pixel])
-            parts.append((seen.pixel, seen.distance, path, np.full(len(path), i)))
+            layer = layer_depth(body, seen), layer_radiance(scene, body, seen, rays)
+            parts.append((seen.pixel, seen.distance, path, np.full(len(path), i), *layer))
     return Crossings(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 

@@ -151,19 +151,37 @@ def volume_segments(
     ends = (places(rays, segments.pixel, t) for t in (segments.t_enter, segments.t_exit))
     weights = volume.between(filling, *ends)
     extinction, emission = weights @ volume.extinction, weights @ volume.emission
+    if (crossings.covered > 0).any():
+        _add_layers(extinction, emission, filling, intervals, crossings)
     return replace(segments, extinction=extinction, emission=emission), filling
+
+
+def _add_layers(extinction: Array, emission: Array, filling: Array, intervals: Intervals, crossings: Crossings) -> None:
+    """Add to coefficients (k, 3) those of the layers among the crossings."""
+    pieces = len(filling) - len(crossings.body)
+    source = _order(intervals, crossings) - pieces
+    row = np.flatnonzero(source >= 0)
+    covered = crossings.covered[source[row]] / crossings.path[source[row]]
+    extinction[row] += covered[:, None]
+    emission[row] += covered[:, None] * crossings.shown[source[row]]
+
+
+def _order(intervals: Intervals, crossings: Crossings) -> Integers:
+    """Where each segment that `scene_segments` makes comes from: the pieces of solids, and then the crossings."""
+    pixel, t_enter, t_exit, _, _ = _pieces(intervals, crossings)
+    at = crossings.distance
+    columns = [np.concatenate(pair) for pair in ((t_exit, at), (t_enter, at), (pixel, crossings.pixel))]
+    return np.lexsort(columns)
 
 
 def _filling(scene: Scene, intervals: Intervals, crossings: Crossings) -> Array:
     """(k, n): what fills each segment that `scene_segments` makes of the same arguments."""
-    pixel, t_enter, t_exit, bodies, windings = _pieces(intervals, crossings)
+    pixel, _, _, bodies, windings = _pieces(intervals, crossings)
     solid = np.zeros((len(pixel), len(scene.objects)))
     solid[:, bodies] = _weights(scene, bodies, windings).T
     sheet = np.zeros((len(crossings.body), len(scene.objects)))
     sheet[np.arange(len(sheet)), crossings.body] = 1.0
-    at = crossings.distance
-    columns = [np.concatenate(pair) for pair in ((t_exit, at), (t_enter, at), (pixel, crossings.pixel))]
-    return np.concatenate([solid, sheet])[np.lexsort(columns)]
+    return np.concatenate([solid, sheet])[_order(intervals, crossings)]
 
 
 def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> Array:

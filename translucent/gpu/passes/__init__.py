@@ -13,6 +13,7 @@ from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.interfaces import InterfacesPass
 from translucent.gpu.passes.k_buffer import KBufferPass
+from translucent.gpu.passes.layers import LayersPass
 from translucent.gpu.passes.light_views import LightViewsPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
@@ -46,4 +47,5 @@ PASSES: dict[str, type[Pass]] = {
     "transmittance": TransmittancePass,
     "interfaces": InterfacesPass,
     "surfaces": SurfacesPass,
+    "layers": LayersPass,
 }

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.variants import Variants
+from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import CONSTANTS, set_uniform
 from translucent.gpu.textures import texture_units
 from translucent.plan_borders import picture_cuts
@@ -45,17 +45,22 @@ class InterfacesPass:
                 job.targets.entered().color_attachments[0].use(_UNITS["entered"])
             if exits:
                 job.targets.ordered().color_attachments[2].use(_UNITS["ordered_layers"])
-            program = self._variants.program(BACK=back, BEYOND=beyond, EXITS=exits, OPAQUE=job.has_opaque)
-            self._draw(job, program, solids)
+            switches = {"BACK": back, "BEYOND": beyond, "EXITS": exits, "OPAQUE": job.has_opaque}
+            self._draw(job, switches, solids)
             if not back:
                 job.gl.enable_only(moderngl.DEPTH_TEST)
-                self._draw(job, program, sheets)
+                self._draw(job, switches, sheets)
         job.gl.cull_face = "back"
         job.gl.depth_func = "<"
 
-    def _draw(self, job: FrameJob, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+    def _draw(self, job: FrameJob, switches: dict[str, bool], objects: tuple[int, ...]) -> None:
         for i in objects:
-            self._set_finish(job, program, job.scene.objects[i])
+            body = job.scene.objects[i]
+            holes = not switches["BACK"] and body.has_holes
+            program = self._variants.program(**switches, **look_switches(body), HOLES=holes)
+            self._set_finish(job, program, body)
+            if holes and body.surface is not None:
+                set_uniform(program, "hole_below", body.surface.alpha_cutoff)
             job.draw(program, (i,))
 
     def _set_finish(self, job: FrameJob, program: moderngl.Program, body: Object) -> None:

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.variants import Variants
+from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import CONSTANTS, set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.render_plan import PassSpec
@@ -14,16 +14,17 @@ from translucent.surface import Surface
 
 _MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table")
 _FIRST_TEXTURE = len(_MAPS)
-_UNITS = {name: unit for unit, name in enumerate(_MAPS)} | texture_units(_FIRST_TEXTURE)
+#: Texture units of ``shaders/shade/opaque_surface.glsl``.
+FINISH_UNITS = {name: unit for unit, name in enumerate(_MAPS)} | texture_units(_FIRST_TEXTURE)
 
 
 class OpaquePass:
     """Draws the nearest opaque surface of each pixel; see ``shaders/shade/opaque.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", **_UNITS)
-        self._finished = Variants(gl, "geometry/border.vert", "shade/opaque.frag", **_UNITS)
-        self._reflectance: moderngl.Texture | None = None
+        self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", **FINISH_UNITS)
+        self._finished = Variants(gl, "geometry/border.vert", "shade/opaque.frag", **FINISH_UNITS)
+        self._maps = FinishMaps(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
@@ -36,34 +37,48 @@ class OpaquePass:
         environment = job.scene.environment
         light_map = environment.kind == "image"
         if light_map:
-            job.resources.environments.light(environment).irradiance.use(_UNITS["light_irradiance"])
+            job.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
         for i in spec.objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
-                program = self._plain.program(WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, LIGHT_MAP=light_map)
+                program = self._plain.program(
+                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, LIGHT_MAP=light_map, VERTEX_COLORS=0, OCCLUSION=0
+                )
             else:
-                program = self._finished.program(SURFACE=1, LIGHT_MAP=light_map)
-                self._bind_maps(job)
-                self._set_finish(job, program, surface)
+                looks = look_switches(job.scene.objects[i])
+                program = self._finished.program(SURFACE=1, LIGHT_MAP=light_map, **looks)
+                self._maps.bind(job)
+                self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
             job.draw(program, (i,))
         job.gl.depth_func = "<"
 
-    def _bind_maps(self, job: FrameJob) -> None:
+
+class FinishMaps:
+    """What ``shaders/shade/opaque_surface.glsl`` reads: maps of the environment, and how an object is finished."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._reflectance: moderngl.Texture | None = None
+
+    def bind(self, job: FrameJob) -> None:
+        """Give the environment's maps to the texture units of `FINISH_UNITS`."""
         if self._reflectance is None:
-            self._reflectance = reflectance_table(job.gl)
+            self._reflectance = reflectance_table(self._gl)
         environment = job.scene.environment
         maps = job.resources.environments.light(environment)
         textures = maps.irradiance, job.resources.environments.sharp(environment), maps.levels, self._reflectance
         for unit, texture in enumerate(textures):
             texture.use(unit)
 
-    def _set_finish(self, job: FrameJob, program: moderngl.Program, surface: Surface) -> None:
+    def set_finish(self, job: FrameJob, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
+        """Tell a program the surface of an object; there is a hole where alpha is less than `hole_below`."""
         job.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
-        finish = surface.metallic, surface.roughness, surface.ior, surface.alpha_cutoff
+        finish = surface.metallic, surface.roughness, surface.ior, hole_below
         set_uniform(program, "opaque_finish", finish)
-        set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
-        set_uniform(program, "opaque_passed_share", surface.diffuse_transmission)
         set_uniform(program, "opaque_emissive", tuple(np.asarray(surface.emissive)))
+        if "opaque_passed_share" in program:  # not where an object only glows
+            set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
+            set_uniform(program, "opaque_passed_share", surface.diffuse_transmission)
 
 
 def _clear(framebuffer: moderngl.Framebuffer) -> None:

@@ -42,8 +42,9 @@ class SurfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl, environment = job.gl, job.scene.environment
-        (job.targets.average() if job.averaging else job.targets.surfaced()).use()
-        gl.enable_only(moderngl.BLEND if job.averaging else moderngl.NOTHING)
+        sums = job.averaging and not job.has_layers
+        (job.targets.average() if sums else job.targets.surfaced()).use()
+        gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
         seen_map = environment.seen.kind == "image"

@@ -6,7 +6,9 @@ import moderngl
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import set_uniform
 from translucent.render_plan import PassSpec
+from translucent.surface import LEAST_COVER
 
 
 class ThinLayerPass:
@@ -16,11 +18,23 @@ class ThinLayerPass:
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/body.vert", "thickness/thin_layer.frag", opaque_place=0)
+        units = {"opaque_place": 0, "color_texture": 1}
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/thin_layer.frag", **units)
+        self._with_holes = Variants(gl, "geometry/holes.vert", "thickness/thin_layer.frag", **units)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the sheets."""
         job.begin_adding(spec.target)
         job.bind_opaque(0)
         switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.has_opaque}
-        job.draw(self._variants.program(WITH_NORMAL=1, WITH_POSITION=0, **switches), spec.objects)
+        holed = tuple(i for i in spec.objects if job.scene.objects[i].has_holes)
+        if whole := tuple(i for i in spec.objects if i not in holed):
+            program = self._variants.program(WITH_NORMAL=1, WITH_POSITION=0, HOLES=0, VERTEX_COLORS=0, **switches)
+            job.draw(program, whole)
+        for i in holed:
+            body = job.scene.objects[i]
+            assert body.surface is not None
+            program = self._with_holes.program(HOLES=1, VERTEX_COLORS=body.mesh.colors is not None, **switches)
+            job.resources.textures.bind_holes(body.surface, program, 1)
+            set_uniform(program, "hole_below", body.surface.alpha_cutoff or LEAST_COVER)
+            job.draw(program, (i,))

@@ -44,7 +44,8 @@ class TransmittancePass:
         seen_map = seen.kind == "image" and not job.has_surfaces
         if seen_map:
             job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
-        if job.averaging and not job.has_surfaces:
+        sums = job.averaging and not job.has_surfaces and not job.has_layers
+        if sums:
             job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
             gl.blend_equation = moderngl.FUNC_ADD
@@ -59,7 +60,7 @@ class TransmittancePass:
         program = self._variants.program(
             SPECTRAL=plan.spectral,
             FALLBACK=fallback,
-            AVERAGE=job.averaging and not job.has_surfaces,
+            AVERAGE=sums,
             SURFACES=job.has_surfaces,
             SEEN_MAP=seen_map,
             EMISSION=job.emits and not plan.ordered,

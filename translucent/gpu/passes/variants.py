@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import build_program
+from translucent.scene import Object
 
 
 class Variants:
@@ -64,6 +65,12 @@ def walk_switches(job: Any) -> dict[str, bool | int]:
         "GRAY": all(_is_gray(slot.medium.extinction) for slot in job.slots),
         "SHADOWS": bool(job.scene.opaque),
     }
+
+
+def look_switches(body: Object) -> dict[str, bool]:
+    """Switches of ``geometry/border.vert`` and ``shade/surface_textures.glsl``: what few objects have."""
+    occluded = body.surface is not None and body.surface.occlusion_texture is not None
+    return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
 
 
 def _is_gray(values: npt.NDArray[np.float64]) -> bool:

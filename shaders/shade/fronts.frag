@@ -1,0 +1,14 @@
+// Where a ray first meets a body: layers beyond it are seen through media.
+
+#include <constants>
+#include <Body>
+
+in float axial;
+
+layout(location = 0) out float front;  // place
+
+void main() {
+    if (axial < axial_start) { discard; }  // behind an orthographic picture
+    front = axial * place_scale + place_start;
+    gl_FragDepth = clamp(front, 0.0, 1.0);
+}

@@ -1,0 +1,69 @@
+// A layer that covers a share of what is behind it, and shows what an opaque object would (Porter & Duff 1984, `over`);
+// or GLOW: light that the border of a body adds where a ray first enters it. Painted object by object, far ones first.
+// What is behind the first body on a ray is kept apart; BODIES: there are some.
+
+#include <constants>
+#include <View>
+#include <Body>
+#include <Environment>
+#include <Lights>
+#include "lib/ray.glsl"
+#include "shade/opaque_surface.glsl"
+#if OPAQUE
+#include "intervals/last_axial.glsl"
+#endif
+#if GLOW
+uniform sampler2D entered;  // w: place of the border where a ray first enters a body
+#elif BODIES
+uniform sampler2D fronts;   // place where a ray first meets one
+#endif
+#if !GLOW
+uniform float layer_opacity;
+#endif
+
+in float axial;
+in vec3 world_normal;
+in vec3 from_eye;
+in vec2 surface_uv;
+#if VERTEX_COLORS
+in vec4 vertex_color;
+#else
+const vec4 vertex_color = vec4(1.0);
+#endif
+
+layout(location = 0) out vec4 in_front;  // multiplied by the share that it covers; w: that share
+layout(location = 1) out vec4 behind;
+
+void main() {
+    // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
+    OpaqueFinish finish = opaque_finish_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    if (finish.is_hole || axial < axial_start) { discard; }
+#if OPAQUE
+    // What lies on an opaque surface is seen, also where rounding puts it behind.
+    if (axial > last_axial() + sheet_tolerance) { discard; }
+#endif
+    float place = axial * place_scale + place_start;
+    // A scene that is flat has no depth to count places in.
+    float touching = TOUCHING + sheet_tolerance * place_scale;
+    in_front = behind = vec4(0.0);
+#if GLOW
+    if (abs(place - texelFetch(entered, ivec2(gl_FragCoord.xy), 0).w) > touching) { discard; }
+    in_front.rgb = min(finish.emitted, vec3(NOTHING));
+#else
+    vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
+    vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
+    // Interpolated normals may look away from the eye where the faces do not: then the surface is seen edge-on.
+    vec3 normal = gl_FrontFacing ? finish.normal : -finish.normal;
+    float facing = dot(normal, ray);
+    normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
+    float share = layer_opacity * finish.opacity;
+    vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_eye), vec3(NOTHING)), share);
+#if BODIES
+    if (place > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
+        behind = shown;
+        return;
+    }
+#endif
+    in_front = shown;
+#endif
+}

@@ -1,0 +1,109 @@
+"""Layers that cover a share of what is behind them, and light that borders of bodies add."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps
+from translucent.gpu.passes.variants import Variants, look_switches
+from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.render_plan import PassSpec
+from translucent.scene import Object
+from translucent.surface import LEAST_COVER
+
+_OWN = ("opaque_place", "entered", "fronts")
+_SAMPLERS = ("layers_in_front", "layers_behind", "straight_transmittance", "shaded_radiance")
+
+
+class LayersPass:
+    """Paints the layers, far objects first, and puts them over the picture; see ``shaders/shade/layer.frag``."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        units = FINISH_UNITS | {name: len(FINISH_UNITS) + i for i, name in enumerate(_OWN)}
+        self._units = units
+        self._painted = Variants(gl, "geometry/border.vert", "shade/layer.frag", **units)
+        self._fronts = Variants(gl, "geometry/body.vert", "shade/fronts.frag")
+        over = {name: unit for unit, name in enumerate(_SAMPLERS)}
+        self._over = Variants(gl, "geometry/fullscreen.vert", "shade/layers_over.frag", **over)
+        self._maps = FinishMaps(gl)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Draw and put over; for a job of several samples, add the sample's radiance and transmittance."""
+        bodies = tuple(i for i, item in enumerate(job.scene.objects) if item.medium is not None and not item.covers)
+        if bodies:
+            self._find_fronts(job, bodies)
+        self._paint(job, spec, bool(bodies))
+        self._put_over(job)
+
+    def _find_fronts(self, job: FrameJob, bodies: tuple[int, ...]) -> None:
+        """Where each ray first meets a body: at once, if it starts inside one."""
+        framebuffer = job.targets.fronts()
+        framebuffer.use()
+        nothing = float(CONSTANTS["NOTHING"])
+        framebuffer.clear(-nothing if job.starts_inside else nothing, depth=1.0)
+        job.gl.enable_only(moderngl.DEPTH_TEST)
+        if not job.starts_inside:
+            job.draw(self._fronts.program(WITH_NORMAL=0, WITH_POSITION=0), bodies)
+
+    def _paint(self, job: FrameJob, spec: PassSpec, bodies: bool) -> None:
+        gl, framebuffer = job.gl, job.targets.layers()
+        framebuffer.use()
+        framebuffer.clear()
+        gl.enable_only(moderngl.BLEND | moderngl.CULL_FACE)
+        gl.blend_equation = moderngl.FUNC_ADD
+        gl.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        self._maps.bind(job)
+        job.bind_opaque(self._units["opaque_place"])
+        if job.has_surfaces:
+            job.targets.entered().color_attachments[0].use(self._units["entered"])
+        if bodies:
+            job.targets.fronts().color_attachments[0].use(self._units["fronts"])
+        for i in sorted(spec.objects, key=lambda i: _distance(job, i), reverse=True):
+            self._paint_object(job, i, bodies)
+        gl.cull_face = "back"
+
+    def _paint_object(self, job: FrameJob, number: int, bodies: bool) -> None:
+        body = job.scene.objects[number]
+        surface = body.surface
+        assert surface is not None
+        program = self._painted.program(
+            GLOW=not body.covers, OPAQUE=job.has_opaque, BODIES=bodies, **look_switches(body)
+        )
+        self._maps.set_finish(job, program, surface, surface.alpha_cutoff or (LEAST_COVER if body.covers else 0.0))
+        if body.covers:
+            set_uniform(program, "layer_opacity", surface.opacity)
+        # The far side first, as in viewers of glTF; a sheet that glows does so on both sides.
+        back = surface.double_sided if body.covers else number in job.sheets
+        for culled in ("front", "back") if back else ("back",):
+            job.gl.cull_face = culled
+            job.draw(program, (number,))
+
+    def _put_over(self, job: FrameJob) -> None:
+        gl, targets = job.gl, job.targets
+        gl.enable_only(moderngl.BLEND)
+        in_front, behind = targets.layers().color_attachments
+        transmittance = targets.result().color_attachments[1]
+        for unit, texture in enumerate((in_front, behind, transmittance, job.picture.color_attachments[0])):
+            texture.use(unit)
+        shown = "surfaced" if job.has_surfaces else "result"
+        steps = (
+            ("RADIANCE", targets.view(shown, 0), (moderngl.ONE, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
+            ("SHARE", targets.view("result", 1), (moderngl.ZERO, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
+            ("DEPTH", targets.view("result", 2), (moderngl.ONE, moderngl.ONE)),
+            ("SUM", targets.average() if job.averaging else None, (moderngl.ONE, moderngl.ONE)),
+        )
+        for step, framebuffer, blending in steps:
+            if framebuffer is not None:
+                framebuffer.use()
+                gl.blend_func = blending
+                switches = {name: name == step for name, _, _ in steps}
+                self._over.draw_fullscreen(self._over.program(**switches))
+
+
+def _distance(job: FrameJob, number: int) -> float:
+    body: Object = job.scene.objects[number]
+    camera = job.scene.camera
+    center = body.bounds.mean(axis=0) - camera.eye
+    return float(center @ camera.forward if camera.fov_y is None else np.linalg.norm(center))

@@ -1,0 +1,73 @@
+"""Layers that cover a share of what is behind them (Porter and Duff's `over`), and the holes of thin sheets.
+
+A layer of opacity alpha that shows radiance S is a sheet of optical depth -log(1 - alpha) whose thickness emits S:
+then it passes 1 - alpha, and adds S (1 - (1 - alpha)) = alpha S.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.reference.hits import Hits, world_normals
+from translucent.reference.opaque import irradiance_at
+from translucent.reference.rays import Rays
+from translucent.scene import Object, Scene
+from translucent.surface import LEAST_COVER
+from translucent.texture import Texture
+
+Array = npt.NDArray[np.float64]
+
+#: Share that an opaque layer leaves: what float32 can hold.
+_LEAST_LEFT = 1e-37
+
+
+def without_holes(body: Object, hits: Hits) -> Hits:
+    """The hits of a sheet that are in none of its holes, and where it is seen."""
+    if body.surface is None or not (body.covers or body.has_holes):
+        return hits
+    if body.covers and not body.surface.double_sided:
+        hits = hits.where(hits.sign > 0)
+    alpha = _painted(body, hits)[:, 3]
+    return hits.where(alpha >= (body.surface.alpha_cutoff or LEAST_COVER))
+
+
+def layer_depth(body: Object, hits: Hits) -> Array:
+    """(k,): optical depth of a layer at its hits; 0 if the object is none."""
+    if body.surface is None or body.surface.opacity is None:
+        return np.zeros(len(hits.pixel))
+    return np.asarray(-np.log(np.maximum(1.0 - body.surface.opacity * _painted(body, hits)[:, 3], _LEAST_LEFT)))
+
+
+def layer_radiance(scene: Scene, body: Object, hits: Hits, rays: Rays) -> Array:
+    """(k, 3): what a layer shows at its hits: it is matt, as opaque objects are here, and may glow."""
+    if body.surface is None or not body.covers:
+        return np.zeros((len(hits.pixel), 3))
+    directions = rays.directions[hits.pixel]
+    normals = world_normals(body, hits.face)
+    normals[np.einsum("ki,ki->k", normals, directions) > 0] *= -1.0
+    points = rays.origins[hits.pixel] + hits.distance[:, None] * directions
+    glow = np.asarray(body.surface.emissive) * _sampled(body, hits, body.surface.emissive_texture)[:, :3]
+    with np.errstate(under="ignore"):
+        lit = irradiance_at(scene, points, normals) / np.pi
+        return np.asarray(body.base_color * _painted(body, hits)[:, :3] * lit + glow)
+
+
+def _painted(body: Object, hits: Hits) -> Array:
+    """(k, 4): color and opacity of texture and vertices."""
+    painted = _sampled(body, hits, None if body.surface is None else body.surface.color_texture)
+    return painted if body.mesh.colors is None else painted * _across(body, body.mesh.colors, hits)
+
+
+def _sampled(body: Object, hits: Hits, texture: Texture | None) -> Array:
+    """(k, 4): a texture's values; 1 without one."""
+    values = np.ones((len(hits.pixel), 4))
+    if texture is not None and body.mesh.uv is not None:
+        found = texture.sample(_across(body, body.mesh.uv, hits))
+        values[:, : found.shape[1]] = found
+    return values
+
+
+def _across(body: Object, values: Array, hits: Hits) -> Array:
+    """(k, n): what is given at the vertices (v, n), at the hits."""
+    return np.asarray(np.einsum("kc,kcn->kn", hits.barycentric, values[body.mesh.faces[hits.face]]))
