@@ -63,7 +63,7 @@ class Targets:
     def nothing(self) -> moderngl.Framebuffer:
         """Something to draw into for passes that write to buffers only.
 
-        Its colors are masked. Else llvmpipe takes a face that fills a tile of 64 x 64 pixels for one that hides whatever
+        Its colors are masked. Else llvmpipe takes a face that fills a tile of 64 x 64 pixels for one that hides what
         has been drawn there, and leaves that out with all that it would have written to buffers.
         """
         framebuffer = self._get("nothing", (-1,))
