@@ -1,0 +1,18 @@
+"""Tests of rendering, on whatever driver there is."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import pytest
+
+from translucent.gpu.drivers import DriverFaultError
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Generator[None, None, None]:
+    """Skip what the driver is known to end the process on, and say so."""
+    try:
+        return (yield)
+    except DriverFaultError as error:
+        pytest.skip(str(error))
