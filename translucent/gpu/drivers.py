@@ -12,14 +12,14 @@ class DriverFaultError(RenderError):
     """What was asked for would end the process, through no fault of its own."""
 
 
-def require_two_borders(info: Mapping[str, Any]) -> None:
-    """Raise `DriverFaultError` where the driver crashes on rays that bend at two borders.
+def require_borders(info: Mapping[str, Any]) -> None:
+    """Raise `DriverFaultError` where the driver crashes on what the borders of bodies do to light.
 
     Lavapipe 22 writes beyond an array where it inlines uniforms of a shader's fourth block, or of a later one.
     """
     if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
         raise DriverFaultError(
-            'borders="both" with zink over lavapipe',
+            "borders of bodies with zink over lavapipe",
             f"this driver, {info['GL_VERSION']}, ends the process on them",
-            'use another driver, a newer Mesa, or borders="front"',
+            "use another driver, a newer Mesa, or media without ior and surface",
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
-from translucent.gpu.drivers import require_two_borders
+from translucent.gpu.drivers import require_borders
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
@@ -43,8 +43,7 @@ class SurfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl, environment = job.gl, job.scene.environment
-        if not job.one_border:
-            require_two_borders(gl.info)
+        require_borders(gl.info)
         (job.targets.average() if job.averaging else job.targets.surfaced()).use()
         gl.enable_only(moderngl.BLEND if job.averaging else moderngl.NOTHING)
         gl.blend_equation = moderngl.FUNC_ADD
