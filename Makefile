@@ -14,10 +14,10 @@ BIN = .venv/bin
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv demo test lint bench meshes wheel clean
+.PHONY: help venv demo test test-drivers lint bench meshes wheel clean
 
 help: ## list these commands
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 venv: ## make .venv for development, and find an OpenGL
 	$(BOOTSTRAP) --group dev
@@ -29,6 +29,10 @@ demo: ## render a few pictures into out/
 test: ## run the tests
 	$(BOOTSTRAP) --group test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+test-drivers: ## run the tests of rendering on every OpenGL driver that is here: an hour, see docs/drivers.md
+	$(BOOTSTRAP) --group test
+	@$(BIN)/python tools/drivers.py
 
 lint: ## check style, types and the layers of the imports
 	$(BOOTSTRAP) --group dev

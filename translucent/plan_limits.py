@@ -38,6 +38,9 @@ LIGHTS_LEFT_OUT = (
     "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
 )
 
+#: What limits a plan for an OpenGL that cannot follow lights into media.
+UNLIT = "pixels with media that scatter are marked invalid: their light takes OpenGL 4.3, or the reference"
+
 #: What a plan says where media scatter and nothing shines.
 ONLY_REMOVES = "in-scattered light: scattering only removes light"
 

@@ -45,8 +45,9 @@ class PassSpec:
         Indices into `Scene.objects` of what it draws; empty for a pass over pixels.
     geometry_passes : int
         How often it draws them, or for depth peeling is expected to.
-    target : {"accumulated", "fallback"}
-        Where its paths add up: the fallback is read where the other does not balance.
+    target : {"accumulated", "fallback", "unlit"}
+        Where its paths add up: the fallback is read where the other does not balance, and pixels are marked invalid
+        where there is any in the last.
     cost : float
         Expected time, in multiples of drawing the same objects into a depth buffer.
     """
@@ -55,7 +56,7 @@ class PassSpec:
     reason: str
     objects: tuple[int, ...] = ()
     geometry_passes: int = 0
-    target: Literal["accumulated", "fallback"] = "accumulated"
+    target: Literal["accumulated", "fallback", "unlit"] = "accumulated"
     cost: float = 0.0
 
 

@@ -30,5 +30,7 @@ float last_place() {
 }
 
 uint fragment_word(float place) {
-    return pack_crossing(place, slot, !gl_FrontFacing);
+    // A choice between words: where the side itself becomes a number, softpipe takes every face for a back face.
+    uint word = pack_crossing(place, slot, false);
+    return gl_FrontFacing ? word : word + 1u;
 }

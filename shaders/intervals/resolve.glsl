@@ -30,9 +30,6 @@ void note_exit(Walk walk) {
 // Metres along this pixel's ray per metre along the camera's forward axis.
 float ray_advance() {
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
-#if SCATTER
-    pixel_in_picture = 2.0 * pixel / frame_size.xy - 1.0;
-#endif
     return length(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
 }
 

@@ -32,8 +32,9 @@ vec3 seen_at(vec3 point) {
                         : vec3(-1.0, -1.0, -NOTHING);
 }
 
+// The nearest texel: samples aside from the centers of pixels reach past the last ones, where nothing may be fetched.
 ivec2 texel_of(vec2 pixel) {
-    return ivec2(floor(pixel.x - frame_size.z), floor(pixel.y - frame_size.w));
+    return ivec2(clamp(floor(pixel - frame_size.zw), vec2(0.0), frame_size.xy - 1.0));
 }
 
 bool in_picture(vec2 pixel) {

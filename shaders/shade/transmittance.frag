@@ -28,6 +28,12 @@ uniform sampler2D fallback;
 uniform sampler2D fallback_path;
 #endif
 #endif
+#if UNLIT
+uniform sampler2D unlit;  // paths in media that scatter light which nothing follows
+#if SPECTRAL
+uniform sampler2D unlit_path;
+#endif
+#endif
 
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
@@ -118,6 +124,15 @@ void main() {
 #if !AVERAGE
     out_optical_depth = vec4(path.optical_depth, 1.0);
     out_thickness = path.thickness;
+#if UNLIT
+#if SPECTRAL
+    float in_the_dark = texelFetch(unlit_path, texel, 0).r * advance;
+#else
+    float in_the_dark = texelFetch(unlit, texel, 0).r * advance;
+#endif
+    // Thickness and transmittance are as right as ever, and stay; radiance is not.
+    valid = valid && in_the_dark <= coverage_floor;
+#endif
     out_flags = ((covered ? FLAG_COVERED : 0.0) + (valid ? FLAG_VALID : 0.0)) / 255.0;
 #endif
 }

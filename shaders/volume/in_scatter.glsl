@@ -4,7 +4,7 @@
 // The points are those of a variable in which the exponential is constant, were its exponent linear from end to end (the
 // secant): with E(s) = sigma_t s + tau_light(s) and x = E(L) - E(0), s(u) = -(L / x) log(1 - (1 - e^-x) u). Where a
 // point light is near, the angle seen from it takes the place of s (equiangular sampling, Kulla & Fajardo 2012), which
-// cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone.
+// cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone. Needs <View>.
 
 #include "intervals/slots.glsl"
 #include "volume/light_views.glsl"
@@ -15,13 +15,16 @@ struct ViewRay {
 };
 
 // Right and down of the pixel at hand, from -1 to 1 over the picture.
-vec2 pixel_in_picture;
+vec2 pixel_in_picture() {
+    return 2.0 * (vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw) / frame_size.xy - 1.0;
+}
 
 // The view ray from a place of the walk on. Nothing here is larger than the scene, however far away the eye is.
 ViewRay ray_from(float place) {
     float axial = scatter_near.x + place * place_metres;
     float spread = scatter_near.z == 1.0 ? axial : 1.0;
-    vec3 across = pixel_in_picture.x * scatter_right.xyz - pixel_in_picture.y * scatter_up.xyz;
+    vec2 pixel = pixel_in_picture();
+    vec3 across = pixel.x * scatter_right.xyz - pixel.y * scatter_up.xyz;
     vec3 along = ray_forward.xyz * (place * place_metres + scatter_near.y);
     return ViewRay(across * spread - scatter_off_axis.xyz + along, normalize(ray_forward.xyz + across * scatter_near.z));
 }

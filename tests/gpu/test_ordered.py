@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import trimesh
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.gpu.storage import Storage
+from translucent.gpu.timer import PassTimer
 from translucent.metrics import interior
 from translucent.solids import Box, Sphere
 
@@ -416,3 +418,16 @@ def test_peeling_goes_on_for_the_one_pixel_that_needs_it(renderer: tl.Renderer, 
     assert frame.layers is not None
     assert frame.layers.max() == 14
     np.testing.assert_allclose(frame.thickness.max(), 3.5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("method", [tl.FragmentLists(), tl.KBuffer(k=4)], ids=["lists", "k-buffer"])
+def test_no_face_hides_what_others_have_written_to_buffers(monkeypatch: pytest.MonkeyPatch, method: Any) -> None:
+    """Faces fill whole tiles of the picture. While a timer runs, llvmpipe draws what they hide, too: here none does."""
+    monkeypatch.setattr(PassTimer, "measure", lambda *_: contextlib.nullcontext())
+    scene = tl.Scene(
+        [tl.Object(Box.slab((4.0, 4.0), 1.0).tessellate(), AMBER)], tl.Camera.orthographic((0, 0, 5), (0, 0, 0))
+    )
+    with tl.Renderer() as renderer:
+        frame = renderer.render(scene, (256, 256), method)
+    assert frame.valid.all()
+    assert (frame.layers == 2).all()

@@ -27,6 +27,13 @@ SIZE = (64, 64)
 BALL = Sphere().tessellate(600)
 
 
+@pytest.fixture(autouse=True)
+def opengl_follows_lights(request: pytest.FixtureRequest, renderer: tl.Renderer) -> None:
+    """Skip all but what is about an OpenGL that cannot, where this cannot."""
+    if not renderer.gpu.capabilities.shader_storage and "cannot_follow" not in request.node.name:
+        pytest.skip("this OpenGL has no shader storage buffers, without which no light is followed")
+
+
 def ball_scene(light: Any, extinction: float, anisotropy: float = 0.0) -> tl.Scene:
     medium = tl.Medium(absorption=0.5 * extinction, scattering=0.5 * extinction, anisotropy=anisotropy)
     camera = tl.Camera.orthographic((0, 0, -5), (0, 0, 0), height=2.2)
@@ -344,3 +351,39 @@ def test_lights_look_again_only_when_what_they_see_changes(monkeypatch: pytest.M
         assert not looks
         with tl.Renderer() as new:
             np.testing.assert_array_equal(other, new.render(scene, (25, 16)).radiance)
+
+
+def without_shader_storage(monkeypatch: pytest.MonkeyPatch) -> tl.Renderer:
+    """A renderer that takes this OpenGL for one before 4.3."""
+    from translucent.gpu import renderer as module
+
+    monkeypatch.setattr(module, "SHADER_STORAGE", 1000)
+    return tl.Renderer()
+
+
+@pytest.mark.parametrize("emission", [0.0, 1.0], ids=["one draw", "in order"])
+@pytest.mark.parametrize("eye", [(0, 0.3, -5), (-0.5, 0, 0)], ids=["outside", "inside"])
+def test_an_opengl_that_cannot_follow_lights_marks_what_they_light(
+    monkeypatch: pytest.MonkeyPatch, emission: float, eye: Any
+) -> None:
+    """A ball that scatters, one that absorbs, and a wall: thickness stays, radiance is not trusted."""
+    milk, dye = tl.Medium(absorption=0.5, scattering=0.5), tl.Medium(absorption=1.0, emission=emission)
+    left, right, behind = (np.eye(4) for _ in range(3))
+    left[0, 3], right[0, 3], behind[:3, 3] = -0.5, 0.9, (-0.5, 0.0, 2.0)
+    ball = Sphere().tessellate(24)
+    objects = [tl.Object(ball, milk, left), tl.Object(ball, dye, right), tl.Object(Box().tessellate(), None, behind)]
+    camera = tl.Camera.look_at(eye, (0, 0, 0) if eye[2] else (1, 0, 0))
+    scene, dark = tl.Scene(objects, camera, lights=[LIGHTS["side"]]), tl.Scene(objects, camera)
+    with (
+        without_shader_storage(monkeypatch) as renderer,
+        pytest.warns(tl.TranslucentWarning, match=r"pixels with media that scatter are marked invalid|leaves out what"),
+    ):
+        frame = renderer.render(scene, SIZE)
+    alone = tl.Scene([objects[0], objects[2]], camera)
+    milky = tl.reference.render(alone, SIZE).thickness > 1e-3
+    inside = tl.interior(tl.reference.hit_counts(scene, SIZE))
+    assert 0.05 < milky.mean() <= 1.0
+    np.testing.assert_array_equal(frame.valid[inside], ~milky[inside])
+    truth = tl.reference.render(dark, SIZE)
+    np.testing.assert_allclose(frame.thickness[inside], truth.thickness[inside], atol=1e-4)
+    np.testing.assert_allclose(frame.transmittance[inside], truth.transmittance[inside], atol=1e-4)

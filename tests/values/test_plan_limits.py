@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import translucent as tl
-from tests.values.plan_scenes import BOX, DIAMOND, MILK, OPEN, ORDERED, TORUS, body, names, scene, sheet
+from tests.values.plan_scenes import BOX, DIAMOND, MILK, NO_STORAGE, OPEN, ORDERED, TORUS, body, names, scene, sheet
 from translucent.plan import plan
 
 _APART = BOX.vertices + (5, 0, 0)
@@ -121,3 +121,17 @@ def test_a_plan_that_is_not_exact_says_where(objects: list[tl.Object], method: A
     assert len(found.limits) == len(limits)
     for told, limit in zip(found.limits, limits, strict=True):
         assert told.startswith(limit)
+
+
+@pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.DepthPeeling()], ids=str)
+def test_without_shader_storage_what_scatters_is_marked(method: tl.SignedDepth | tl.DepthPeeling | None) -> None:
+    wax, dye = tl.Medium(scattering=1.0), tl.Medium(absorption=1.0)
+    light = tl.DirectionalLight((0, 0, -1), (1, 1, 1))
+    lit = scene(body(dye), body(wax), lights=[light])
+    here, there = plan(lit, method), plan(lit, method, NO_STORAGE)
+    assert "unlit" not in names(here)
+    assert names(there)[-2:] == ["unlit", "transmittance"]
+    assert there.passes[-2].objects == (1,)
+    assert any("marked invalid: their light takes OpenGL 4.3" in limit for limit in there.limits)
+    for other in (scene(body(dye), body(wax)), scene(body(dye), lights=[light])):
+        assert "unlit" not in names(plan(other, method, NO_STORAGE))

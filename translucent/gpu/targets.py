@@ -62,8 +62,14 @@ class Targets:
         return self._get(f"peel_state-{number}", (4, 4, 4, 4, 4), windings=2)
 
     def nothing(self) -> moderngl.Framebuffer:
-        """Something to draw into for passes that write to buffers only."""
-        return self._get("nothing", (-1,))
+        """Something to draw into for passes that write to buffers only.
+
+        Its colors are masked. Else llvmpipe takes a face that fills a tile of 64 x 64 pixels for one that hides what
+        has been drawn there, and leaves that out with all that it would have written to buffers.
+        """
+        framebuffer = self._get("nothing", (-1,))
+        framebuffer.color_mask = (False, False, False, False)
+        return framebuffer
 
     def steepest(self) -> moderngl.Framebuffer:
         """R32F: how far the rasterizer may misplace the steepest face of a pixel, in places."""

@@ -35,6 +35,7 @@ class Pass(Protocol):
 PASSES: dict[str, type[Pass]] = {
     "signed_depth": SignedDepthPass,
     "signed_depth_fallback": SignedDepthPass,
+    "unlit": SignedDepthPass,
     "thin_layer": ThinLayerPass,
     "thin_layer_fallback": ThinLayerPass,
     "back_face_depth": BackFaceDepthPass,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
+from translucent.gpu.drivers import require_borders
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
@@ -42,6 +43,7 @@ class SurfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl, environment = job.gl, job.scene.environment
+        require_borders(gl.info)
         sums = job.averaging and not job.has_layers
         (job.targets.average() if sums else job.targets.surfaced()).use()
         gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)

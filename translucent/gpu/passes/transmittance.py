@@ -19,6 +19,8 @@ _SAMPLERS = (
     "opaque_place",
     "opaque_radiance",
     "seen_map",
+    "unlit",
+    "unlit_path",
 )
 
 
@@ -33,10 +35,12 @@ class TransmittancePass:
         """Resolve the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl, plan = job.gl, job.plan
         fallback = any(step.target == "fallback" for step in plan.passes)
+        unlit = any(step.target == "unlit" for step in plan.passes)
         accumulated = not plan.ordered or any(step.name == "thin_layer" for step in plan.passes)
         inputs = {
             "accumulated": job.accumulator() if accumulated else None,
             "fallback": job.accumulator("fallback") if fallback else None,
+            "unlit": job.accumulator("unlit") if unlit else None,
             "ordered_depth": job.targets.ordered() if plan.ordered else None,
             "opaque_place": job.targets.opaque() if job.has_opaque else None,
         }
@@ -60,6 +64,7 @@ class TransmittancePass:
         program = self._variants.program(
             SPECTRAL=plan.spectral,
             FALLBACK=fallback,
+            UNLIT=unlit,
             AVERAGE=sums,
             SURFACES=job.has_surfaces,
             SEEN_MAP=seen_map,

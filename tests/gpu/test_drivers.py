@@ -1,0 +1,44 @@
+"""Faults of drivers that are refused before they end the process."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import translucent as tl
+from translucent.errors import RenderError
+from translucent.gpu.drivers import require_borders
+from translucent.solids import Sphere
+
+LAVAPIPE = {
+    "GL_RENDERER": "zink (llvmpipe (LLVM 15.0.6, 256 bits))",
+    "GL_VERSION": "4.5 (Core Profile) Mesa 22.3.6",
+}
+
+
+@pytest.mark.parametrize(
+    "other", [{"GL_RENDERER": "llvmpipe (LLVM 15.0.6, 256 bits)"}, {"GL_VERSION": "4.6 (Core Profile) Mesa 24.0.1"}]
+)
+def test_only_the_driver_at_fault_is_refused(other: dict[str, str]) -> None:
+    with pytest.raises(
+        RenderError, match=r"lavapipe; this driver.*Mesa 22.3.6, ends the process.*without ior and surface$"
+    ):
+        require_borders(LAVAPIPE)
+    require_borders(LAVAPIPE | other)
+
+
+def test_a_renderer_that_refuses_borders_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    from translucent.gpu.passes import surfaces
+
+    def refuse(_: Any) -> None:
+        require_borders(LAVAPIPE)
+
+    monkeypatch.setattr(surfaces, "require_borders", refuse)
+    ball, camera = Sphere().tessellate(16), tl.Camera.look_at((1, 2, 3), (0, 0, 0))
+    glass, dye = (tl.Scene([tl.Object(ball, tl.Medium(absorption=1.0, ior=ior))], camera) for ior in (1.5, 1.0))
+    with tl.Renderer() as renderer:
+        for _ in range(2):
+            with pytest.raises(RenderError, match="ends the process"):
+                renderer.render(glass, (32, 24))
+            assert renderer.render(dye, (32, 24)).valid.all()

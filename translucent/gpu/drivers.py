@@ -1,0 +1,25 @@
+"""Faults of drivers that cannot be worked around, and so are refused before they do harm; see ``docs/drivers.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from translucent.errors import RenderError
+
+
+class DriverFaultError(RenderError):
+    """What was asked for would end the process, through no fault of its own."""
+
+
+def require_borders(info: Mapping[str, Any]) -> None:
+    """Raise `DriverFaultError` where the driver crashes on what the borders of bodies do to light.
+
+    Lavapipe 22 writes beyond an array where it inlines uniforms of a shader's fourth block, or of a later one.
+    """
+    if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
+        raise DriverFaultError(
+            "borders of bodies with zink over lavapipe",
+            f"this driver, {info['GL_VERSION']}, ends the process on them",
+            "use another driver, a newer Mesa, or media without ior and surface",
+        )
