@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-#: Lines along each side of the grid of one direction. What is smaller than a cell can slip through.
-LINES = 96
+#: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
+#: What is smaller than a cell can slip through.
+LINES = (12, 96)
 
 #: On a share of the diagonal, rounding and welding may wind a surface negatively.
 NEGATIVE = 1e-5
@@ -39,17 +42,26 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     if not 0 < diagonal < np.inf:
         return False
     unit = (vertices - (low / 2 + high / 2)) / diagonal
-    return any(_negative_along(unit @ np.roll(_DIRECTIONS, -k, axis=0).T, faces) for k in range(3))
+    lines = int(np.clip(2 * np.sqrt(len(faces)), *LINES))
+    # One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
+    points = np.concatenate([unit @ np.roll(_DIRECTIONS, -k, axis=0).T for k in range(3)])
+    copies = np.concatenate([faces + k * len(unit) for k in range(3)])
+    found = list(_chunks(points, copies, lines, np.repeat(np.arange(3), len(faces))))
+    if not found:
+        return False
+    line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return _winds_below_zero(line, height, sign)
 
 
-def _negative_along(points: Array, faces: npt.NDArray[np.integer]) -> bool:
-    """Whether some line along the last axis of points within -0.5 to 0.5 winds negatively."""
-    scaled = (points[:, :2] + 0.5) * LINES - 0.5
+def _chunks(
+    points: Array, faces: npt.NDArray[np.integer], lines: int, direction: Integers
+) -> Iterator[tuple[Integers, Array, Integers]]:
+    """What the lines along the last axis meet of faces with points within -0.5 to 0.5; see `_crossings`."""
+    scaled = (points[:, :2] + 0.5) * lines - 0.5
     first, count = zip(*(_span(column[faces]) for column in scaled.T), strict=True)
     pairs = count[0] * count[1]
     near = np.flatnonzero(pairs)
     ends = np.cumsum(pairs[near])
-    found = []
     for begin in range(0, int(ends[-1]) if len(ends) else 0, CHUNK):
         pair = np.arange(begin, min(begin + CHUNK, int(ends[-1])))
         entry = np.searchsorted(ends, pair, side="right")
@@ -58,11 +70,8 @@ def _negative_along(points: Array, faces: npt.NDArray[np.integer]) -> bool:
         rows = count[1][face]
         cell = np.stack([first[0][face] + inside // rows, first[1][face] + inside % rows], axis=1)
         corners = faces[face]
-        found.append(_crossings(scaled[corners], points[corners, 2], cell))
-    if not found:
-        return False
-    line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return _winds_below_zero(line, height, sign)
+        line = (direction[face] * lines + cell[:, 0]) * lines + cell[:, 1]
+        yield _crossings(scaled[corners], points[corners, 2], cell, line)
 
 
 def _span(coordinate: Array) -> tuple[Integers, Integers]:
@@ -73,7 +82,7 @@ def _span(coordinate: Array) -> tuple[Integers, Integers]:
     return first, np.maximum(last - first + 1, 0)
 
 
-def _crossings(triangles: Array, heights: Array, cell: Integers) -> tuple[Integers, Array, Integers]:
+def _crossings(triangles: Array, heights: Array, cell: Integers, line: Integers) -> tuple[Integers, Array, Integers]:
     """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that the lines at the cells meet."""
     relative = triangles - cell[:, None, :]
     a, b = np.roll(relative, -1, axis=1), np.roll(relative, -2, axis=1)
@@ -81,9 +90,8 @@ def _crossings(triangles: Array, heights: Array, cell: Integers) -> tuple[Intege
     total = area.sum(axis=1)
     met = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
     weights = area[met] / total[met, None]
-    line = cell[met, 0] * LINES + cell[met, 1]
     # Counter-clockwise seen from above: the outside is up there, and a line that goes up leaves.
-    return line, (weights * heights[met]).sum(axis=1), -np.sign(total[met]).astype(np.int64)
+    return line[met], (weights * heights[met]).sum(axis=1), -np.sign(total[met]).astype(np.int64)
 
 
 def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:
