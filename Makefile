@@ -30,7 +30,7 @@ test: ## run the tests
 	$(BOOTSTRAP) --group test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-test-drivers: ## run the tests of rendering on every OpenGL driver that is here: an hour, see docs/drivers.md
+test-drivers: ## run the tests of rendering on every OpenGL driver that is here: it takes long, see docs/drivers.md
 	$(BOOTSTRAP) --group test
 	@$(BIN)/python tools/drivers.py
 

@@ -10,7 +10,6 @@ from translucent.plan_borders import border_passes, check_borders, with_one_bord
 from translucent.plan_layers import layer_passes
 from translucent.plan_limits import (
     MAX_SCATTER_LIGHTS,
-    UNLIT,
     closed_sheet_limits,
     layer_limits,
     marching_limits,
@@ -21,6 +20,7 @@ from translucent.plan_limits import (
     scattering_limits,
     unmodelled_effects,
     with_ambient_told,
+    with_unlit_marked,
 )
 from translucent.plan_order import media_differ, why_order_matters
 from translucent.render_plan import Borders, Capabilities, PassSpec, RenderPlan
@@ -108,7 +108,7 @@ def plan(
         return _plan_traced(scene, method, capabilities)
     chosen = _plan_drawn(scene, method, capabilities, borders)
     if _scatters(scene) and not capabilities.shader_storage:
-        chosen = _with_unlit_marked(scene, chosen)
+        chosen = with_unlit_marked(scene, chosen, _signed_depth_cost(chosen.spectral))
     return chosen if borders == "both" else with_one_border(scene, chosen)
 
 
@@ -182,17 +182,6 @@ def _light_views(scene: Scene, points: int) -> PassSpec:
         f"light, in order, tell how much of it reaches the {points} points of an interval"
     )
     return PassSpec("light_views", reason, solids, lights, cost=lights * COSTS["fragment_lists"])
-
-
-def _with_unlit_marked(scene: Scene, chosen: RenderPlan) -> RenderPlan:
-    """The plan with a pass that finds the pixels in which media scatter light that this OpenGL cannot follow."""
-    scattering = tuple(i for i in _solids(scene) if (medium := scene.objects[i].medium) is not None and medium.scatters)
-    reason = "paths in media that scatter: this OpenGL cannot follow lights there, so their pixels are marked invalid"
-    cost = _signed_depth_cost(chosen.spectral)
-    unlit = PassSpec("unlit", reason, scattering, 1, target="unlit", cost=cost)
-    last = next(i for i, step in enumerate(chosen.passes) if step.name == "transmittance")
-    passes = (*chosen.passes[:last], unlit, *chosen.passes[last:])
-    return dataclasses.replace(chosen, passes=passes, limits=(*chosen.limits, UNLIT))
 
 
 def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities) -> RenderPlan:

@@ -9,7 +9,7 @@ import numpy as np
 from translucent.density import DensityGrid
 from translucent.errors import InputError
 from translucent.plan_layers import layer_effects
-from translucent.render_plan import Capabilities, RenderPlan
+from translucent.render_plan import Capabilities, PassSpec, RenderPlan
 from translucent.scene import Object, Scene, object_names
 from translucent.thickness import (
     LEAST_SEEN,
@@ -212,6 +212,17 @@ def _is_invisible(body: Object) -> bool:
         and not (medium.extinction > 0).any()
         and not medium.emits
     )
+
+
+def with_unlit_marked(scene: Scene, chosen: RenderPlan, cost: float) -> RenderPlan:
+    """The plan with a pass that finds the pixels in which media scatter light that this OpenGL cannot follow."""
+    solids = ((i, body.medium) for i, body in enumerate(scene.objects) if body.sheet_thickness is None)
+    scattering = tuple(i for i, medium in solids if medium is not None and medium.scatters)
+    reason = "paths in media that scatter: this OpenGL cannot follow lights there, so their pixels are marked invalid"
+    unlit = PassSpec("unlit", reason, scattering, 1, target="unlit", cost=cost)
+    last = next(i for i, step in enumerate(chosen.passes) if step.name == "transmittance")
+    passes = (*chosen.passes[:last], unlit, *chosen.passes[last:])
+    return replace(chosen, passes=passes, limits=(*chosen.limits, UNLIT))
 
 
 def with_ambient_told(plan: RenderPlan) -> RenderPlan:

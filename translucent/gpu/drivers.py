@@ -15,7 +15,7 @@ class DriverFaultError(RenderError):
 def require_borders(info: Mapping[str, Any]) -> None:
     """Raise `DriverFaultError` where the driver crashes on what the borders of bodies do to light.
 
-    Lavapipe 22 writes beyond an array where it inlines uniforms of a shader's fourth block, or of a later one.
+    Lavapipe 22 reads before the first of its constant buffers where it inlines uniforms into that shader.
     """
     if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
         raise DriverFaultError(
