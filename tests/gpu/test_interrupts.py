@@ -37,6 +37,8 @@ def interrupted_at(line: int) -> Iterator[list[str]]:
 
     def trace(frame: FrameType, event: str, argument: Any) -> Any:
         code = frame.f_code
+        if code.co_name == "_release":  # of an earlier renderer
+            return None
         if code.co_filename not in WATCHED and (code.co_filename, code.co_name) not in BEGUN_AND_ENDED:
             return None
         if event == "line":
@@ -46,11 +48,15 @@ def interrupted_at(line: int) -> Iterator[list[str]]:
         return trace
 
     before = sys.gettrace()
+    # What is raised while an earlier renderer is collected, Python does not pass on.
+    gc.collect()
+    gc.disable()
     sys.settrace(trace)
     try:
         yield seen
     finally:
         sys.settrace(before)
+        gc.enable()
 
 
 def picture(renderer: tl.Renderer) -> np.ndarray:
