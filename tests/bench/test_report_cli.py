@@ -136,7 +136,7 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
     [
         (["--from", "x.json", "-o", "out", "--quick"], "nothing is measured"),
         (["--from", "x.json", "-o", "out", "knot"], "nothing is measured"),
-        (["--from", "absent.json", "-o", "out"], "it cannot be read"),
+        (["--from", "absent.json", "-o", "out"], "no such file"),
     ],
     ids=["from and quick", "from and a model", "no such file"],
 )
