@@ -223,7 +223,9 @@ def summary(color: npt.ArrayLike, distance: float, extinction: npt.ArrayLike, un
         ``extinction_per_unit`` is per this unit.
     """
     t, sigma = _triples(color), _triples(extinction)
-    colors = color_at_distance(sigma, np.array(FACTORS) * distance)
+    with np.errstate(over="ignore"):
+        distances = np.minimum(np.array(FACTORS) * distance, np.finfo(np.float64).max)
+    colors = color_at_distance(sigma, distances)
     with np.errstate(under="ignore"):
         per_unit = sigma * metres_per_unit(unit)
     return {

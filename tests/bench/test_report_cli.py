@@ -146,7 +146,7 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
         (["--preset", "jade"], "--preset jade; no MODEL to fill; the toolkit's scenes keep their media; add a MODEL"),
         (["knot", "--color", "teal"], "--distance is missing"),
         (["knot", "--preset", "milk"], "did you mean skim_milk"),
-        (["--from", "absent.json", "-o", "out"], "it cannot be read"),
+        (["--from", "absent.json", "-o", "out"], "no such file"),
     ],
     ids=["from and quick", "from and a model", "from a medium", "no model", "no distance", "preset", "no such file"],
 )
