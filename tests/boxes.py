@@ -8,7 +8,7 @@ from typing import Any
 
 import trimesh
 
-from translucent.materials.gltf_file import GltfFile, read_gltf
+from translucent.gltf.file import GltfFile, read_gltf
 
 GLASS = {
     "KHR_materials_transmission": {"transmissionFactor": 1},

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.metrics import interior
+from translucent.frames.metrics import interior
 
 SIZE = (960, 720)
 OUT = Path("out")

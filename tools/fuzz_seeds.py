@@ -19,14 +19,14 @@ from translucent.bench.files import read_report, write_csv
 from translucent.bench.page.pictures import heat_map
 from translucent.bench.record import CaseRecord, Picture, Provenance, Report
 from translucent.bench.row import Errors, Row, Timing
-from translucent.environment_files import read_environment_map
+from translucent.files.unpacking import PICTURES
+from translucent.geometry.solids import Box
+from translucent.gltf.materials import read_materials
+from translucent.gltf.write import write_medium
 from translucent.materials import load_medium, text_block
-from translucent.materials.gltf import read_materials
-from translucent.materials.gltf_write import write_medium
-from translucent.pixel import pixel_color
-from translucent.presets import read_presets
-from translucent.solids import Box
-from translucent.unpacking import PICTURES
+from translucent.media.pixel import pixel_color
+from translucent.media.presets import read_presets
+from translucent.scene.environment_files import read_environment_map
 
 JADE = tl.Medium.from_color((0.2, 0.6, 0.4), 0.02, ior=1.5)
 
@@ -218,7 +218,7 @@ def _read_report(path: Path) -> None:
 
 
 def _read_table(path: Path) -> None:
-    from translucent.batch import convert_table
+    from translucent.media.batch import convert_table
 
     convert_table(path, "m", "m", False)
 
@@ -238,7 +238,7 @@ def _read_script(path: Path) -> None:
 def readers(folder: Path) -> dict[str, Reader]:
     """Every reader by its name; `folder` is for files that only a library can make."""
     from translucent.bake.reading import load_thickness_map
-    from translucent.fitting import fit_wedge
+    from translucent.media.fitting import fit_wedge
 
     glb = ("scene.glb", packed_glb(*gltf_tree(b"")))
     text = ("scene.gltf", json.dumps(gltf_tree(None)[0]).encode())

@@ -24,10 +24,10 @@ import numpy.typing as npt
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.errors import InputError
+from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.reference.hits import Hits, PictureGrid, camera_vertices
 from translucent.reference.intervals import body_intervals, origin_windings, unbalanced
 from translucent.reference.render import scene_hits
-from translucent.solids import Box, Sphere, Torus
 
 SIZE = (48, 36)
 

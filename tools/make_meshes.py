@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.mesh import Mesh
-from translucent.solid_geometry import revolve
-from translucent.solids import Sphere, SphericalShell
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solid_geometry import revolve
+from translucent.geometry.solids import Sphere, SphericalShell
 
 ROOT = Path(__file__).resolve().parents[1]
 CENTIMETRE = 0.01

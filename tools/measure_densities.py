@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 import translucent as tl
-from translucent.solids import Sphere
+from translucent.geometry.solids import Sphere
 
 VOXELS = 64
 SIZE = (512, 512)

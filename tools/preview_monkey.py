@@ -19,7 +19,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from translucent.presets import presets
+from translucent.media.presets import presets
 from translucent.preview.actions import Change, ChoosePreset, Pan, Turn, View, Zoom
 from translucent.preview.document import RANGES, Document, Model, Orbit
 from translucent.preview.scenes import method_of

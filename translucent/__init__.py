@@ -11,17 +11,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from translucent import reference
-from translucent.albedo import scattering_medium
-from translucent.appearance import Appearance, appearance_of, average_color, medium_for_average_color
-from translucent.backdrop import Backdrop
 from translucent.bake.bake import bake_thickness
 from translucent.bake.batch import BatchReport, bake_many
 from translucent.bake.reading import load_thickness_map
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 from translucent.bake.vertices import bake_vertex_thickness
-from translucent.camera import Camera
-from translucent.conversion import (
+from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
+from translucent.frames.appearance import Appearance, appearance_of, average_color, medium_for_average_color
+from translucent.frames.frame import Frame
+from translucent.frames.metrics import Errors, compare, interior
+from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.gltf.load import load_scene
+from translucent.gltf.materials import read_materials
+from translucent.gltf.write import write_medium
+from translucent.materials import load_medium, text_block
+from translucent.media.albedo import scattering_medium
+from translucent.media.conversion import (
     DistanceMatch,
     clamp_colors,
     color_at_distance,
@@ -29,27 +35,11 @@ from translucent.conversion import (
     distance_for_color,
     extinction_from_colors,
 )
-from translucent.density import DensityGrid, ExponentialDensity, LinearDensity
-from translucent.environment import Environment
-from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
-from translucent.fitting import Fit, fit_medium, fit_wedge
-from translucent.frame import Frame
-from translucent.gltf.load import load_scene
-from translucent.lights import DirectionalLight, PointLight
-from translucent.materials import load_medium, text_block
-from translucent.materials.gltf import read_materials
-from translucent.materials.gltf_write import write_medium
-from translucent.medium import Medium
-from translucent.mesh import Mesh, load_mesh
-from translucent.metrics import Errors, compare, interior
-from translucent.plan import plan
-from translucent.presets import Preset, preset, presets
-from translucent.render_plan import Capabilities, RenderPlan
-from translucent.scene import Object, Scene
-from translucent.showcase import showcase
-from translucent.surface import Surface
-from translucent.texture import Texture
-from translucent.thickness import (
+from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
+from translucent.media.fitting import Fit, fit_medium, fit_wedge
+from translucent.media.medium import Medium
+from translucent.media.presets import Preset, preset, presets
+from translucent.planning.methods import (
     BackFaceDepth,
     DepthPeeling,
     FragmentLists,
@@ -58,6 +48,16 @@ from translucent.thickness import (
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import showcase
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 if TYPE_CHECKING:
     from translucent.renderer import Renderer

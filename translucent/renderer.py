@@ -11,21 +11,21 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from translucent.backdrop import Backdrop
-from translucent.camera import check_size
-from translucent.environment import Environment
 from translucent.errors import InputError, RenderError, TranslucentWarning
-from translucent.frame import Frame, check_exposure
+from translucent.formulas.tone import tone_curve
+from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
-from translucent.plan import plan, plan_over_backdrop
-from translucent.plan_borders import check_borders
-from translucent.plan_limits import LIGHTS_LEFT_OUT
-from translucent.render_plan import Borders, RenderPlan
-from translucent.scene import Scene
-from translucent.thickness import Method
-from translucent.tone import tone_curve
+from translucent.planning.borders import check_borders
+from translucent.planning.limits import LIGHTS_LEFT_OUT
+from translucent.planning.methods import Method
+from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.planning.render_plan import Borders, RenderPlan
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.camera import check_size
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Scene
 from translucent.version import VERSION
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
 // Color encodings (IEC 61966-2-1, ITU-R BT.709). Pure. Inputs: linear Rec.709 or sRGB-encoded channels, exposure in stops.
-// Each function is the float32 twin of the same name in translucent/color.py.
+// Each function is the float32 twin of the same name in translucent/formulas/color.py.
 
 #include <constants>
 

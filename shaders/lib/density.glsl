@@ -1,5 +1,5 @@
 // Relative density from place to place. Inputs: places along an axis of a body's unit box, 0 to 1; densities without unit.
-// Pure: needs only lib/optics.glsl. Each function is the float32 twin of the same name in translucent/density.py.
+// Pure: needs only lib/optics.glsl. Each function is the float32 twin of the same name in translucent/media/density.py.
 
 #include "lib/optics.glsl"
 

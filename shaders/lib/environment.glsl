@@ -1,5 +1,5 @@
 // The procedural environments, as shares between two radiances, and places in pictures of all directions. Pure.
-// Each function is the float32 twin of the same name in translucent/environment.py.
+// Each function is the float32 twin of the same name in translucent/scene/environment.py.
 
 #include <constants>
 

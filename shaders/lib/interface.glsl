@@ -1,6 +1,6 @@
 // What boundaries between media do with light. Pure: needs only <constants> and the library. Directions are unit vectors
 // of travel; a normal looks to the side that the light comes from; ior is that of the other side relative to this one.
-// Each function is the float32 twin of the same name in translucent/interface.py, where the sources are cited: Snell;
+// Each function is the float32 twin of the same name in translucent/formulas/interface.py, where the sources are cited: Snell;
 // Stokes 1862; Walter et al. 2007; Heitz 2014; KHR_materials_dispersion. fresnel_dielectric is in optics.glsl.
 
 #include <constants>

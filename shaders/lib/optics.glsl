@@ -1,5 +1,5 @@
 // Formulas of light in a medium. Inputs: extinction in 1/m, distance in m, optical depth without unit, cosines.
-// Pure: needs only <constants>. Each function is the float32 twin of the same name in translucent/optics.py, where the
+// Pure: needs only <constants>. Each function is the float32 twin of the same name in translucent/formulas/optics.py, where the
 // sources are cited: Beer-Lambert; Max 1995; Porter & Duff 1984; Fresnel; Drobot 2017; Henyey & Greenstein 1941.
 
 #include <constants>

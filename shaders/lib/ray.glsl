@@ -1,4 +1,4 @@
-// View rays. Pure. Each function is the float32 twin of the same name in translucent/camera.py.
+// View rays. Pure. Each function is the float32 twin of the same name in translucent/scene/camera.py.
 
 // Ray through a point of the picture, not normalised: it advances 1 m along the camera's forward axis.
 // pixel: right and down from the top left corner, in pixels. right, up: the camera's axes, times half the extent of the

@@ -1,6 +1,6 @@
 // Tone curves: from linear radiance to linear colors that a display can show, 0 to 1; encode them as sRGB afterwards.
 // Khronos PBR Neutral Tone Mapper (specification 2024); AgX (Sobotka 2022), base look. Pure. Rec.709.
-// Each function is the float32 twin of the same name in translucent/tone.py, which explains the numbers.
+// Each function is the float32 twin of the same name in translucent/formulas/tone.py, which explains the numbers.
 
 #include <constants>
 

@@ -1,6 +1,6 @@
 // Light that a layer scatters any number of times, as one diffuse stream forwards and one backwards. Pure. Depths are
 // without unit: coefficients K and S in 1/m times the thickness of the layer. Each function is the float32 twin of the
-// same name in translucent/two_stream.py, where the sources are cited: Schuster 1905; Kubelka & Munk 1931; Gate 1974.
+// same name in translucent/formulas/two_stream.py, where the sources are cited: Schuster 1905; Kubelka & Munk 1931; Gate 1974.
 
 #include <constants>
 #include "lib/optics.glsl"

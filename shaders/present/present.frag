@@ -1,4 +1,4 @@
-// A linear picture on a display: exposure, tone curve (TONE counts those in translucent.tone.TONES), sRGB. The picture's row 0 is its top row.
+// A linear picture on a display: exposure, tone curve (TONE counts those in translucent.formulas.tone.TONES), sRGB. The picture's row 0 is its top row.
 
 #include "present/develop.glsl"
 

@@ -18,9 +18,9 @@ import trimesh
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
-from translucent.batch import MOST_SHOWN, convert_table
 from translucent.commands.extinction import TARGETS
 from translucent.commands.on_model import SIZE
+from translucent.media.batch import MOST_SHOWN, convert_table
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import trimesh
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
-from translucent.materials.gltf import read_materials
-from translucent.materials.gltf_file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.materials import read_materials
 
 WINE = ("--color", "linear(0.2,0.02,0.05)", "--distance", "1cm")
 
@@ -164,7 +164,7 @@ def test_a_folder_that_refuses_is_a_failure_in_one_line(
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("translucent.paths._temporary_file", refuse)
+    monkeypatch.setattr("translucent.files.paths._temporary_file", refuse)
     line = one_error_line(run("material", "apply", model, *WINE, "-o", tmp_path / "out.glb"), code=1)
     assert "it cannot be written (Permission denied)" in line
     assert not (tmp_path / "out.glb").exists()

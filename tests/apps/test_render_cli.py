@@ -14,7 +14,7 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
-from translucent.thickness import METHODS
+from translucent.planning.methods import METHODS
 
 GREEN = "linear(0.18,0.62,0.35)"
 

@@ -13,8 +13,8 @@ from PIL import Image
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.commands.common import TONE_NAMES, read_environment
-from translucent.showcase import LIGHT_TABLE
-from translucent.tone import TONES
+from translucent.formulas.tone import TONES
+from translucent.scene.showcase import LIGHT_TABLE
 
 SMALL = ("--size", "32x24", "--samples", "1")
 

@@ -79,7 +79,7 @@ def test_what_a_killed_process_left_is_removed(make_jobs: Any) -> None:
     output.parent.mkdir(exist_ok=True)
     for written in (output, sidecar_of(output)):
         code = (
-            "import os, signal, sys, pathlib; from translucent.paths import write_atomically\n"
+            "import os, signal, sys, pathlib; from translucent.files.paths import write_atomically\n"
             "write_atomically(pathlib.Path(sys.argv[1]), lambda path: os.kill(os.getpid(), signal.SIGKILL))\n"
         )
         assert subprocess.run([sys.executable, "-c", code, str(written)], check=False).returncode == -signal.SIGKILL
@@ -149,7 +149,7 @@ def test_whatever_changes_is_baked_again(what: str, make_jobs: Any, monkeypatch:
 
 
 def test_the_files_that_a_gltf_links_to_count(ball_glb: Path, tmp_path: Path) -> None:
-    from translucent.materials.gltf_file import read_gltf
+    from translucent.gltf.file import read_gltf
 
     file = read_gltf(ball_glb)
     (tmp_path / "data.bin").write_bytes(file.resource({}))

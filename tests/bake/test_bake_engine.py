@@ -16,7 +16,7 @@ from translucent.bake import canvas, measure, strips
 from translucent.bake.directions import Directions
 from translucent.bake.modes import RayMean, block_edges
 from translucent.bake.settings import BakeSettings
-from translucent.solids import Box, Sphere, Torus
+from translucent.geometry.solids import Box, Sphere, Torus
 
 MEDIUM = tl.Medium(absorption=(10.0, 20.0, 40.0))
 

@@ -18,14 +18,14 @@ import trimesh
 from PIL import Image
 
 import translucent as tl
-from translucent.bake.glb_builder import INDICES, GlbBuilder
-from translucent.bake.gltf_maps import write_maps
-from translucent.bake.gltf_targets import find_targets
+from translucent.bake.gltf.builder import INDICES, GlbBuilder
+from translucent.bake.gltf.maps import write_maps
+from translucent.bake.gltf.targets import find_targets
 from translucent.bake.writing import save_map, save_vertices
 from translucent.gltf.accessors import Accessors
-from translucent.materials.gltf import read_materials
-from translucent.materials.gltf_file import GltfFile, read_gltf, write_gltf
-from translucent.materials.gltf_scene import thickness_at, thickness_map
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.materials import read_materials
+from translucent.gltf.scene_media import thickness_at, thickness_map
 
 MapMaker = Callable[..., Any]
 Json = dict[str, Any]
@@ -378,7 +378,7 @@ def test_what_cannot_be_unwrapped_is_refused(scene: MapMaker, change: str, tmp_p
 
 @pytest.mark.parametrize("metres", [1.0, 0.01])
 def test_vertices_get_an_attribute(scene: MapMaker, metres: float, make_vertices: MapMaker, tmp_path: Path) -> None:
-    from translucent.bake.gltf_vertices import write_vertices
+    from translucent.bake.gltf.vertices import write_vertices
 
     before = scene(tmp_path / "in.glb", 1, extensions=GLASS)
     (target,) = find_targets(GlbBuilder(before), metres, needs_uv=False)

@@ -11,7 +11,7 @@ import translucent as tl
 from translucent.bake.measure import Measure
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Surface
-from translucent.solids import Box, Ellipsoid, Sphere
+from translucent.geometry.solids import Box, Ellipsoid, Sphere
 
 
 def test_vertices_of_a_sphere() -> None:

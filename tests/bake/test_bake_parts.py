@@ -21,7 +21,7 @@ from translucent.bake.check_files import check_output
 from translucent.bake.jobs import bake_file
 from translucent.bake.record import read_record
 from translucent.gltf.accessors import Accessors
-from translucent.materials.gltf_file import read_gltf
+from translucent.gltf.file import read_gltf
 
 QUICK = ("--size", "64", "--rays", "16", "--padding", "2")
 SETTINGS = {"size": 64, "rays": 16, "padding": 2}

@@ -12,7 +12,7 @@ import translucent as tl
 from translucent.bake.padding import pad
 from translucent.bake.surface import Surface
 from translucent.bake.texels import Atlas
-from translucent.solids import Box, Sphere
+from translucent.geometry.solids import Box, Sphere
 
 SQUARE = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]
 

@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.solids import Box, Sphere, Torus
+from translucent.geometry.solids import Box, Sphere, Torus
 
 RADIUS, SEGMENTS = 0.03, 96
 SPHERE = Sphere(radius=RADIUS)

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.bench import hard_geometry, hard_values, hard_views
-from translucent.bench.hard_cases import Checks, Hard, measure_hard_cases
+from translucent.bench.hard import geometry as hard_geometry
+from translucent.bench.hard import values as hard_values
+from translucent.bench.hard import views as hard_views
+from translucent.bench.hard.cases import Checks, Hard, measure_hard_cases
 
 ALL = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
 

@@ -25,11 +25,11 @@ from translucent.bench.scaling import ScalingRun
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.table import table
 from translucent.bench.truth import Truth
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.depth_only import DepthOnlyPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.storage import Storage
 from translucent.gpu.targets import Targets
-from translucent.solids import Box, Sphere
 
 #: Rounds are few and frames small: what is tested is that there are numbers.
 HASTE = Effort(0.0, 0.0, 0.4)

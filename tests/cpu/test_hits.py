@@ -20,8 +20,8 @@ from translucent.cpu import picture
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.hits import TracedMesh, Tracer, embree_hits
 from translucent.cpu.picture import Band, Picture
+from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.reference import Hits, line_hits
-from translucent.solids import Box, Sphere, Torus
 
 IDENTITY = np.eye(4)
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -12,10 +12,10 @@ import translucent as tl
 from translucent.cpu import picture, shading
 from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.throughput import throughput
-from translucent.frame import ARRAYS
-from translucent.plan import FALLBACK_SHEET
-from translucent.sampling import sample_shifts
-from translucent.solids import Box, Solid, Sphere, Torus
+from translucent.formulas.sampling import sample_shifts
+from translucent.frames.frame import ARRAYS
+from translucent.geometry.solids import Box, Solid, Sphere, Torus
+from translucent.planning.plan import FALLBACK_SHEET
 
 SIZE = (48, 36)
 EPS = float(np.finfo(np.float32).eps)

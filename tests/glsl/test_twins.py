@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent import camera, color, density, environment, interface, optics, tone, two_stream
 from translucent.assets import shader_library
+from translucent.formulas import color, interface, optics, tone, two_stream
 from translucent.gpu.probe import run_function, signatures
+from translucent.media import density
+from translucent.scene import camera, environment
 
 MODULES: dict[str, ModuleType] = {
     "optics": optics,

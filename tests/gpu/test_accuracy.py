@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.metrics import interior
-from translucent.solids import Box
+from translucent.frames.metrics import interior
+from translucent.geometry.solids import Box
 
 SIZE = (512, 512)
 ABSORBING = tl.Medium(absorption=1.0)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent import optics
-from translucent.solids import Box, Sphere, Torus
+from translucent.formulas import optics
+from translucent.geometry.solids import Box, Sphere, Torus
 
 SIZE = (32, 24)
 CAMERA = tl.Camera.look_at((1, 1.5, 4), (0, 0, 0))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.appearance import average_color, medium_for_average_color, thickness_samples
 from translucent.assets import mesh_path
+from translucent.frames.appearance import average_color, medium_for_average_color, thickness_samples
 
 SIZE = (160, 120)
 

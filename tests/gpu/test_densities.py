@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.solids import Box, Sphere, Torus
+from translucent.geometry.solids import Box, Sphere, Torus
 
 SIZE = (32, 24)
 DUSK = tl.Environment.constant((0.2, 0.3, 0.1))

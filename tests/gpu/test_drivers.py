@@ -8,8 +8,8 @@ import pytest
 
 import translucent as tl
 from translucent.errors import RenderError
+from translucent.geometry.solids import Sphere
 from translucent.gpu.drivers import require_borders
-from translucent.solids import Sphere
 
 LAVAPIPE = {
     "GL_RENDERER": "zink (llvmpipe (LLVM 15.0.6, 256 bits))",

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent.color import luminance
-from translucent.showcase import framing
+from translucent.formulas.color import luminance
+from translucent.scene.showcase import framing
 
 pytestmark = pytest.mark.filterwarnings("ignore::translucent.TranslucentWarning")
 

@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.geometry.solids import Sphere
 from translucent.gpu import context as contexts
 from translucent.gpu import renderer as renderers
 from translucent.gpu import timer as timers
-from translucent.solids import Sphere
 
 SIZE = (12, 8)
 MEDIUM = tl.Medium(absorption=(1, 2, 3))

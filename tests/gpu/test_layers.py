@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 import translucent as tl
-from translucent.solids import Box
+from translucent.geometry.solids import Box
 
 Array = npt.NDArray[np.float64]
 

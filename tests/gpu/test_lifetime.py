@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.targets import Targets
-from translucent.solids import Box, Sphere
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Program", "Query")
 NAMES = range(1, 4000)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.solids import Box, Sphere
-from translucent.thickness import Quadrature
+from translucent.geometry.solids import Box, Sphere
+from translucent.planning.methods import Quadrature
 
 SIZE = (32, 24)
 DUSK = tl.Environment.constant((0.2, 0.3, 0.1))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.metrics import interior
-from translucent.solids import Box, Sphere
+from translucent.frames.metrics import interior
+from translucent.geometry.solids import Box, Sphere
 
 SIZE = (160, 120)
 BODY = Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate()

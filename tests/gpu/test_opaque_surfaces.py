@@ -10,10 +10,10 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent.brdf_table import albedo
-from translucent.environment_map import EnvironmentMap
-from translucent.interface import ggx_distribution, ggx_visibility
-from translucent.solids import Sphere
+from translucent.formulas.brdf_table import albedo
+from translucent.formulas.interface import ggx_distribution, ggx_visibility
+from translucent.geometry.solids import Sphere
+from translucent.scene.environment_map import EnvironmentMap
 
 Array = npt.NDArray[np.float64]
 

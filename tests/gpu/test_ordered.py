@@ -13,10 +13,10 @@ import trimesh
 
 import translucent as tl
 from translucent.assets import mesh_path
+from translucent.frames.metrics import interior
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.storage import Storage
 from translucent.gpu.timer import PassTimer
-from translucent.metrics import interior
-from translucent.solids import Box, Sphere
 
 SIZE = (320, 240)
 METHODS = {

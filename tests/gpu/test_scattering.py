@@ -11,8 +11,8 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes.light_views import LightViewsPass
-from translucent.solids import Box, Sphere
 
 BLACK = tl.Environment.constant((0.0, 0.0, 0.0))
 LIGHTS = {

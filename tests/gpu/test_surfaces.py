@@ -10,9 +10,9 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent import interface, optics
 from translucent.assets import mesh_path
-from translucent.solids import Box, Sphere
+from translucent.formulas import interface, optics
+from translucent.geometry.solids import Box, Sphere
 
 Array = npt.NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.solids import Box, Sphere
+from translucent.geometry.solids import Box, Sphere
 
 SIZE = (96, 72)
 BALL = Sphere().tessellate(64)

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from translucent.geometry.solids import Box, Sphere
 from translucent.interop._pyrender_shim import load_pyrender
-from translucent.solids import Box, Sphere
 
 
 @pytest.fixture(scope="session")

@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.placement import AxialRange
 from translucent.gpu.shaders import CONSTANTS
-from translucent.plan import plan_over_backdrop
-from translucent.solids import Box, Sphere
+from translucent.planning.plan import plan_over_backdrop
 
 Array = npt.NDArray[Any]
 

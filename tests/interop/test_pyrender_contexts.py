@@ -272,7 +272,7 @@ import numpy as np
 import pyrender
 import translucent as tl
 from translucent.interop.pyrender import render
-from translucent.solids import Sphere
+from translucent.geometry.solids import Sphere
 ball = Sphere().tessellate(48)
 scene = pyrender.Scene()
 scene.add(pyrender.Mesh([pyrender.Primitive(ball.vertices, indices=ball.faces)]), name="ball")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.geometry.solids import Sphere
 from translucent.interop.pyrender import backdrop_from_pyrender, scene_from_pyrender, to_pyrender
-from translucent.solids import Sphere
 
 SIZE = (80, 60)
 GREEN = tl.Medium(absorption=(3.0, 0.5, 2.0))

@@ -7,10 +7,10 @@ import dataclasses
 import pytest
 
 import translucent as tl
+from translucent.geometry.solids import Box
 from translucent.preview import baking
 from translucent.preview.document import Orbit
 from translucent.preview.tasks import Task
-from translucent.solids import Box
 
 BOX = Box((0.0, 0.0, 0.0), (0.02, 0.02, 0.02)).tessellate()
 

@@ -14,9 +14,10 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
-from translucent.corner_normals import corner_normals, drawn_normals, has_drawn_normals
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.ledger import Ledger, PostponedError, ProgramName
-from translucent.mesh import Mesh
 from translucent.preview import compiling
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
@@ -24,9 +25,8 @@ from translucent.preview.compiling import Compiled, Compiler, stand_in
 from translucent.preview.elsewhere import Companion
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
-from translucent.showcase import showcase
-from translucent.solids import Box, Sphere
-from translucent.texture import Texture
+from translucent.scene.showcase import showcase
+from translucent.scene.texture import Texture
 
 LEAF = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
 BALL = Sphere(radius=0.02).tessellate(24)
@@ -131,7 +131,7 @@ def test_normals_of_a_large_mesh_come_from_another_process(
     assert not has_drawn_normals(mesh)
     wait(work, lambda: work.compiler.lane.task is None)
     here: list[Mesh] = []
-    monkeypatch.setattr("translucent.corner_normals.corner_normals", here.append)
+    monkeypatch.setattr("translucent.geometry.normals.corner_normals", here.append)
     work.do(ChoosePreset("whole_milk"))
     finish(stage, work)
     assert stage.problem == ""

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box
 from translucent.preview import elsewhere
 from translucent.preview.elsewhere import Companion, in_a_process
 from translucent.preview.tasks import CancelledError, Report, Task
-from translucent.solids import Box
 
 _seen: list[Mesh] = []
 

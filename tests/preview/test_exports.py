@@ -13,13 +13,13 @@ from PIL import Image
 
 import translucent as tl
 from tests.preview.waiting import wait
-from translucent.paths import write_atomically
+from translucent.files.paths import write_atomically
+from translucent.geometry.solids import Box
 from translucent.preview import elsewhere
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture, write_turntable
 from translucent.preview.workspace import Workspace
-from translucent.showcase import showcase
-from translucent.solids import Box
+from translucent.scene.showcase import showcase
 
 SIZE = (64, 40)
 SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), size=SIZE)

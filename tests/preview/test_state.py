@@ -18,7 +18,7 @@ from translucent.preview.history import MAX_STEPS, History
 from translucent.preview.scenes import material_of, medium_of
 from translucent.preview.script import read_script
 from translucent.preview.session import load_session, save_session
-from translucent.showcase import framing, showcase
+from translucent.scene.showcase import framing, showcase
 
 ORBIT = Orbit((0.1, 0.2, 0.3), 40.0, 20.0, 2.0)
 

@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from translucent.planning.methods import Method
 from translucent.reference import line_hits, pixel_rays, shade_hits, sheet_thicknesses
-from translucent.scene import Scene
-from translucent.thickness import Method
+from translucent.scene.scene import Scene
 
 #: Arrays of a frame by name, (h, w) or (h, w, 3).
 Shade = Callable[..., dict[str, npt.NDArray[Any]]]

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
-from translucent.environment import Environment
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box
+from translucent.media.medium import Medium
 from translucent.reference import render
-from translucent.scene import Scene
-from translucent.solids import Box
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 

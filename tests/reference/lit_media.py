@@ -10,15 +10,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
-from translucent import optics
-from translucent.camera import Camera
-from translucent.density import Density
-from translucent.environment import Environment
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
+from translucent.formulas import optics
+from translucent.geometry.solids import Box, Solid
+from translucent.media.density import Density
+from translucent.media.medium import Medium
 from translucent.reference import render
-from translucent.scene import Light, Object, Overlap, Scene
-from translucent.solids import Box, Solid
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Overlap, Scene
 
 Array = npt.NDArray[np.float64]
 DARK = Environment.constant((0, 0, 0))

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from translucent.camera import Camera
-from translucent.medium import Medium
-from translucent.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.media.medium import Medium
 from translucent.reference import render
-from translucent.scene import Object, Overlap, Scene
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Overlap, Scene
 
 MESHES = Path(__file__).parents[3] / "shared" / "assets" / "meshes_clean"
 MEDIUM = Medium(absorption=1e-3)

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from tests.reference.dielectrics import BLACK, GLASS, UP_AND_DOWN, WHITE, Array, box, oblique, pixel, reflectance, slab
-from translucent.camera import Camera
-from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Sphere
+from translucent.media.medium import Medium
 from translucent.reference import bent_light, render
 from translucent.reference.bent import FAINTEST
-from translucent.scene import Object, Scene
-from translucent.solids import Sphere
-from translucent.surface import Surface
-from translucent.texture import Texture
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 # Slabs
 

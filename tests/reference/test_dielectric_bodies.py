@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from tests.reference.dielectrics import BLACK, GLASS, UP_AND_DOWN, WHITE, box, oblique, pixel, reflectance, slab
-from translucent.camera import Camera
-from translucent.environment import Environment
-from translucent.frame import Frame
-from translucent.lights import DirectionalLight
-from translucent.medium import Medium
+from translucent.frames.frame import Frame
+from translucent.geometry.solids import Sphere
+from translucent.media.medium import Medium
 from translucent.reference import bent_light, render
 from translucent.reference.bent import FAINTEST
-from translucent.scene import Object, Scene
-from translucent.solids import Sphere
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Object, Scene
 
 # What rays are in
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from tests.reference.dielectrics import UP_AND_DOWN, WHITE, WIDE, Array, box, oblique, pixel, reflectance, slab
-from translucent import interface
-from translucent.camera import Camera
-from translucent.lights import DirectionalLight
-from translucent.medium import Medium
+from translucent.formulas import interface
+from translucent.geometry.solids import Sphere
+from translucent.media.medium import Medium
 from translucent.reference import bent_light
 from translucent.reference.bent import FAINTEST
-from translucent.scene import Object, Scene
-from translucent.solids import Sphere
-from translucent.surface import Surface
+from translucent.scene.camera import Camera
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
 
 
 def test_dispersion_bends_each_color_by_its_own_index() -> None:

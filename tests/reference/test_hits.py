@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from translucent.camera import Camera
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Sphere
 from translucent.reference import Hits, camera_hits, line_hits
 from translucent.reference.hits import CHUNK, _edge_functions
-from translucent.solids import Box, Sphere
+from translucent.scene.camera import Camera
 
 IDENTITY = np.eye(4)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from translucent.camera import Camera
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, SphericalShell
+from translucent.media.medium import Medium
 from translucent.reference import Hits, line_hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, scene_intervals, unbalanced
-from translucent.scene import Object, Scene
-from translucent.solids import Box, SphericalShell
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Scene
 
 MEDIUM = Medium(absorption=1.0)
 

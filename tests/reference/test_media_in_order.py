@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent.camera import Camera
-from translucent.environment import Environment
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Sphere, SphericalShell
+from translucent.media.medium import Medium
 from translucent.reference import render
-from translucent.scene import Object, Overlap, Scene
-from translucent.solids import Box, Sphere, SphericalShell
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Overlap, Scene
 
 Array = npt.NDArray[np.float64]
 Shade = Callable[..., dict[str, npt.NDArray[Any]]]

@@ -9,15 +9,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent.camera import Camera
-from translucent.environment import Environment
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Sphere
+from translucent.media.medium import Medium
+from translucent.planning.methods import ThinLayer
 from translucent.reference import SHEET_ON_OPAQUE, hit_counts, render
-from translucent.scene import Object, Scene
-from translucent.solids import Box, Sphere
-from translucent.thickness import ThinLayer
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 Shade = Callable[..., dict[str, npt.NDArray[Any]]]

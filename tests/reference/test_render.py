@@ -9,17 +9,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent import optics
-from translucent.camera import Camera
-from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.frame import ARRAYS
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.formulas import optics
+from translucent.frames.frame import ARRAYS
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Solid, Sphere, SphericalShell, Torus, TwoSpheres
+from translucent.media.medium import Medium
+from translucent.planning.methods import BackFaceDepth
 from translucent.reference import hit_counts, line_hits, pixel_rays, render, shade_hits
-from translucent.scene import Object, Scene
-from translucent.solids import Box, Solid, Sphere, SphericalShell, Torus, TwoSpheres
-from translucent.thickness import BackFaceDepth
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 MEDIUM = Medium(absorption=(1.0, 2.0, 3.0))

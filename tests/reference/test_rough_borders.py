@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tests.reference.dielectrics import BLACK, UP_AND_DOWN, Array, oblique, slab
-from translucent import interface, optics
-from translucent.lights import DirectionalLight
-from translucent.medium import Medium
+from translucent.formulas import interface, optics
+from translucent.media.medium import Medium
 from translucent.reference import bent_light, microfacets
 from translucent.reference.microfacets import scattered_at_border
-from translucent.scene import Object, Scene
-from translucent.surface import Surface
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
 
 
 @pytest.mark.parametrize("ior", [1.5, 1 / 1.5])

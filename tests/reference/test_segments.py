@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from translucent.camera import Camera
-from translucent.medium import Medium
+from translucent.geometry.solids import Box
+from translucent.media.medium import Medium
 from translucent.reference.compositing import composite
 from translucent.reference.intervals import Intervals
 from translucent.reference.segments import Segments, mix, scene_segments
 from translucent.reference.sheets import Crossings
-from translucent.scene import Object, Overlap, Scene
-from translucent.solids import Box
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Overlap, Scene
 
 CAMERA = Camera.orthographic((0, 0, 5), (0, 0, 0))
 MESH = Box().tessellate()

@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent import optics
-from translucent.camera import Camera
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.formulas import optics
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Sphere
+from translucent.media.medium import Medium
+from translucent.planning.methods import ThinLayer
 from translucent.reference import render
-from translucent.scene import Object, Scene
-from translucent.solids import Box, Sphere
-from translucent.thickness import ThinLayer
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 MEDIUM = Medium(absorption=1.0)

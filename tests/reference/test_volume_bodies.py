@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from tests.reference.lit_media import MEDIUM, SLAB, SUN, Array, integral, middle, middle_ray, scene, slab
-from translucent import optics
-from translucent.camera import Camera
-from translucent.density import DensityGrid
-from translucent.lights import DirectionalLight
-from translucent.medium import Medium
+from translucent.formulas import optics
+from translucent.geometry.solids import Box
+from translucent.media.density import DensityGrid
+from translucent.media.medium import Medium
+from translucent.planning.methods import ThinLayer
 from translucent.reference import render
-from translucent.scene import Object, Overlap
-from translucent.solids import Box
-from translucent.thickness import ThinLayer
+from translucent.scene.camera import Camera
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Object, Overlap
 
 
 def layers(light: DirectionalLight, *found: tuple[float, float, list[Medium]]) -> Array:

@@ -20,15 +20,15 @@ from tests.reference.lit_media import (
     single_scatter,
     slab,
 )
-from translucent import optics
-from translucent.camera import Camera
-from translucent.density import Density, DensityGrid, ExponentialDensity, LinearDensity
-from translucent.lights import PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.formulas import optics
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box
+from translucent.media.density import Density, DensityGrid, ExponentialDensity, LinearDensity
+from translucent.media.medium import Medium
 from translucent.reference import render
-from translucent.scene import Object
-from translucent.solids import Box
+from translucent.scene.camera import Camera
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Object
 
 PROFILES: dict[str, Density] = {
     "linear": LinearDensity(2, 0.2, 2.0),

@@ -10,19 +10,19 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent import optics
-from translucent.camera import Camera
-from translucent.density import Density, DensityGrid, ExponentialDensity, LinearDensity
-from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
+from translucent.formulas import optics
+from translucent.geometry.solids import Box, Torus
+from translucent.media.density import Density, DensityGrid, ExponentialDensity, LinearDensity
+from translucent.media.medium import Medium
+from translucent.planning.methods import METHODS, RayMarched, method_from_name
 from translucent.reference import blending, march, render
 from translucent.reference.equiangular import equiangular
 from translucent.reference.quadrature import even_steps, gauss_steps, hashed
-from translucent.scene import Light, Object, Scene
-from translucent.solids import Box, Torus
-from translucent.thickness import METHODS, RayMarched, method_from_name
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Scene
 
 Array = npt.NDArray[np.float64]
 

@@ -13,13 +13,13 @@ import numpy.typing as npt
 import pytest
 import trimesh
 
-from translucent.camera import Camera
-from translucent.environment import Environment
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.media.medium import Medium
 from translucent.reference import path_trace, render
-from translucent.scene import Light, Object, Scene
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Scene
 
 Array = npt.NDArray[np.float64]
 SIZE = (32, 24)

@@ -9,18 +9,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent import optics
-from translucent.camera import Camera
-from translucent.density import Density, DensityGrid, LinearDensity
-from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.formulas import optics
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Torus
+from translucent.media.density import Density, DensityGrid, LinearDensity
+from translucent.media.medium import Medium
 from translucent.reference import path_trace, render
 from translucent.reference.phase import henyey_greenstein_cosine, scattered_directions
-from translucent.scene import Light, Object, Scene
-from translucent.solids import Box, Torus
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Scene
 
 Array = npt.NDArray[np.float64]
 CAMERA = Camera.look_at((0.4, 0.5, 3.0), (0, 0, 0), fov_y=25)

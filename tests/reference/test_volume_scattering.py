@@ -21,16 +21,16 @@ from tests.reference.lit_media import (
     single_scatter,
     slab,
 )
-from translucent import optics
-from translucent.camera import Camera
-from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.formulas import optics
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Solid, Sphere, SphericalShell, TwoSpheres
+from translucent.media.medium import Medium
 from translucent.reference import render
-from translucent.scene import Light, Object, Scene
-from translucent.solids import Box, Solid, Sphere, SphericalShell, TwoSpheres
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Scene
 
 # One slab
 

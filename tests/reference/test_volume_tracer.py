@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent.camera import Camera
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
+from translucent.media.medium import Medium
 from translucent.reference import line_hits, pixel_rays
 from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.tracer import Tracer
-from translucent.scene import Object, Scene
-from translucent.solids import Box, Sphere, SphericalShell, Torus
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 TURN = np.array([[0.36, -0.48, 0.8, 0.1], [0.8, 0.6, 0.0, -0.2], [-0.48, 0.64, 0.6, 0.3], [0, 0, 0, 1]])

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from translucent.diagnosis import Diagnosis, Finding
-from translucent.mesh import Mesh
+from translucent.geometry.diagnosis import Diagnosis, Finding
+from translucent.geometry.mesh import Mesh
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -7,7 +7,7 @@ from typing import Any
 import trimesh
 
 import translucent as tl
-from translucent.render_plan import Capabilities, RenderPlan
+from translucent.planning.render_plan import Capabilities, RenderPlan
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces, name="box")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.albedo import (
+from translucent.media.albedo import (
     CHIANG_MAX_ALBEDO,
     chiang_albedo,
     chiang_color,

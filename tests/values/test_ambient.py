@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.plan import plan
-from translucent.solids import Box
+from translucent.geometry.solids import Box
+from translucent.planning.plan import plan
 
 CUBE = Box().tessellate()
 CAMERA = tl.Camera.look_at((1, 2, 4), (0, 0, 0))

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.animation import write_animation
+from translucent.frames.animation import write_animation
 
 COUNT, HEIGHT, WIDTH = 5, 33, 47
 

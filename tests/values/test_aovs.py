@@ -10,9 +10,18 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.aovs import EMPTY, SEEN, WRONG, aov_pictures, false_colors, marks, thickness_picture, validity_picture
-from translucent.color import luminance, srgb_to_linear
-from translucent.frame import Frame
+from translucent.formulas.color import luminance, srgb_to_linear
+from translucent.frames.aovs import (
+    EMPTY,
+    SEEN,
+    WRONG,
+    aov_pictures,
+    false_colors,
+    marks,
+    thickness_picture,
+    validity_picture,
+)
+from translucent.frames.frame import Frame
 
 
 def frame(scale: float = 1e-3, height: int = 40, width: int = 60) -> Frame:

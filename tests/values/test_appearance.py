@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.appearance import (
+from translucent.frames.appearance import (
     QUANTILES,
     appearance_of,
     average_color,
@@ -17,7 +17,7 @@ from translucent.appearance import (
     medium_for_average_color,
     thickness_samples,
 )
-from translucent.solids import Sphere
+from translucent.geometry.solids import Sphere
 
 TARGETS = [(0.9, 0.5, 0.1), (1.0, 1 - 1e-12, 0.999), (1e-4, 0.01, 0.3)]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from translucent import brdf_table
-from translucent.brdf_table import albedo
-from translucent.brdf_table import brdf_table as table
+from translucent.formulas import brdf_table
+from translucent.formulas.brdf_table import albedo
+from translucent.formulas.brdf_table import brdf_table as table
 
 
 def sampled(n_v: float, roughness: float, count: int = 200_000) -> tuple[np.ndarray, np.ndarray]:

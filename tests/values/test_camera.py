@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import translucent as tl
-from translucent.camera import FRAMING_MARGIN, Camera, check_size, view_ray
+from translucent.scene.camera import FRAMING_MARGIN, Camera, check_size, view_ray
 
 EPS = float(np.finfo(np.float64).eps)
 FRONT = Camera.look_at((0, 0, 5), (0, 0, 0), fov_y=90.0)

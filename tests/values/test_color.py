@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from translucent import color
 from translucent.errors import InputError
+from translucent.formulas import color
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -13,9 +13,9 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent import conversion
-from translucent.color import parse_color, srgb_to_linear, to_hex
-from translucent.conversion import (
+from translucent.formulas.color import parse_color, srgb_to_linear, to_hex
+from translucent.media import conversion
+from translucent.media.conversion import (
     clamp_colors,
     color_at_distance,
     condition_number,
@@ -26,7 +26,7 @@ from translucent.conversion import (
     mean_free_path,
     summary,
 )
-from translucent.swatches import html_swatches
+from translucent.media.swatches import html_swatches
 
 EDGES = np.array([1.0, np.nextafter(1, 0), 1 - 1e-9, 0.5, math.exp(-1), 1e-4, 1e-30, 1e-300, 5e-324])
 

@@ -12,8 +12,8 @@ import pytest
 from scipy.integrate import quad
 
 import translucent as tl
-from translucent.density import Density
-from translucent.solids import Box
+from translucent.geometry.solids import Box
+from translucent.media.density import Density
 
 EPS = float(np.finfo(np.float64).eps)
 NAN = math.nan
@@ -88,7 +88,7 @@ def _cuts(a: float, b: float, voxels: int) -> list[float]:
 def test_many_lines_have_the_means_of_each(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     start, end = rng.random((2, 200, 3))
     whole = DENSITIES["grid"].mean_between(start, end)
-    monkeypatch.setattr("translucent.density.CHUNK", 100)
+    monkeypatch.setattr("translucent.media.density.CHUNK", 100)
     np.testing.assert_array_equal(DENSITIES["grid"].mean_between(start, end), whole)
 
 

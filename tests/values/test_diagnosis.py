@@ -24,7 +24,7 @@ from tests.values.handmade import (
     joined,
     moebius,
 )
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 WITH_NAN = np.vstack([CORNERS[:-1], [[1.0, np.nan, 1.0]]])
 # Corner 0 to corner 2 of a cube, split by a vertex that lies on that edge: a face without area closes the gap.

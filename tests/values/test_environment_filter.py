@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.environment import equirectangular_uv
-from translucent.environment_filter import LEVEL_SIZE, LEVELS, FilteredEnvironment, filtered, irradiance_map
-from translucent.environment_map import EnvironmentMap, row_solid_angles, texel_directions
+from translucent.scene.environment import equirectangular_uv
+from translucent.scene.environment_filter import LEVEL_SIZE, LEVELS, FilteredEnvironment, filtered, irradiance_map
+from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 
 EPS32 = float(np.finfo(np.float32).eps)
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.environment import equirectangular_uv
-from translucent.environment_map import EnvironmentMap, row_solid_angles, texel_directions
+from translucent.scene.environment import equirectangular_uv
+from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 
 EPS = float(np.finfo(np.float64).eps)
 NAN, INF = float("nan"), float("inf")

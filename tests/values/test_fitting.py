@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.fitting import fit_medium, fit_wedge
+from translucent.media.fitting import fit_medium, fit_wedge
 
 SIGMA = np.array([120.0, 40.0, 3.0])
 DISTANCES = np.array([1, 2, 3, 5, 8, 13]) * 1e-3

@@ -14,10 +14,10 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.frame import ARRAYS, Frame, check_output
-from translucent.metrics import interior
-from translucent.paths import write_atomically
-from translucent.render_plan import PassSpec, RenderPlan
+from translucent.files.paths import write_atomically
+from translucent.frames.frame import ARRAYS, Frame, check_output
+from translucent.frames.metrics import interior
+from translucent.planning.render_plan import PassSpec, RenderPlan
 
 PLAN = RenderPlan(tl.SignedDepth(), (PassSpec("signed_depth", "a test", (0,), 1),))
 #: 2 rows of 3 pixels, all numbers different.

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from translucent.grouping import Groups, equal_rows, position_ids, shared_edges, side_ends, used_vertices
+from translucent.geometry.grouping import Groups, equal_rows, position_ids, shared_edges, side_ends, used_vertices
 
 ROWS = arrays.arrays(np.int64, st.tuples(st.integers(1, 30), st.integers(1, 3)), elements=st.integers(-3, 3))
 FACES = arrays.arrays(np.int32, st.tuples(st.integers(1, 20), st.just(3)), elements=st.integers(0, 6))

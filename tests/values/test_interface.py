@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from translucent import interface, optics
+from translucent.formulas import interface, optics
 
 Array = npt.NDArray[np.float64]
 

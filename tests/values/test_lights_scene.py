@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import translucent as tl
-from translucent.environment import checkerboard_share, gradient_share
+from translucent.scene.environment import checkerboard_share, gradient_share
 
 EPS = float(np.finfo(np.float64).eps)
 NAN = math.nan

@@ -28,9 +28,9 @@ from tests.values.handmade import (
     joined,
     moebius,
 )
-from translucent.mesh import Mesh, load_mesh
-from translucent.repair import WELD_TOLERANCE, weld
-from translucent.solids import Sphere, Torus
+from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.repair import WELD_TOLERANCE, weld
+from translucent.geometry.solids import Sphere, Torus
 
 # Welding
 

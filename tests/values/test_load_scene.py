@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 import translucent as tl
 from tests.values.gltf_writer import COLOR, TURN, WINE, Writer, box_file, glass, load
-from translucent.scene import OPAQUE_COLOR
-from translucent.showcase import filled
+from translucent.scene.scene import OPAQUE_COLOR
+from translucent.scene.showcase import filled
 
 # Nodes
 

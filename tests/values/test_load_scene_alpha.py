@@ -156,7 +156,7 @@ def test_occlusion_is_read_with_its_strength(tmp_path: Path) -> None:
 
 
 def test_media_fill_bodies_and_leave_layers(tmp_path: Path) -> None:
-    from translucent.showcase import filled
+    from translucent.scene.showcase import filled
 
     scene = material_scene(tmp_path, SMOKE)
     rock = tl.Object(scene.objects[0].mesh, None)

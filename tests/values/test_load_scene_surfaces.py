@@ -13,10 +13,10 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.color import srgb_to_linear
+from translucent.formulas.color import srgb_to_linear
 from translucent.gltf import images
-from translucent.materials.gltf_texture import TextureTransform
-from translucent.materials.gltf_texture import sample as sample_gltf
+from translucent.gltf.textures import TextureTransform
+from translucent.gltf.textures import sample as sample_gltf
 
 Json = dict[str, Any]
 DIFFUSE = "KHR_materials_diffuse_transmission"

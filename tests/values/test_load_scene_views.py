@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from tests.values.gltf_writer import TURN, box_file, lit_scene, load
-from translucent.showcase import LIGHT_TABLE
+from translucent.scene.showcase import LIGHT_TABLE
 
 # Cameras
 

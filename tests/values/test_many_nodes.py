@@ -13,11 +13,11 @@ import translucent as tl
 from tests.values.gltf_writer import Writer, glass
 from tests.values.plan_scenes import BOX, CAMERA, DIAMOND, GLASS, OPEN, WINE, body
 from tests.work import calls
-from translucent import overlaps
-from translucent.overlaps import first_overlap
-from translucent.plan import plan
-from translucent.showcase import filled
-from translucent.slots import medium_slots
+from translucent.planning.plan import plan
+from translucent.planning.slots import medium_slots
+from translucent.scene import overlaps
+from translucent.scene.overlaps import first_overlap
+from translucent.scene.showcase import filled
 
 #: Twice as many nodes; what is linear takes twice as many calls, but for what is done once.
 FEW, MANY = 60, 120

@@ -16,12 +16,12 @@ from PIL import Image
 
 import translucent as tl
 from tests.values.gltf_json import gltf
-from translucent import optics
+from translucent.formulas import optics
+from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.materials import GltfMaterial, materials_of, read_materials
+from translucent.gltf.scene_media import material_uses, thickness_at, thickness_map, world_thickness
+from translucent.gltf.textures import TextureTransform
 from translucent.materials.color_distance import BLACKEST
-from translucent.materials.gltf import GltfMaterial, materials_of, read_materials
-from translucent.materials.gltf_file import GltfFile, read_gltf
-from translucent.materials.gltf_scene import material_uses, thickness_at, thickness_map, world_thickness
-from translucent.materials.gltf_texture import TextureTransform
 
 COLOR = (0.1, 0.5, 0.9)
 

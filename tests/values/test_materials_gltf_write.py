@@ -12,11 +12,11 @@ import pytest
 
 import translucent as tl
 from tests.values.gltf_json import JADE
+from translucent.gltf.file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.materials import materials_of, read_materials
+from translucent.gltf.scene_media import material_uses
+from translucent.gltf.write import write_medium
 from translucent.materials.color_distance import BLACKEST
-from translucent.materials.gltf import materials_of, read_materials
-from translucent.materials.gltf_file import GltfFile, read_gltf, write_gltf
-from translucent.materials.gltf_scene import material_uses
-from translucent.materials.gltf_write import write_medium
 
 # Writing
 

@@ -13,10 +13,10 @@ import pytest
 
 import translucent as tl
 from tests.values.media import CLEAR, COLOR, GLOW, JADE, MILK, close
+from translucent.gltf.file import GltfFile
+from translucent.gltf.materials import materials_of
 from translucent.materials import TARGETS, load_medium, text_block
 from translucent.materials.color_distance import BLACKEST, color_at, extinction_at
-from translucent.materials.gltf import materials_of
-from translucent.materials.gltf_file import GltfFile
 from translucent.materials.json_text import read_json, write_json
 from translucent.materials.openpbr import read_openpbr, write_openpbr
 from translucent.materials.standard_surface import read_standard_surface, write_standard_surface

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import translucent as tl
-from translucent.color import parse_color
-from translucent.medium import Medium
+from translucent.formulas.color import parse_color
+from translucent.media.medium import Medium
 
 NAN, INF = math.nan, math.inf
 JADE = (0.18, 0.62, 0.35)

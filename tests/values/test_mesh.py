@@ -26,7 +26,7 @@ from tests.values.handmade import (
     joined,
     moebius,
 )
-from translucent.mesh import MAX_COORDINATE, Mesh
+from translucent.geometry.mesh import MAX_COORDINATE, Mesh
 
 # Volume
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh, load_mesh
 
 Array = npt.NDArray[np.float64]
 

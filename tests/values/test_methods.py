@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.thickness import MAX_K, MAX_LAYERS, METHODS, method_from_name
+from translucent.planning.methods import MAX_K, MAX_LAYERS, METHODS, method_from_name
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from translucent import optics
+from translucent.formulas import optics
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.frame import write_png
-from translucent.paths import require_file, require_folder, require_place, write_atomically, write_text_atomically
+from translucent.files.paths import require_file, require_folder, require_place, write_atomically, write_text_atomically
+from translucent.frames.frame import write_png
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def partial_files(folder: Path) -> list[str]:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_what_a_killed_process_left_is_removed_by_the_next_write_of_that_file(tmp_path: Path) -> None:
     code = (
-        "import os, signal, sys, pathlib; from translucent.paths import write_atomically\n"
+        "import os, signal, sys, pathlib; from translucent.files.paths import write_atomically\n"
         "write_atomically(pathlib.Path(sys.argv[1]), lambda path: os.kill(os.getpid(), signal.SIGKILL))\n"
     )
     for name in ("a.png", "b.png"):

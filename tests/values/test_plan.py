@@ -25,8 +25,8 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.plan import COSTS, plan, plan_over_backdrop
-from translucent.render_plan import Capabilities
+from translucent.planning.plan import COSTS, plan, plan_over_backdrop
+from translucent.planning.render_plan import Capabilities
 
 # The table of the planner: what a scene has, the passes it gets, how often geometry is drawn, and whether that is exact
 
@@ -278,7 +278,7 @@ def test_importing_and_planning_loads_no_opengl() -> None:
     code = """
 import sys
 import translucent as tl
-from translucent.render_plan import Capabilities
+from translucent.planning.render_plan import Capabilities
 mesh = tl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 assert tl.plan(tl.showcase(mesh)).exact
 body, fire = tl.Object(mesh, tl.Medium(1.0)), tl.Object(mesh, tl.Medium(emission=1.0))

@@ -8,9 +8,9 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import DIAMOND, OPEN, ORDERED, TORUS, WINE, body, scene, sheet
-from translucent.plan import plan
-from translucent.plan_borders import ONE_BORDER
-from translucent.render_plan import Borders
+from translucent.planning.borders import ONE_BORDER
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Borders
 
 
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), *ORDERED])

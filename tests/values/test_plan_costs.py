@@ -25,8 +25,8 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.plan import COSTS, plan
-from translucent.render_plan import PassSpec, RenderPlan
+from translucent.planning.plan import COSTS, plan
+from translucent.planning.render_plan import PassSpec, RenderPlan
 
 
 @pytest.mark.parametrize(

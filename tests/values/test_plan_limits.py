@@ -8,7 +8,7 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import BOX, DIAMOND, MILK, NO_STORAGE, OPEN, ORDERED, TORUS, body, names, scene, sheet
-from translucent.plan import plan
+from translucent.planning.plan import plan
 
 _APART = BOX.vertices + (5, 0, 0)
 #: One part looks outwards, the other inwards, and neither is inside the other.

@@ -22,8 +22,8 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.plan import plan
-from translucent.render_plan import Capabilities
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities
 
 FACES = len(TORUS.faces)
 

@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import EMBER, FIRE, ORDERED, TORUS, WINE, body, names, scene, sheet
-from translucent.plan import plan
+from translucent.planning.plan import plan
 
 
 @pytest.mark.parametrize("method", ["RayMarched", "signed-depth", tl.ThinLayer, 3])

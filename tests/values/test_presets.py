@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.color import to_hex
-from translucent.presets import PAPERS, Preset, read_presets
+from translucent.formulas.color import to_hex
+from translucent.media.presets import PAPERS, Preset, read_presets
 
 NAMES = sorted(tl.presets())
 MEASURED = [name for name in NAMES if tl.preset(name).kind == "measured"]

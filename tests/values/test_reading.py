@@ -19,16 +19,16 @@ from PIL import Image
 
 import translucent as tl
 from tests.boxes import box_buffer, linked_box
-from translucent import reading
 from translucent.bake.reading import load_thickness_map
 from translucent.bench.codec import Packed
-from translucent.fitting import fit_wedge
+from translucent.files import reading
+from translucent.files.reading import json_value, open_file, require_room, toml_value
+from translucent.gltf.write import write_medium
 from translucent.materials import load_medium
-from translucent.materials.gltf_write import write_medium
 from translucent.materials.usd import read_usda
-from translucent.pixel import pixel_color
-from translucent.presets import read_presets
-from translucent.reading import json_value, open_file, require_room, toml_value
+from translucent.media.fitting import fit_wedge
+from translucent.media.pixel import pixel_color
+from translucent.media.presets import read_presets
 
 JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
 

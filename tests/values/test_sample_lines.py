@@ -7,9 +7,9 @@ import pytest
 
 import translucent as tl
 from translucent.bench.shapes import backward_window, bow_tie, inside_out_slab_beside_an_open_box, nested_shells
-from translucent.plan import plan
-from translucent.sample_lines import winds_negatively
-from translucent.solids import Box, Sphere, Torus
+from translucent.geometry.sample_lines import winds_negatively
+from translucent.geometry.solids import Box, Sphere, Torus
+from translucent.planning.plan import plan
 
 CAMERA = tl.Camera.look_at((0, 0, 4), (0, 0, 0))
 

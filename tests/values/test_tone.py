@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.tone import TONES, agx_sigmoid, tone_agx, tone_curve, tone_neutral
+from translucent.formulas.tone import TONES, agx_sigmoid, tone_agx, tone_curve, tone_neutral
 
 GREYS = np.concatenate([[0.0], np.geomspace(1e-30, 1e6, 2000)])[:, None] * np.ones(3)
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from translucent import two_stream
-from translucent.camera import Camera
-from translucent.environment import Environment
-from translucent.medium import Medium
+from translucent.formulas import two_stream
+from translucent.geometry.solids import Box
+from translucent.media.medium import Medium
 from translucent.reference import path_trace
-from translucent.scene import Object, Scene
-from translucent.solids import Box
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Scene
 
 EPS = float(np.finfo(np.float64).eps)
 

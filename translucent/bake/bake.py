@@ -23,8 +23,8 @@ from translucent.bake.unwrap import Unwrapped, in_tile, unwrap
 from translucent.bake.work import Progress, bake_strips
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentWarning
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.media.medium import Medium
 
 #: Share of the surface that may have no texel of its own before a warning says so, and how many texels per face a map
 #: has that could show all.

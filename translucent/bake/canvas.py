@@ -13,9 +13,9 @@ import numpy.typing as npt
 from translucent.bake.settings import BakeSettings
 from translucent.bake.strips import COUNTS, Strip
 from translucent.errors import InputError
-from translucent.mesh import Mesh
-from translucent.paths import write_atomically
-from translucent.unpacking import read_arrays
+from translucent.files.paths import write_atomically
+from translucent.files.unpacking import read_arrays
+from translucent.geometry.mesh import Mesh
 from translucent.version import VERSION
 
 #: Seconds between writes of a checkpoint, and how many times longer than the last write they are at least.

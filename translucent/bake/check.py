@@ -17,18 +17,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bake.gltf_maps import wrapping
-from translucent.camera import Camera
+from translucent.bake.gltf.maps import wrapping
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.renderer import CpuRenderer
 from translucent.errors import InputError
-from translucent.frame import Frame
-from translucent.materials.gltf_texture import sample
-from translucent.medium import Medium
-from translucent.mesh import Mesh
-from translucent.metrics import Errors, compare
-from translucent.plan import plan
-from translucent.showcase import showcase
+from translucent.frames.frame import Frame
+from translucent.frames.metrics import Errors, compare
+from translucent.geometry.mesh import Mesh
+from translucent.gltf.textures import sample
+from translucent.media.medium import Medium
+from translucent.planning.plan import plan
+from translucent.scene.camera import Camera
+from translucent.scene.showcase import showcase
 
 Array = npt.NDArray[np.float64]
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 from translucent.bake.check import MapCheck, NotSeenError, check_map
 from translucent.bake.check_uv import mesh_corners, own_corners, placed_around, placed_corners, require_uv_of
-from translucent.bake.gltf_bodies import Bodies
+from translucent.bake.gltf.bodies import Bodies
 from translucent.bake.jobs import has_parts, stays_gltf
 from translucent.bake.reading import load_thickness_map
 from translucent.bake.record import parts_of
 from translucent.errors import InputError
-from translucent.materials.gltf import GltfMaterial, materials_of
-from translucent.materials.gltf_file import GltfFile, read_gltf
-from translucent.materials.gltf_scene import thickness_map
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.materials import GltfMaterial, materials_of
+from translucent.gltf.scene_media import thickness_map
+from translucent.media.medium import Medium
 from translucent.units import metres_per_unit
 
 #: By the name of a mesh; None where the rest of its body hides it.

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from translucent.color import linear_to_srgb
-from translucent.paths import write_atomically
+from translucent.files.paths import write_atomically
+from translucent.formulas.color import linear_to_srgb
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bake.gltf_bodies import Bodies, first_transforms, transformed
+from translucent.bake.gltf.bodies import Bodies, first_transforms, transformed
 from translucent.bake.record import Record
 from translucent.errors import RenderError, TranslucentWarning
+from translucent.geometry.mesh import Mesh
 from translucent.gltf.accessors import Accessors
-from translucent.materials.gltf import GltfMaterial
-from translucent.materials.gltf_file import GltfFile
-from translucent.mesh import Mesh
+from translucent.gltf.file import GltfFile
+from translucent.gltf.materials import GltfMaterial
 
 Array = npt.NDArray[np.float64]
 #: Positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from translucent.bake.surface import Points, Surface, blend
 from translucent.bake.unwrap import Unwrapped
 from translucent.errors import InputError
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
 

@@ -50,10 +50,10 @@ from translucent.bake.record import Record, file_hash, files_of, read_record
 from translucent.bake.thickness_map import ThicknessMap, VertexThickness
 from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output, save_map, save_vertices
 from translucent.errors import InputError
+from translucent.files.reading import read_bytes
+from translucent.geometry.mesh import Mesh, load_mesh
 from translucent.gltf.load import SUFFIXES
-from translucent.medium import Medium
-from translucent.mesh import Mesh, load_mesh
-from translucent.reading import read_bytes
+from translucent.media.medium import Medium
 from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
@@ -161,7 +161,7 @@ def _parts(path: Path, allow_outside: bool) -> list[bytes]:
     """A file and, of a .gltf, what it links to."""
     data = [read_bytes(path, f"mesh {str(path)!r}")]
     if path.suffix.lower() in SUFFIXES:
-        from translucent.materials.gltf_file import read_gltf
+        from translucent.gltf.file import read_gltf
 
         file = read_gltf(path, allow_outside)
         holders = [*file.items("buffers"), *file.items("images")]
@@ -216,7 +216,7 @@ def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Resul
     output = Path(job["output"])
     about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
     if has_parts(job):
-        from translucent.bake.gltf_bake import bake_gltf
+        from translucent.bake.gltf.bake import bake_gltf
 
         return bake_gltf(job, about, progress)
     mesh = load_mesh(job["model"], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))

@@ -12,14 +12,14 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from translucent.bake.glb_builder import GlbBuilder
-from translucent.bake.gltf_bodies import Place, primitive_name
-from translucent.bake.gltf_targets import Target
+from translucent.bake.gltf.bodies import Place, primitive_name
+from translucent.bake.gltf.builder import GlbBuilder
+from translucent.bake.gltf.targets import Target
 from translucent.bake.record import Record, shared, write_common_record
 from translucent.bake.thickness_map import ThicknessMap
 from translucent.bake.writing import save_map, write_uv_file
-from translucent.materials.gltf_file import GltfFile
-from translucent.paths import remove_partial
+from translucent.files.paths import remove_partial
+from translucent.gltf.file import GltfFile
 
 #: Most characters of the name of a map, and what beside letters and digits neither file systems nor shells mind.
 _LONGEST, _SAFE = 60, "._-"

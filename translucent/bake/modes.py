@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.bake.settings import BakeSettings
-from translucent.color import LUMINANCE_WEIGHTS
+from translucent.formulas.color import LUMINANCE_WEIGHTS
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

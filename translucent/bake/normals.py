@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from translucent.grouping import position_ids
+from translucent.geometry.grouping import position_ids
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

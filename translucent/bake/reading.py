@@ -12,9 +12,9 @@ from translucent.bake.encoding import Encoding
 from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
 from translucent.errors import InputError, TranslucentError
-from translucent.paths import require_file
-from translucent.reading import open_file, read_bytes
-from translucent.unpacking import open_picture, read_array, read_arrays, read_exr
+from translucent.files.paths import require_file
+from translucent.files.reading import open_file, read_bytes
+from translucent.files.unpacking import open_picture, read_array, read_arrays, read_exr
 
 Array = npt.NDArray[np.float64]
 

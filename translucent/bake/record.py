@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from translucent.paths import write_text_atomically
-from translucent.reading import json_value, read_text
+from translucent.files.paths import write_text_atomically
+from translucent.files.reading import json_value, read_text
 from translucent.version import VERSION
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from translucent.errors import InputError
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 
 Mode = Literal["normal", "cone", "transmittance", "inscribed", "local"]
 Weighting = Literal["cosine", "uniform"]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from translucent.bake.normals import CREASE, corner_normals
 from translucent.cpu.embree import EmbreeMesh
 from translucent.errors import InputError
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.bake.settings import BakeSettings
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]

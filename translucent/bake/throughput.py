@@ -21,7 +21,7 @@ from translucent.bake.surface import Points, Surface
 from translucent.bake.texels import Atlas
 from translucent.bake.unwrap import Unwrapped, unwrap
 from translucent.cpu.threads import in_threads, processors
-from translucent.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh, load_mesh
 
 #: Rays that Embree alone traces in a round: enough for some seconds, and little memory.
 SAMPLE = 1 << 23

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.extras import require_package
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -17,9 +17,9 @@ from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import BakeReport, VertexThickness
 from translucent.bake.work import Progress, in_order
 from translucent.errors import TranslucentWarning
-from translucent.grouping import position_ids
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.geometry.grouping import position_ids
+from translucent.geometry.mesh import Mesh
+from translucent.media.medium import Medium
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

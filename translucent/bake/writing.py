@@ -33,11 +33,11 @@ from translucent.bake.encoding import Encoding
 from translucent.bake.record import DEFINITIONS, Record, describe, fingerprint, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
 from translucent.extras import require_package
-from translucent.paths import remove_partial, require_place, write_atomically
+from translucent.files.paths import remove_partial, require_place, write_atomically
 
 if TYPE_CHECKING:
     from translucent.bake.thickness_map import ThicknessMap, VertexThickness
-    from translucent.materials.gltf_file import GltfFile
+    from translucent.gltf.file import GltfFile
 
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
@@ -95,15 +95,15 @@ def save_map(
     suffix = check_map_output(path, normalize=normalize, invert=invert)
     unit = unit_of(result.settings.mode)
     if suffix == ".glb":
-        from translucent.bake.gltf_export import mesh_file
-        from translucent.bake.gltf_maps import write_maps
+        from translucent.bake.gltf.export import mesh_file
+        from translucent.bake.gltf.maps import write_maps
 
         return write_maps(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
     levels = PNG_LEVELS if suffix == ".png" else 0
     encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=unit)
     about = dict(about or {})
     if result.report.uv_from == "xatlas":
-        from translucent.bake.gltf_export import mesh_file
+        from translucent.bake.gltf.export import mesh_file
 
         about["uv_file"] = write_uv_file(mesh_file(result.mesh), path)
     write_atomically(path, partial(_WRITERS[suffix], _Task(result, encoding)))
@@ -112,7 +112,7 @@ def save_map(
 
 def write_uv_file(model: GltfFile, path: Path) -> Record:
     """Write a model with new UVs beside the map at `path` that belongs to them; its name and hash."""
-    from translucent.materials.gltf_file import write_gltf
+    from translucent.gltf.file import write_gltf
 
     place = path.with_name(f"{path.name}{UV_SUFFIX}")
     remove_partial(place)
@@ -231,8 +231,8 @@ def save_vertices(result: VertexThickness, path: str | Path, *, about: Record | 
     path = Path(path)
     suffix = check_map_output(path, VERTEX_SUFFIXES)
     if suffix == ".glb":
-        from translucent.bake.gltf_export import mesh_file
-        from translucent.bake.gltf_vertices import write_vertices
+        from translucent.bake.gltf.export import mesh_file
+        from translucent.bake.gltf.vertices import write_vertices
 
         return write_vertices(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
     values = np.ascontiguousarray(result.values, dtype=np.float32)

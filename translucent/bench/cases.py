@@ -12,16 +12,16 @@ import numpy as np
 from translucent.assets import mesh_path
 from translucent.bench.contenders import Effect
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, subdivided
-from translucent.camera import Camera
-from translucent.density import DensityGrid
-from translucent.environment import Environment
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh, load_mesh
-from translucent.scene import Object, Scene
-from translucent.showcase import framing, showcase
-from translucent.solids import Box, Sphere, Torus
-from translucent.surface import Surface
+from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.solids import Box, Sphere, Torus
+from translucent.media.density import DensityGrid
+from translucent.media.medium import Medium
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import framing, showcase
+from translucent.scene.surface import Surface
 
 Size = tuple[int, int]
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.reading import json_value
+from translucent.files.reading import json_value
 
 #: Of an array, in bytes once unpacked: a damaged file must not fill the memory.
 _LARGEST = 1 << 28

@@ -9,9 +9,7 @@ from typing import Literal, get_args
 
 from translucent.bench.row import Kind
 from translucent.errors import InputError
-from translucent.render_plan import Borders
-from translucent.scene import Scene
-from translucent.thickness import (
+from translucent.planning.methods import (
     MAX_LAYERS,
     BackFaceDepth,
     DepthPeeling,
@@ -23,6 +21,8 @@ from translucent.thickness import (
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.render_plan import Borders
+from translucent.scene.scene import Scene
 
 #: How a contender is drawn: by the plan for its method, by a shortcut of the bench, or without OpenGL.
 Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march"]

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from translucent import reference
 from translucent.bench.timing import Sample
-from translucent.frame import Frame
+from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.depth_only import DepthOnlyPass
@@ -16,10 +16,10 @@ from translucent.gpu.passes.shortcuts import Shortcut
 from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
-from translucent.render_plan import PassSpec, RenderPlan
+from translucent.planning.methods import RayMarched, SignedDepth
+from translucent.planning.render_plan import PassSpec, RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Scene
-from translucent.thickness import RayMarched, SignedDepth
+from translucent.scene.scene import Scene
 
 Size = tuple[int, int]
 

@@ -10,8 +10,8 @@ from typing import Any, get_args, get_type_hints
 
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
-from translucent.paths import write_text_atomically
-from translucent.reading import read_text
+from translucent.files.paths import write_text_atomically
+from translucent.files.reading import read_text
 
 #: Bytes of a report: it holds pictures.
 _LARGEST = 1 << 28

@@ -9,10 +9,10 @@ import numpy as np
 from translucent.bench.contenders import Contender
 from translucent.bench.drawing import Size, Studio
 from translucent.bench.staging import drawing, plan_of
-from translucent.frame import Frame
+from translucent.frames.frame import Frame
 from translucent.gpu.targets import Targets
-from translucent.scene import Scene
-from translucent.thickness import ThinLayer
+from translucent.planning.methods import ThinLayer
+from translucent.scene.scene import Scene
 
 
 def fitted(studio: Studio, contender: Contender, scene: Scene, truth: Frame, size: Size) -> tuple[Contender, float]:

@@ -20,12 +20,12 @@ from translucent.bench.staging import drawing, plan_of, seen_by
 from translucent.bench.timing import Samples, interleaved, ratio, timing
 from translucent.bench.truth import Truth
 from translucent.errors import InputError, TranslucentError, TranslucentWarning
-from translucent.frame import Frame
+from translucent.frames.frame import Frame
 from translucent.gpu.targets import Targets
-from translucent.render_plan import RenderPlan
+from translucent.planning.methods import DepthPeeling
+from translucent.planning.render_plan import RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Scene
-from translucent.thickness import DepthPeeling
+from translucent.scene.scene import Scene
 
 #: By which quantity the methods of a case are ranked.
 QUANTITY: dict[str, Quantity] = {

@@ -12,7 +12,7 @@ from translucent import reference
 from translucent.bench.cases import Case, Size
 from translucent.bench.contenders import Effect
 from translucent.errors import InputError
-from translucent.scene import Object, Scene
+from translucent.scene.scene import Object, Scene
 
 #: A model is no solid if the reference can trust less than this share of the pixels that it covers ...
 LEAST_VALID = 0.5

@@ -14,8 +14,8 @@ from translucent.bench.page.figure import require_packages
 from translucent.bench.page.overview import has_overview, write_overview
 from translucent.bench.record import Report
 from translucent.errors import RenderError
-from translucent.folders import made_folder
-from translucent.paths import require_folder
+from translucent.files.folders import made_folder
+from translucent.files.paths import require_folder
 
 
 @contextmanager

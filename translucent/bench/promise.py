@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from translucent.bench.contenders import Contender
 from translucent.bench.row import Quantity
-from translucent.render_plan import RenderPlan
-from translucent.scene import Object, Scene
-from translucent.thickness import RayMarched
+from translucent.planning.methods import RayMarched
+from translucent.planning.render_plan import RenderPlan
+from translucent.scene.scene import Object, Scene
 
 
 def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:

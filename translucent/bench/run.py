@@ -11,14 +11,14 @@ from translucent.bench.cases import CASES, Case, Size
 from translucent.bench.claims import check_claims
 from translucent.bench.contenders import check_names, contenders
 from translucent.bench.drawing import Studio
-from translucent.bench.hard_cases import measure_hard_cases
+from translucent.bench.hard.cases import measure_hard_cases
 from translucent.bench.machine import provenance
 from translucent.bench.measure import CaseRun
 from translucent.bench.record import Report
 from translucent.bench.scaling import ScalingRun
-from translucent.camera import check_size
 from translucent.errors import RenderError
 from translucent.renderer import Renderer
+from translucent.scene.camera import check_size
 
 #: Size of the timed frames.
 FULL_SIZE: Size = (512, 512)

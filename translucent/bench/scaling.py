@@ -14,16 +14,16 @@ from translucent.bench.measure import one_line
 from translucent.bench.record import ScalePoint, Series
 from translucent.bench.shapes import lying_torus, plates
 from translucent.bench.timing import Samples, interleaved, ratio, timing
-from translucent.camera import Camera
-from translucent.environment import Environment
 from translucent.errors import TranslucentError
+from translucent.geometry.solids import Sphere
 from translucent.gpu.targets import Targets
-from translucent.medium import Medium
-from translucent.scene import Object, Scene
-from translucent.showcase import framing, showcase
-from translucent.slots import MAX_SLOTS
-from translucent.solids import Sphere
-from translucent.thickness import MAX_LAYERS, DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth
+from translucent.media.medium import Medium
+from translucent.planning.methods import MAX_LAYERS, DepthPeeling, FragmentLists, KBuffer, Method, SignedDepth
+from translucent.planning.slots import MAX_SLOTS
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import framing, showcase
 
 Axis = Literal["triangles", "pixels", "layers", "media"]
 

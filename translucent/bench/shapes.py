@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.assets import mesh_path
-from translucent.mesh import Mesh, load_mesh
-from translucent.solids import Box, Sphere, Torus
+from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.solids import Box, Sphere, Torus
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]

@@ -9,10 +9,10 @@ from translucent.bench.drawing import Drawing, OnProcessor, Planned, Short, Stud
 from translucent.errors import InputError
 from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFacePass, Shortcut, UnmarkedBackFacePass
 from translucent.gpu.targets import Targets
-from translucent.render_plan import RenderPlan
+from translucent.planning.methods import BackFaceDepth, RayMarched, SignedDepth
+from translucent.planning.render_plan import RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Object, Scene
-from translucent.thickness import BackFaceDepth, RayMarched, SignedDepth
+from translucent.scene.scene import Object, Scene
 
 
 def seen_by(contender: Contender, scene: Scene) -> Scene:

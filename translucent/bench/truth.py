@@ -19,9 +19,9 @@ from translucent.bench.record import Picture
 from translucent.bench.row import ColorDifference, Errors, Quantity
 from translucent.bench.seeing import color_difference
 from translucent.errors import InputError
-from translucent.frame import Frame
-from translucent.metrics import compare, interior
-from translucent.scene import Scene
+from translucent.frames.frame import Frame
+from translucent.frames.metrics import compare, interior
+from translucent.scene.scene import Scene
 
 #: Reflections that the reference follows where borders bend rays; what it leaves then is below the errors shown.
 BOUNCES = 12

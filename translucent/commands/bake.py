@@ -177,7 +177,7 @@ def _bake_many(
     as_json: bool,
 ) -> None:
     from translucent.bake.batch import BatchReport, bake_many
-    from translucent.folders import made_folder
+    from translucent.files.folders import made_folder
 
     if jobs is not None and dask is not None:
         raise InputError(f"--jobs {jobs}", "--dask is given, too", "its workers are as many as they are; leave one out")

@@ -16,11 +16,11 @@ from translucent.errors import InputError
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from translucent.environment import Environment
-    from translucent.medium import Medium
-    from translucent.thickness import Method
+    from translucent.media.medium import Medium
+    from translucent.planning.methods import Method
+    from translucent.scene.environment import Environment
 
-#: Of tone curves, as in `translucent.tone.TONES`, which only rendering imports.
+#: Of tone curves, as in `translucent.formulas.tone.TONES`, which only rendering imports.
 TONE_NAMES = ("none", "neutral", "agx")
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -88,7 +88,7 @@ def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
         What the verb was given to read: files, also with what an option adds, as in ``sky.hdr,90``, or other names. The
         files that a glTF file links to are read, too.
     """
-    from translucent.paths import same_file
+    from translucent.files.paths import same_file
 
     # What is not there yet can be none of them.
     if click.get_current_context().meta.get(_OVERWRITE) or not os.path.exists(output):
@@ -105,8 +105,8 @@ def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
 
 def _linked_files(name: str) -> list[Path]:
     """The files that a glTF file links to."""
+    from translucent.gltf.file import read_gltf
     from translucent.gltf.load import SUFFIXES
-    from translucent.materials.gltf_file import read_gltf
 
     if Path(name).suffix.lower() not in SUFFIXES or not os.path.isfile(name):
         return []
@@ -144,8 +144,8 @@ def read_medium(
     color: str | None, distance: str | None, preset_name: str | None, clamp: bool | None = None
 ) -> Medium | None:
     """The medium that the options choose, if they do."""
-    from translucent.medium import Medium
-    from translucent.presets import preset
+    from translucent.media.medium import Medium
+    from translucent.media.presets import preset
     from translucent.units import parse_length
 
     if preset_name is not None:
@@ -169,8 +169,8 @@ def read_medium(
 
 def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     """The color without channels that are too dark, and a line for the user where there were any."""
-    from translucent.color import parse_color
-    from translucent.conversion import CLAMP, clamp_colors
+    from translucent.formulas.color import parse_color
+    from translucent.media.conversion import CLAMP, clamp_colors
 
     triple, changed = clamp_colors(parse_color(color))
     # As it was written, if nothing is to be done: errors tell it so.
@@ -179,7 +179,7 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
 
 def read_method(name: str | None, thickness: str | None) -> Method | None:
     """The thickness method of this name, if there is one."""
-    from translucent.thickness import ThinLayer, method_from_name
+    from translucent.planning.methods import ThinLayer, method_from_name
     from translucent.units import parse_length
 
     method = method_from_name(name) if name else None
@@ -221,7 +221,7 @@ def look_options(command: F) -> F:
 
 def read_environment(name: str | None, background: str | None) -> Environment | None:
     """What the options name; None if they name nothing."""
-    from translucent.showcase import LIGHT_TABLE
+    from translucent.scene.showcase import LIGHT_TABLE
 
     if background is None:
         return None if name is None else _environment(name)
@@ -229,8 +229,8 @@ def read_environment(name: str | None, background: str | None) -> Environment | 
 
 
 def _environment(text: str) -> Environment:
-    from translucent.environment_files import READERS
-    from translucent.showcase import named_environment
+    from translucent.scene.environment_files import READERS
+    from translucent.scene.showcase import named_environment
 
     name, rotation = text, 0.0
     head, comma, tail = text.rpartition(",")
@@ -244,7 +244,7 @@ def _environment(text: str) -> Environment:
 
 def read_size(text: str) -> tuple[int, int]:
     """Width and height of an option."""
-    from translucent.camera import check_size
+    from translucent.scene.camera import check_size
 
     try:
         width, height = (int(part) for part in text.lower().split("x"))

@@ -8,7 +8,7 @@ import click
 
 from translucent.errors import printable
 
-#: Ends of lines, tabs, and swatches such as those of `translucent.swatches`.
+#: Ends of lines, tabs, and swatches such as those of `translucent.media.swatches`.
 _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 

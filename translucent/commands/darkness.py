@@ -11,9 +11,9 @@ from translucent.commands.console import echo
 from translucent.units import METRES_PER_UNIT, metres_per_unit
 
 if TYPE_CHECKING:
-    from translucent.frame import Frame
-    from translucent.medium import Medium
-    from translucent.scene import Scene
+    from translucent.frames.frame import Frame
+    from translucent.media.medium import Medium
+    from translucent.scene.scene import Scene
 
 #: Below these shares of light, passed straight or scattered back, a picture shows little but black.
 NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
@@ -95,8 +95,8 @@ def _media(scene: Scene) -> list[Medium]:
 
 def _given_back(scene: Scene, medium: Medium) -> float:
     """Luminance of what a body as large as the scene gives back of white light."""
-    from translucent.color import luminance
-    from translucent.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
+    from translucent.formulas.color import luminance
+    from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
 
     absorbed = two_stream_absorption(medium.absorption) * scene.diagonal
     turned = two_stream_scattering(medium.scattering, medium.anisotropy) * scene.diagonal

@@ -20,9 +20,9 @@ from translucent.commands.console import echo
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
-    from translucent.mesh import Mesh
-    from translucent.render_plan import Borders, RenderPlan
-    from translucent.scene import Object, Scene
+    from translucent.geometry.mesh import Mesh
+    from translucent.planning.render_plan import Borders, RenderPlan
+    from translucent.scene.scene import Object, Scene
 
 
 @click.command(epilog="Example: translucent explain goblet")
@@ -49,7 +49,7 @@ def explain(
 
     Of a .glb or .gltf file, the scene that it is, with the media of its materials.
     """
-    from translucent.plan import plan
+    from translucent.planning.plan import plan
 
     medium = read_medium(color, distance, preset_name, clamp)
     scene = read_scene(model, unit, medium, allow_outside=allow_outside)

@@ -25,9 +25,9 @@ from translucent.commands.on_model import doubts_on, report_on, thickness_on, to
 from translucent.errors import InputError, TranslucentError
 
 if TYPE_CHECKING:
-    from translucent.fitting import Fit
-    from translucent.frame import Frame
-    from translucent.medium import Medium
+    from translucent.frames.frame import Frame
+    from translucent.media.fitting import Fit
+    from translucent.media.medium import Medium
 
 TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", "usd", "css", "json")
 
@@ -75,7 +75,7 @@ def extinction(
     With --on MODEL and no DISTANCE, the medium in which that model shows COLOR on average, over the pixels that it
     covers before white light; with a DISTANCE, --preset or --from, the average color that this medium shows on it.
     """
-    from translucent.color import QUOTE_HINT
+    from translucent.formulas.color import QUOTE_HINT
     from translucent.units import metres_per_unit
 
     metres_per_unit(unit_out)
@@ -139,11 +139,11 @@ def _convert(
     """What there is to say of a medium: a given one, one for a color at a distance, or one for a color on a model."""
     import numpy as np
 
-    from translucent.appearance import medium_for_average_color, thickness_samples
-    from translucent.color import parse_color
-    from translucent.conversion import summary
+    from translucent.formulas.color import parse_color
+    from translucent.frames.appearance import medium_for_average_color, thickness_samples
     from translucent.materials.color_distance import color_at
-    from translucent.medium import Medium
+    from translucent.media.conversion import summary
+    from translucent.media.medium import Medium
     from translucent.units import parse_length
 
     wanted, changes = clamped(color) if clamp and color is not None else (color or "", [])
@@ -173,8 +173,8 @@ def _tell(told: dict[str, Any], medium: Medium, stated: float, target: str | Non
 
 
 def _report(told: dict[str, Any]) -> str:
-    from translucent.color import to_hex
-    from translucent.swatches import terminal_strip
+    from translucent.formulas.color import to_hex
+    from translucent.media.swatches import terminal_strip
 
     distance, colors = told["distance"], told["transmittance"]
     lines = report_on(told["on"]) if "on" in told else []
@@ -204,8 +204,8 @@ def _infinite(values: list[float | None]) -> list[float]:
 
 
 def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bool) -> None:
-    from translucent.batch import check_batch_output, convert_table
-    from translucent.conversion import CLAMP
+    from translucent.media.batch import check_batch_output, convert_table
+    from translucent.media.conversion import CLAMP
 
     if output is not None:
         check_batch_output(output)
@@ -230,8 +230,8 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
 def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: bool) -> None:
     import numpy as np
 
-    from translucent.conversion import summary
-    from translucent.fitting import fit_wedge
+    from translucent.media.conversion import summary
+    from translucent.media.fitting import fit_wedge
 
     fit = fit_wedge(table, unit)
     distance = float(np.median(fit.distances))

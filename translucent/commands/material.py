@@ -21,7 +21,7 @@ from translucent.commands.console import echo
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.materials.gltf import GltfMaterial
+    from translucent.gltf.materials import GltfMaterial
 
 
 @click.group(epilog="Example: translucent material show model.glb")
@@ -34,7 +34,7 @@ def material() -> None:
 @common_options
 def show(model: str, as_json: bool) -> None:
     """List the materials of MODEL, a .glb or .gltf file, with the volume that each of them states."""
-    from translucent.materials.gltf import read_materials
+    from translucent.gltf.materials import read_materials
 
     found = read_materials(model)
     if as_json:
@@ -97,7 +97,7 @@ def apply(
     as_json: bool,
 ) -> None:
     """Write a medium into MODEL's materials; a color leaves them their index of refraction, a preset brings its own."""
-    from translucent.materials.gltf_write import write_medium
+    from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
     medium = read_medium(color, distance, preset_name, clamp)

@@ -12,11 +12,11 @@ import numpy as np
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.camera import Camera
-    from translucent.environment import Environment
-    from translucent.medium import Medium
-    from translucent.mesh import Mesh
-    from translucent.scene import Object, Scene
+    from translucent.geometry.mesh import Mesh
+    from translucent.media.medium import Medium
+    from translucent.scene.camera import Camera
+    from translucent.scene.environment import Environment
+    from translucent.scene.scene import Object, Scene
 
 #: Of a camera that options place, and that no option says otherwise of.
 DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
@@ -58,7 +58,7 @@ def read_scene(
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
     from translucent.gltf.load import load_scene
-    from translucent.showcase import filled, finished, showcase
+    from translucent.scene.showcase import filled, finished, showcase
 
     view = view or View()
     if view.camera is not None and view.placed:
@@ -97,7 +97,7 @@ def is_own(model: str) -> bool:
 
 def read_mesh(model: str, unit: str, allow_outside: bool = False) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
-    from translucent.mesh import load_mesh
+    from translucent.geometry.mesh import load_mesh
 
     return load_mesh(mesh_file(model, unit), unit=unit, allow_outside=allow_outside)
 
@@ -123,8 +123,8 @@ def mesh_file(model: str, unit: str) -> str:
 
 def _placed_camera(scene: Scene, view: View, size: tuple[int, int]) -> Camera:
     """The camera that the options place, or that frames all objects as they say."""
-    from translucent.camera import Camera
-    from translucent.showcase import framing
+    from translucent.scene.camera import Camera
+    from translucent.scene.showcase import framing
 
     up, fov = read_vector("--up", view.up or DEFAULT_UP), DEFAULT_FOV if view.fov is None else view.fov
     if view.eye is None:
@@ -159,7 +159,7 @@ def medium_lines(scene: Scene) -> list[str]:
 
 
 def _medium_text(medium: Medium, bodies: list[Object], *, several: bool) -> str:
-    from translucent.color import to_hex
+    from translucent.formulas.color import to_hex
 
     names = ", ".join(sorted({repr(body.mesh.name) for body in bodies}))
     whose = f"{names}: " if several else ""

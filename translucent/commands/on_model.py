@@ -8,8 +8,8 @@ from translucent.commands.common import triple_text
 from translucent.commands.model import View, read_scene
 
 if TYPE_CHECKING:
-    from translucent.frame import Frame
-    from translucent.medium import Medium
+    from translucent.frames.frame import Frame
+    from translucent.media.medium import Medium
 
 #: Pixels of the picture that is averaged; of the shape of the one that ``translucent render`` makes, and so framed.
 SIZE = (640, 360)
@@ -30,7 +30,7 @@ def thickness_on(model: str, unit: str, eye: str | None, allow_outside: bool = F
 
 def told_on(model: str, frame: Frame, medium: Medium) -> dict[str, Any]:
     """How a medium looks on a model, as JSON can hold it."""
-    from translucent.appearance import appearance_of
+    from translucent.frames.appearance import appearance_of
 
     return {"model": model, **appearance_of(frame, medium).summary()}
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from translucent.frame import Frame
-    from translucent.scene import Scene
+    from translucent.frames.frame import Frame
+    from translucent.scene.scene import Scene
 
 
 class Pictures(NamedTuple):
@@ -31,9 +31,9 @@ class Pictures(NamedTuple):
 
     def check(self) -> None:
         """Raise before any work is done where they could not be written."""
-        from translucent.animation import check_animation
-        from translucent.frame import check_exposure, check_output
-        from translucent.paths import require_folder
+        from translucent.files.paths import require_folder
+        from translucent.frames.animation import check_animation
+        from translucent.frames.frame import check_exposure, check_output
 
         check_exposure(self.exposure)
         if self.aov is not None:
@@ -56,8 +56,8 @@ class Pictures(NamedTuple):
         return frame
 
     def _write_turntable(self, scene: Scene, draw: Callable[[Scene], Frame], count: int) -> Frame:
-        from translucent.animation import write_animation
-        from translucent.turntable import turntable
+        from translucent.frames.animation import write_animation
+        from translucent.scene.turntable import turntable
 
         views = turntable(scene, count)
         first = draw(next(views))

@@ -14,7 +14,7 @@ from translucent.commands.common import common_options, triple_text
 from translucent.commands.console import echo
 
 if TYPE_CHECKING:
-    from translucent.presets import Preset
+    from translucent.media.presets import Preset
 
 _LISTED = ("name", "kind", "regime", "colors", "source")
 
@@ -24,7 +24,7 @@ _LISTED = ("name", "kind", "regime", "colors", "source")
 @click.pass_context
 def presets(context: click.Context, as_json: bool) -> None:
     """List the named media: what they do to light, and their colors after 1 mm, 1 cm and 10 cm."""
-    from translucent.presets import presets as all_presets
+    from translucent.media.presets import presets as all_presets
 
     if context.invoked_subcommand is not None:
         return
@@ -42,7 +42,7 @@ def presets(context: click.Context, as_json: bool) -> None:
 @click.pass_context
 def show(context: click.Context, name: str, as_json: bool) -> None:
     """Print everything about the medium NAME: coefficients, colors, source, and what absorption alone is worth."""
-    from translucent.presets import preset
+    from translucent.media.presets import preset
 
     one = preset(name)
     above = context.parent.params if context.parent else {}
@@ -67,7 +67,7 @@ def _table(found: list[Preset]) -> str:
 
 
 def _details(one: Preset) -> str:
-    from translucent.presets import PAPERS
+    from translucent.media.presets import PAPERS
 
     rows = [
         ("name", ", ".join((one.name, *one.aliases))),

@@ -38,7 +38,7 @@ from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.render_plan import Borders
+    from translucent.planning.render_plan import Borders
 
 
 @click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
@@ -116,7 +116,7 @@ def render(
     replaces them. All other files are one mesh.
     """
     import translucent as tl
-    from translucent.turntable import framed_all_around
+    from translucent.scene.turntable import framed_all_around
 
     if transparent and (opaque_with is not None or output.suffix.lower() == ".mp4"):
         other = "--opaque-with, which draws what is behind" if opaque_with else "a film, which holds no alpha"

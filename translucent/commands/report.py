@@ -27,7 +27,7 @@ from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
     from translucent.bench.record import CaseRecord, Report
-    from translucent.medium import Medium
+    from translucent.media.medium import Medium
 
 #: How the names of the cases begin that users bring.
 MODEL_CASE = "model "

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import RenderError
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 if TYPE_CHECKING:
     from embreex.rtcore_scene import EmbreeScene

@@ -12,14 +12,14 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.outline import Edges, Outline
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.view import PAIRS, View
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 from translucent.reference.hits import Hits, from_eye
-from translucent.scene import Object
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from translucent.cpu.picture import Band
 from translucent.cpu.view import View, expand, slices
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera, check_size
 from translucent.reference.hits import PictureGrid
 from translucent.reference.rays import Rays
+from translucent.scene.camera import Camera, check_size
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -17,11 +17,11 @@ from translucent.cpu.picture import Band, Picture
 from translucent.cpu.shading import Arrays, Shader
 from translucent.cpu.threads import in_threads, processors
 from translucent.errors import RenderError
-from translucent.frame import Frame
-from translucent.mesh import Mesh
-from translucent.render_plan import Capabilities, RenderPlan
-from translucent.sampling import sample_shifts
-from translucent.scene import Scene
+from translucent.formulas.sampling import sample_shifts
+from translucent.frames.frame import Frame
+from translucent.geometry.mesh import Mesh
+from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.scene.scene import Scene
 
 Seconds = dict[str, float]
 

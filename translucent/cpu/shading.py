@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.cpu.view import slices
-from translucent.plan import FALLBACK_SHEET
+from translucent.planning.plan import FALLBACK_SHEET
+from translucent.planning.render_plan import RenderPlan
 from translucent.reference import Hits, Rays, shade_hits, sheet_thicknesses
-from translucent.render_plan import RenderPlan
-from translucent.scene import Scene
+from translucent.scene.scene import Scene
 
 Arrays = dict[str, npt.NDArray[Any]]
 Integers = npt.NDArray[np.int64]

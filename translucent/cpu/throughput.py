@@ -12,9 +12,9 @@ from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.threads import in_threads, processors
-from translucent.mesh import Mesh
-from translucent.plan import plan
-from translucent.showcase import showcase
+from translucent.geometry.mesh import Mesh
+from translucent.planning.plan import plan
+from translucent.scene.showcase import showcase
 
 
 def throughput(

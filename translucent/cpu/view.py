@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.cpu.picture import Band, Picture
 from translucent.reference.hits import Hits, camera_vertices, cross_triangles, pixel_span, sorted_hits
-from translucent.scene import Object
+from translucent.scene.scene import Object
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

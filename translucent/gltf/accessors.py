@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.files.reading import require_room
+from translucent.geometry.mesh import MAX_INDEX
 from translucent.gltf.fields import refused, section, whole
-from translucent.materials.gltf_file import GltfFile, Json
-from translucent.mesh import MAX_INDEX
-from translucent.reading import require_room
+from translucent.gltf.file import GltfFile, Json
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
 from translucent.errors import InputError
 from translucent.gltf.fields import label, number, refused, section
+from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.left_out import LeftOut
-from translucent.materials.gltf_file import GltfFile, Json
+from translucent.scene.camera import Camera
 
 Array = npt.NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.materials.gltf_file import GltfFile, Json
+from translucent.gltf.file import GltfFile, Json
 
 Array = npt.NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.geometry.mesh import Mesh, mended
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import refused
-from translucent.materials.gltf_file import Json
-from translucent.mesh import Mesh, mended
+from translucent.gltf.file import Json
 
 Indices = npt.NDArray[np.int64]
 

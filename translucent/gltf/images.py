@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from translucent.color import srgb_to_linear
 from translucent.errors import UnreadableError
+from translucent.files.unpacking import open_picture
+from translucent.formulas.color import srgb_to_linear
 from translucent.gltf.fields import extension, label, number, numbers, refused, section, whole
+from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.left_out import LeftOut
-from translucent.materials.gltf_file import GltfFile, Json
-from translucent.materials.gltf_texture import TEXTURE_TRANSFORM, TextureTransform
-from translucent.texture import Texture, Wrap
-from translucent.unpacking import open_picture
+from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform
+from translucent.scene.texture import Texture, Wrap
 
 Bytes = npt.NDArray[np.uint8]
 Pixels = npt.NDArray[np.float32]

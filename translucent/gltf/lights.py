@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from translucent.gltf.cameras import require_regular
 from translucent.gltf.fields import extension, label, number, numbers, refused
+from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.left_out import LeftOut
-from translucent.lights import DirectionalLight, PointLight
-from translucent.materials.gltf_file import GltfFile, Json
-from translucent.scene import Light
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light
 
 Array = npt.NDArray[np.float64]
 

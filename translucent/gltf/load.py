@@ -10,21 +10,21 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from translucent.environment import Environment
 from translucent.errors import InputError, TranslucentWarning
+from translucent.geometry.mesh import MAX_COORDINATE
 from translucent.gltf.cameras import scene_camera
 from translucent.gltf.fields import label, refused
+from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.lights import LIGHTS, scene_lights
+from translucent.gltf.materials import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
 from translucent.gltf.objects import scene_objects
+from translucent.gltf.scene_media import node_transforms
 from translucent.gltf.surfaces import DIFFUSE_TRANSMISSION, LEFT_OUT, UNLIT
-from translucent.materials.gltf import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
-from translucent.materials.gltf_file import GltfFile, read_gltf
-from translucent.materials.gltf_scene import node_transforms
-from translucent.materials.gltf_texture import TEXTURE_TRANSFORM
-from translucent.mesh import MAX_COORDINATE
-from translucent.scene import Scene
-from translucent.showcase import LIGHT_TABLE, framing
+from translucent.gltf.textures import TEXTURE_TRANSFORM
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Scene
+from translucent.scene.showcase import LIGHT_TABLE, framing
 from translucent.units import metres_per_unit
 
 Array = npt.NDArray[np.float64]

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.geometry.mesh import MIN_DIAGONAL, Mesh
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import label, refused
+from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.geometry import primitive_mesh
 from translucent.gltf.left_out import LeftOut
+from translucent.gltf.scene_media import primitives
 from translucent.gltf.surfaces import VERTEX_COLORED, Finish, finish_reader
-from translucent.materials.gltf_file import GltfFile, Json
-from translucent.materials.gltf_scene import primitives
-from translucent.medium import Medium
-from translucent.mesh import MIN_DIAGONAL, Mesh
-from translucent.scene import Object
-from translucent.surface import TEXTURE_FIELDS, Surface
+from translucent.media.medium import Medium
+from translucent.scene.scene import Object
+from translucent.scene.surface import TEXTURE_FIELDS, Surface
 
 Array = npt.NDArray[np.float64]
 

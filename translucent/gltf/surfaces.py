@@ -47,15 +47,15 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.gltf.fields import extension, label, number, refused, section, share, shares
+from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.images import Textures
 from translucent.gltf.left_out import LeftOut
+from translucent.gltf.materials import DEFAULT_IOR, TRANSMISSION, GltfMaterial, materials_of
 from translucent.materials.color_distance import extinction_at
-from translucent.materials.gltf import DEFAULT_IOR, TRANSMISSION, GltfMaterial, materials_of
-from translucent.materials.gltf_file import GltfFile, Json
-from translucent.medium import Medium
-from translucent.scene import OPAQUE_COLOR
-from translucent.surface import MAX_DISPERSION, Surface
-from translucent.texture import Texture
+from translucent.media.medium import Medium
+from translucent.scene.scene import OPAQUE_COLOR
+from translucent.scene.surface import MAX_DISPERSION, Surface
+from translucent.scene.texture import Texture
 
 Array = npt.NDArray[np.float64]
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
+from translucent.files.reading import require_room
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.mesh_files import Triangles, joined
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import refused
+from translucent.gltf.file import read_gltf
 from translucent.gltf.geometry import raw_mesh
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.load import check_extensions, scene_transforms
-from translucent.materials.gltf_file import read_gltf
-from translucent.materials.gltf_scene import primitives
-from translucent.mesh import Mesh
-from translucent.mesh_files import Triangles, joined
-from translucent.reading import require_room
+from translucent.gltf.scene_media import primitives
 
 
 def read_whole(path: Path, allow_outside: bool = False) -> Triangles:

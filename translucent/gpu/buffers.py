@@ -8,9 +8,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.corner_normals import drawn_normals
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import drawn_normals
 from translucent.gpu.ledger import before_making
-from translucent.mesh import Mesh
 
 
 class MeshBuffers:

@@ -9,12 +9,12 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.density import DensityGrid, ExponentialDensity, LinearDensity
 from translucent.errors import RenderError
 from translucent.gpu.layout import DENSITY
 from translucent.gpu.shaders import CONSTANTS
-from translucent.scene import Object, Scene
-from translucent.slots import MAX_SLOTS, Slot
+from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
+from translucent.planning.slots import MAX_SLOTS, Slot
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 

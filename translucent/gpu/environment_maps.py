@@ -8,10 +8,10 @@ from weakref import WeakKeyDictionary
 import moderngl
 import numpy as np
 
-from translucent.environment import Environment
-from translucent.environment_filter import filtered
-from translucent.environment_map import EnvironmentMap
 from translucent.gpu.ledger import before_making
+from translucent.scene.environment import Environment
+from translucent.scene.environment_filter import filtered
+from translucent.scene.environment_map import EnvironmentMap
 
 
 @dataclass(frozen=True, eq=False)

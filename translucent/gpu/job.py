@@ -7,7 +7,6 @@ import time
 import moderngl
 import numpy as np
 
-from translucent.backdrop import Backdrop
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.densities import density_uniforms, scene_grids
 from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
@@ -29,11 +28,12 @@ from translucent.gpu.uniforms import (
     surface_uniforms,
     view_uniforms,
 )
-from translucent.plan import FALLBACK_SHEET
-from translucent.render_plan import RenderPlan
-from translucent.scene import Object, Scene
-from translucent.slots import medium_slots
-from translucent.thickness import FragmentLists, KBuffer, RayMarched, SignedDepth, ThinLayer
+from translucent.planning.methods import FragmentLists, KBuffer, RayMarched, SignedDepth, ThinLayer
+from translucent.planning.plan import FALLBACK_SHEET
+from translucent.planning.render_plan import RenderPlan
+from translucent.planning.slots import medium_slots
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.scene import Object, Scene
 
 _UNEXPECTED = float(CONSTANTS["UNEXPECTED"])
 

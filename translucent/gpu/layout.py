@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.plan_limits import MAX_SCATTER_LIGHTS
-from translucent.slots import MAX_SLOTS
+from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.slots import MAX_SLOTS
 
 #: GLSL type, size and alignment in bytes (std140) of a NumPy field. Other shapes are not used: std140 pads them oddly.
 _TYPES: dict[tuple[str, tuple[int, ...]], tuple[str, int, int]] = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
-from translucent.lights import DirectionalLight, PointLight
-from translucent.scene import Light, Scene
+from translucent.scene.camera import Camera
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Scene
 
 Array = npt.NDArray[np.float64]
 

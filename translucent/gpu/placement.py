@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
-from translucent.scene import Object
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object
 
 Array = npt.NDArray[np.float64]
 

@@ -13,9 +13,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.backdrop import Backdrop
 from translucent.errors import RenderError
-from translucent.frame import Frame
+from translucent.formulas.sampling import sample_shifts
+from translucent.frames.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
 from translucent.gpu.job import FrameJob
@@ -25,9 +25,9 @@ from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import CONSTANTS
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
-from translucent.render_plan import Capabilities, RenderPlan
-from translucent.sampling import sample_shifts
-from translucent.scene import Scene
+from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.scene import Scene
 
 #: OpenGL from which on shaders write to buffers.
 SHADER_STORAGE = 430

@@ -10,12 +10,10 @@ from typing import Any, get_args
 import moderngl
 
 from translucent.assets import shader_path
-from translucent.color import LUMINANCE_WEIGHTS
 from translucent.errors import RenderError
-from translucent.gpu.layout import BLOCKS
-from translucent.optics import MIN_THIN_LAYER_COSINE
-from translucent.thickness import LEAST_SEEN, Quadrature
-from translucent.tone import (
+from translucent.formulas.color import LUMINANCE_WEIGHTS
+from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
+from translucent.formulas.tone import (
     AGX_DISPLAY,
     AGX_MIDDLE_GREY,
     AGX_MIX,
@@ -27,6 +25,8 @@ from translucent.tone import (
     NEUTRAL_F90,
     NEUTRAL_START,
 )
+from translucent.gpu.layout import BLOCKS
+from translucent.planning.methods import LEAST_SEEN, Quadrature
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8

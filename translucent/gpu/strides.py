@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from translucent.sampling import sample_shifts
+from translucent.formulas.sampling import sample_shifts
 
 #: Strides of steps; the sides of pictures are multiples of the largest.
 STRIDES = (1, 2, 4, 8)

@@ -7,12 +7,12 @@ from weakref import WeakKeyDictionary
 import moderngl
 import numpy as np
 
-from translucent.brdf_table import brdf_table
 from translucent.errors import RenderError
+from translucent.formulas.brdf_table import brdf_table
 from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import set_uniform
-from translucent.surface import TEXTURE_FIELDS, Surface
-from translucent.texture import Texture
+from translucent.scene.surface import TEXTURE_FIELDS, Surface
+from translucent.scene.texture import Texture
 
 #: In place of a texture: all values as they are, and a normal straight out.
 _WHITE = Texture(np.ones((1, 1, 3), dtype=np.float32))

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
-from translucent.environment import Environment
 from translucent.errors import InputError
+from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
 from translucent.gpu.layout import (
     BODY,
     ENVIRONMENT,
@@ -26,14 +25,15 @@ from translucent.gpu.layout import (
 )
 from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
 from translucent.gpu.shaders import CONSTANTS
-from translucent.lights import PointLight
-from translucent.medium import Medium
-from translucent.plan_limits import MAX_SCATTER_LIGHTS
+from translucent.media.medium import Medium
+from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.reference.sheets import SHEET_ON_OPAQUE
-from translucent.scene import Scene
-from translucent.slots import MAX_SLOTS, Slot
-from translucent.surface import Surface
-from translucent.two_stream import two_stream_absorption, two_stream_scattering
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Scene
+from translucent.scene.surface import Surface
 
 Array = npt.NDArray[np.float64]
 

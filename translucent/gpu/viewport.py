@@ -14,16 +14,16 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.aovs import EMPTY, SEEN, WRONG, false_colors
 from translucent.errors import RenderError
-from translucent.frame import Frame
+from translucent.formulas.tone import TONES
+from translucent.frames.aovs import EMPTY, SEEN, WRONG, false_colors
+from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.strides import STRIDES, places, shifts
-from translucent.render_plan import RenderPlan
-from translucent.scene import Scene
-from translucent.tone import TONES
+from translucent.planning.render_plan import RenderPlan
+from translucent.scene.scene import Scene
 
 Size = tuple[int, int]
 

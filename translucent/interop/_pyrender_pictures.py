@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import pyrender
 
-from translucent.backdrop import Backdrop
-from translucent.camera import Camera
-from translucent.environment import Environment
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
 
 #: pyrender encodes the radiance that it finds as a power, and cuts it off at 1 (its shaders/mesh.frag).
 GAMMA = 2.2

@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 import pyrender
 
-from translucent.camera import Camera
-from translucent.environment import Environment
 from translucent.errors import InputError, TranslucentWarning
+from translucent.geometry.mesh import Mesh, mended
 from translucent.interop._pyrender_pictures import GAMMA
-from translucent.lights import DirectionalLight, PointLight
-from translucent.medium import Medium
-from translucent.mesh import Mesh, mended
-from translucent.scene import Light, Object, Overlap, Scene
+from translucent.media.medium import Medium
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Overlap, Scene
 
 Array = npt.NDArray[np.float64]
 

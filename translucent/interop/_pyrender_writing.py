@@ -9,11 +9,11 @@ import numpy.typing as npt
 import pyrender
 from pyrender.constants import MAX_N_LIGHTS
 
-from translucent.camera import Camera
 from translucent.errors import InputError
 from translucent.gpu.placement import depth_range
-from translucent.lights import PointLight
-from translucent.scene import Object, Scene
+from translucent.scene.camera import Camera
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 

@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from translucent.backdrop import Backdrop
-from translucent.camera import check_size
 from translucent.errors import InputError, RenderError
 from translucent.interop._pyrender_shim import load_pyrender
-from translucent.medium import Medium
-from translucent.scene import Overlap, Scene
-from translucent.thickness import Method
+from translucent.media.medium import Medium
+from translucent.planning.methods import Method
+from translucent.scene.backdrop import Backdrop
+from translucent.scene.camera import check_size
+from translucent.scene.scene import Overlap, Scene
 
 if TYPE_CHECKING:
-    from translucent.frame import Frame
+    from translucent.frames.frame import Frame
     from translucent.renderer import Renderer
 
 #: What pyrender sees first is taken to be this share nearer: it may lie between the pixel centers that were looked at.

@@ -2,7 +2,7 @@
 
 `TARGETS` names the systems that `text_block` writes for; `load_medium` reads files of those that have files. Numbers of
 the others: `translucent.materials.blender`, `unity` and `unreal`. Reading and writing whole glTF files:
-`translucent.materials.gltf` and `translucent.materials.gltf_write`.
+`translucent.gltf.materials` and `translucent.gltf.write`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.files.reading import read_text
 from translucent.materials.blender import blender_snippet
 from translucent.materials.css import css_text
 from translucent.materials.json_text import read_json, write_json
@@ -23,8 +24,7 @@ from translucent.materials.standard_surface import read_standard_surface, write_
 from translucent.materials.unity import unity_text
 from translucent.materials.unreal import unreal_text
 from translucent.materials.usd import read_usda, usda_text
-from translucent.medium import Medium
-from translucent.reading import read_text
+from translucent.media.medium import Medium
 
 __all__ = ["TARGETS", "load_medium", "text_block"]
 
@@ -33,7 +33,7 @@ _SAME_COLOR = 1e-3
 
 
 def _gltf_text(medium: Medium, distance: float) -> str:
-    from translucent.materials.gltf_write import volume_extensions
+    from translucent.gltf.write import volume_extensions
 
     extensions = volume_extensions(medium, distance, thickness=distance, ior=medium.ior)
     return json.dumps({"extensions": extensions}, indent=2) + "\n"

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 
 Array = npt.NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
 from translucent.errors import InputError
-from translucent.medium import Medium
+from translucent.formulas import optics
+from translucent.media.medium import Medium
 
 Array = npt.NDArray[np.float64]
 

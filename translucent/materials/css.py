@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from translucent.color import to_hex
-from translucent.medium import Medium
+from translucent.formulas.color import to_hex
+from translucent.media.medium import Medium
 
 _STOPS = 9
 

@@ -10,8 +10,8 @@ import json
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.medium import Medium
-from translucent.reading import json_value
+from translucent.files.reading import json_value
+from translucent.media.medium import Medium
 
 _TRIPLES = ("absorption", "scattering", "emission")
 _NUMBERS = ("anisotropy", "ior")

@@ -30,10 +30,10 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from translucent.color import srgb_to_linear
 from translucent.errors import InputError
+from translucent.formulas.color import srgb_to_linear
 from translucent.materials.color_distance import color_at, extinction_at
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 from translucent.units import metres_per_unit
 
 Array = npt.NDArray[np.float64]

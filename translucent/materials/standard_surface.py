@@ -8,7 +8,7 @@ A depth of 0 makes the color a tint of the surface: it is read as a medium witho
 from __future__ import annotations
 
 from translucent.materials.materialx import Shader, read_shader, write_shader
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 
 SHADER = Shader("standard_surface", weight="transmission", ior="specular_IOR", title="Standard Surface")
 

@@ -18,9 +18,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from translucent.color import linear_to_srgb, srgb_to_linear
+from translucent.formulas.color import linear_to_srgb, srgb_to_linear
 from translucent.materials.color_distance import color_at, extinction_at
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 
 
 def from_unity(color: npt.ArrayLike, distance: float, ior: float = 1.5) -> Medium:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.materials.color_distance import color_at
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 
 Array = npt.NDArray[np.float64]
 

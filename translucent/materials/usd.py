@@ -22,7 +22,7 @@ from translucent.errors import InputError
 from translucent.materials.materialx import Shader, medium_of, parse_value, transmission_inputs
 from translucent.materials.openpbr import SHADER
 from translucent.materials.standard_surface import SHADER as STANDARD_SURFACE
-from translucent.medium import Medium
+from translucent.media.medium import Medium
 
 _SHADERS = {f"ND_{shader.node}_surfaceshader": shader for shader in (SHADER, STANDARD_SURFACE)}
 _SPACES = {"lin_rec709_scene": "lin_rec709", "raw": "none", "srgb_rec709_scene": "srgb_texture"}

@@ -12,8 +12,8 @@ import numpy as np
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.materials.color_distance import color_at
-from translucent.medium import MAX_COEFFICIENT, Medium
-from translucent.presets import preset
+from translucent.media.medium import MAX_COEFFICIENT, Medium
+from translucent.media.presets import preset
 from translucent.preview import orbiting
 from translucent.preview.document import Document, Material, Model, Orbit, checked
 
@@ -162,7 +162,7 @@ def _resourced(material: Material, edited: str) -> Material:
 
 def absorption_of_color(material: Material) -> tuple[float, float, float]:
     """Absorption in 1/m of a color at a distance."""
-    from translucent.conversion import extinction_from_colors
+    from translucent.media.conversion import extinction_from_colors
 
     absorption = extinction_from_colors(material.color, material.distance)
     if not (absorption <= MAX_COEFFICIENT).all():

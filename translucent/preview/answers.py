@@ -6,7 +6,7 @@ from pathlib import Path
 
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
-from translucent.materials.gltf_write import write_medium
+from translucent.gltf.write import write_medium
 from translucent.preview.actions import Change
 from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer

@@ -93,8 +93,8 @@ def run(
     if window.failure is not None:
         raise window.failure
     if screenshot is not None:
-        from translucent.frame import write_png
-        from translucent.paths import write_atomically
+        from translucent.files.paths import write_atomically
+        from translucent.frames.frame import write_png
 
         pixels = hello_imgui.final_app_window_screenshot()
         write_atomically(Path(screenshot), partial(write_png, pixels=pixels))
@@ -193,11 +193,11 @@ class _Window:
         """Panels on both sides, with this share of the part of the width that they have in a narrow window."""
         from imgui_bundle import hello_imgui, imgui
 
-        from translucent.preview.panel_look import files_panel, look_panel
-        from translucent.preview.panel_material import material_panel
-        from translucent.preview.panel_messages import messages_panel
-        from translucent.preview.panel_method import method_panel
-        from translucent.preview.panel_viewport import viewport_panel
+        from translucent.preview.panels.look import files_panel, look_panel
+        from translucent.preview.panels.material import material_panel
+        from translucent.preview.panels.messages import messages_panel
+        from translucent.preview.panels.method import method_panel
+        from translucent.preview.panels.viewport import viewport_panel
 
         docking = hello_imgui.DockingParams()
         docking.docking_splits = [

@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from translucent.aovs import EMPTY, false_colors
 from translucent.bake.thickness_map import ThicknessMap
-from translucent.color import srgb_to_linear
-from translucent.corner_normals import drawn_normals
-from translucent.environment import Environment
-from translucent.medium import Medium
-from translucent.mesh import Mesh
+from translucent.formulas.color import srgb_to_linear
+from translucent.frames.aovs import EMPTY, false_colors
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import drawn_normals
+from translucent.media.medium import Medium
 from translucent.preview.document import Orbit
 from translucent.preview.elsewhere import in_a_process
 from translucent.preview.numbers import length_text
 from translucent.preview.orbiting import camera_of
 from translucent.preview.tasks import Report, Task
-from translucent.scene import Object, Scene
-from translucent.surface import Surface
-from translucent.texture import Texture
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 
 @dataclass(eq=False)

@@ -19,22 +19,22 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.assets import newest_shader
-from translucent.corner_normals import corner_normals, has_drawn_normals, keep_drawn_normals
-from translucent.environment import Environment
-from translucent.environment_map import EnvironmentMap
 from translucent.errors import RenderError, TranslucentError
+from translucent.formulas.tone import TONES
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import corner_normals, has_drawn_normals, keep_drawn_normals
+from translucent.geometry.solids import Box
 from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
-from translucent.mesh import Mesh
+from translucent.planning.render_plan import RenderPlan
 from translucent.preview.elsewhere import Companion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
-from translucent.render_plan import RenderPlan
-from translucent.scene import Object, Scene
-from translucent.solids import Box
-from translucent.surface import Surface
-from translucent.texture import Texture
-from translucent.tone import TONES
+from translucent.scene.environment import Environment
+from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 #: Size of the frames that are drawn to have their shaders compiled. No power of two: drivers compile another code for
 #: pictures whose sides are, and those of windows seldom are.

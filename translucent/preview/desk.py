@@ -17,7 +17,7 @@ from translucent.preview.measuring import Crossing, Measured
 from translucent.preview.scenes import method_of
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
-from translucent.scene import Scene
+from translucent.scene.scene import Scene
 
 #: Seconds after which a view counts as still.
 STILL = 0.25

@@ -6,15 +6,15 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
-from translucent.camera import MAX_COORDINATE
-from translucent.environment import MAX_EXPOSURE
 from translucent.errors import InputError
-from translucent.lights import MAX_RADIANCE
-from translucent.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR
-from translucent.showcase import DEFAULT_COLOR
-from translucent.surface import MAX_DISPERSION
-from translucent.thickness import METHODS
-from translucent.tone import TONES
+from translucent.formulas.tone import TONES
+from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR
+from translucent.planning.methods import METHODS
+from translucent.scene.camera import MAX_COORDINATE
+from translucent.scene.environment import MAX_EXPOSURE
+from translucent.scene.lights import MAX_RADIANCE
+from translucent.scene.showcase import DEFAULT_COLOR
+from translucent.scene.surface import MAX_DISPERSION
 from translucent.units import METRES_PER_UNIT
 
 Triple = tuple[float, float, float]

@@ -19,12 +19,12 @@ from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-from translucent.density import DensityGrid
-from translucent.environment_map import EnvironmentMap
 from translucent.errors import RenderError, TranslucentWarning
-from translucent.mesh import Mesh
+from translucent.geometry.mesh import Mesh
+from translucent.media.density import DensityGrid
 from translucent.preview.tasks import CancelledError, Task
-from translucent.texture import Texture
+from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.texture import Texture
 
 #: Seconds between looks whether anybody still waits for the result.
 PATIENCE = 0.1

@@ -9,14 +9,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from translucent.animation import check_animation, write_animation
 from translucent.errors import InputError
-from translucent.frame import SUFFIXES, check_output
+from translucent.frames.animation import check_animation, write_animation
+from translucent.frames.frame import SUFFIXES, check_output
+from translucent.planning.methods import Method
 from translucent.preview.tasks import Report
 from translucent.renderer import Renderer
-from translucent.scene import Scene
-from translucent.thickness import Method
-from translucent.turntable import turntable
+from translucent.scene.scene import Scene
+from translucent.scene.turntable import turntable
 
 Size: TypeAlias = tuple[int, int]
 

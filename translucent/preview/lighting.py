@@ -6,15 +6,15 @@ import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
-from translucent.brdf_table import brdf_table
-from translucent.corner_normals import corner_normals
-from translucent.environment_files import READERS
-from translucent.environment_filter import filtered
+from translucent.formulas.brdf_table import brdf_table
+from translucent.formulas.sampling import sample_shifts
+from translucent.geometry.normals import corner_normals
+from translucent.geometry.solids import Box
 from translucent.preview.document import Document
 from translucent.preview.scenes import environment_of
 from translucent.preview.tasks import Lane, Task
-from translucent.sampling import sample_shifts
-from translucent.solids import Box
+from translucent.scene.environment_files import READERS
+from translucent.scene.environment_filter import filtered
 
 #: What lights, and what is behind.
 Names = tuple[str, str]

@@ -12,18 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent import reference
-from translucent.appearance import thickness_samples
 from translucent.assets import newest_shader
-from translucent.camera import Camera
 from translucent.errors import InputError, TranslucentWarning
-from translucent.frame import Frame
-from translucent.metrics import Errors, compare
+from translucent.frames.appearance import thickness_samples
+from translucent.frames.frame import Frame
+from translucent.frames.metrics import Errors, compare
+from translucent.planning.methods import Method
 from translucent.preview.numbers import Seen
 from translucent.preview.tasks import Report
 from translucent.reference.hits import camera_hits
 from translucent.renderer import Renderer
-from translucent.scene import Object, Scene
-from translucent.thickness import Method
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Scene
 
 Size = tuple[int, int]
 

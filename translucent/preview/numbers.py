@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.appearance import average_color
-from translucent.color import linear_to_srgb, srgb_to_linear, to_hex
-from translucent.conversion import summary
+from translucent.formulas.color import linear_to_srgb, srgb_to_linear, to_hex
+from translucent.frames.appearance import average_color
 from translucent.materials.color_distance import color_at
-from translucent.medium import Medium
+from translucent.media.conversion import summary
+from translucent.media.medium import Medium
 from translucent.preview.document import Material, Triple
 from translucent.preview.scenes import medium_of
 from translucent.units import metres_per_unit
 
 Array = npt.NDArray[np.float64]
 
-#: The darkest linear channel that the color field gives: 0 has no extinction. See `translucent.conversion.CLAMP`.
+#: The darkest linear channel that the color field gives: 0 has no extinction. See `translucent.media.conversion.CLAMP`.
 DARKEST = 1e-4
 
 

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import MAX_COORDINATE, Camera
 from translucent.preview.document import MAX_PITCH, Orbit
-from translucent.scene import Object
-from translucent.showcase import framing
+from translucent.scene.camera import MAX_COORDINATE, Camera
+from translucent.scene.scene import Object
+from translucent.scene.showcase import framing
 
 Array = npt.NDArray[np.float64]
 

@@ -10,18 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from translucent.corner_normals import drawn_normals
-from translucent.environment import Environment
 from translucent.errors import InputError
-from translucent.lights import DirectionalLight
+from translucent.geometry.normals import drawn_normals
 from translucent.materials.color_distance import color_at
-from translucent.medium import Medium
+from translucent.media.medium import Medium
+from translucent.planning.methods import Method, ThinLayer, method_from_name
 from translucent.preview.document import AUTO, Document, Look, Material, Model
 from translucent.preview.orbiting import camera_of
-from translucent.scene import Object, Scene
-from translucent.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable, named_environment
-from translucent.surface import Surface
-from translucent.thickness import Method, ThinLayer, method_from_name
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable, named_environment
+from translucent.scene.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,9 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
         If it cannot be read.
     """
     from translucent.assets import mesh_names, mesh_path
+    from translucent.geometry.mesh import load_mesh
     from translucent.gltf.load import SUFFIXES, load_scene
-    from translucent.mesh import load_mesh
-    from translucent.showcase import showcase
+    from translucent.scene.showcase import showcase
 
     if Path(model.path).suffix.lower() in SUFFIXES:
         scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)

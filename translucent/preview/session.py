@@ -8,9 +8,9 @@ from typing import Any
 
 from translucent.errors import InputError
 from translucent.extras import require_package
-from translucent.paths import write_atomically
+from translucent.files.paths import write_atomically
+from translucent.files.reading import read_text, toml_value
 from translucent.preview.document import Document, Orbit, checked
-from translucent.reading import read_text, toml_value
 
 #: Of the format; a later one that this cannot read would raise it.
 VERSION = 1

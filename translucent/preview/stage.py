@@ -9,21 +9,21 @@ from functools import partial
 from typing import Any, TypeVar
 
 from translucent.assets import newest_shader
-from translucent.corner_normals import drawn_normals
 from translucent.errors import TranslucentError
+from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Shown, Viewport
+from translucent.planning.methods import Method
+from translucent.planning.render_plan import RenderPlan
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
-from translucent.render_plan import RenderPlan
 from translucent.renderer import Renderer
-from translucent.scene import Scene
-from translucent.thickness import Method
+from translucent.scene.scene import Scene
 
 #: Seconds that a step should take at most, and samples of a pixel when steps are quick or slow.
 BUDGET = 0.045

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from translucent.errors import InputError, RenderError, TranslucentError
-from translucent.paths import remove_partial
+from translucent.files.paths import remove_partial
+from translucent.planning.methods import Method
 from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map
@@ -26,9 +27,8 @@ from translucent.preview.measuring import Crossing, Measured, Truth, crossing, m
 from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Lane, Task, problem
-from translucent.scene import Scene
-from translucent.showcase import fillable
-from translucent.thickness import Method
+from translucent.scene.scene import Scene
+from translucent.scene.showcase import fillable
 
 #: Lines that the window keeps.
 MAX_MESSAGES = 50

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
+from translucent.formulas import optics
 from translucent.reference.borders import Borders, Optics
 from translucent.reference.boxes import Lines
 from translucent.reference.compositing import composite
@@ -32,7 +32,7 @@ from translucent.reference.scattering import scattered_once
 from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
-from translucent.scene import Scene
+from translucent.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
 from translucent.errors import InputError
+from translucent.formulas import optics
 
 Array = npt.NDArray[np.float64]
 

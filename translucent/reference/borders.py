@@ -13,12 +13,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from translucent.corner_normals import corner_normals
-from translucent.interface import channel_iors
+from translucent.formulas.interface import channel_iors
+from translucent.geometry.normals import corner_normals
 from translucent.reference.compositing import _layers
 from translucent.reference.hits import Hits, world_normals
-from translucent.scene import Scene
-from translucent.surface import Surface
+from translucent.scene.scene import Scene
+from translucent.scene.surface import Surface
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

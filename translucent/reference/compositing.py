@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
+from translucent.formulas import optics
 from translucent.reference.segments import Segments
 
 Array = npt.NDArray[np.float64]

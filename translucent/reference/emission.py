@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
+from translucent.formulas import optics
 from translucent.reference.adaptive import integrate
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments

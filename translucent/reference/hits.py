@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera, check_size
-from translucent.mesh import Mesh
-from translucent.scene import Object
+from translucent.geometry.mesh import Mesh
+from translucent.scene.camera import Camera, check_size
+from translucent.scene.scene import Object
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
 from translucent.reference.hits import Hits
-from translucent.scene import Object, Scene
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from translucent.grouping import shared_edges
-from translucent.lights import DirectionalLight
+from translucent.geometry.grouping import shared_edges
 from translucent.reference.rays import Rays
 from translucent.reference.tracer import TracedObject
-from translucent.scene import Light
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Light
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -12,9 +12,9 @@ import numpy.typing as npt
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.opaque import irradiance_at
 from translucent.reference.rays import Rays
-from translucent.scene import Object, Scene
-from translucent.surface import LEAST_COVER
-from translucent.texture import Texture
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import LEAST_COVER
+from translucent.scene.texture import Texture
 
 Array = npt.NDArray[np.float64]
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
-from translucent.lights import MAX_RADIANCE, DirectionalLight, PointLight
+from translucent.formulas import optics
 from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs
@@ -16,7 +15,8 @@ from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
-from translucent.scene import Light, Scene
+from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight
+from translucent.scene.scene import Light, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

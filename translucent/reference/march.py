@@ -10,11 +10,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
-from translucent.camera import check_size
 from translucent.errors import InputError
-from translucent.frame import Frame
-from translucent.lights import PointLight
+from translucent.formulas import optics
+from translucent.frames.frame import Frame
+from translucent.planning.methods import RayMarched
+from translucent.planning.render_plan import PassSpec, RenderPlan
 from translucent.reference import blending
 from translucent.reference.blending import Layer
 from translucent.reference.compositing import _layers
@@ -24,9 +24,9 @@ from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind
 from translucent.reference.scattering import light_source, light_variable
 from translucent.reference.volume import places
-from translucent.render_plan import PassSpec, RenderPlan
-from translucent.scene import Light, Scene
-from translucent.thickness import RayMarched
+from translucent.scene.camera import check_size
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Light, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

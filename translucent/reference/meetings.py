@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
-from translucent.interface import (
+from translucent.formulas import optics
+from translucent.formulas.interface import (
     ggx_distribution,
     ggx_visibility,
     reflected_direction,
@@ -16,11 +16,11 @@ from translucent.interface import (
     slab_reflectance,
     slab_transmittance,
 )
-from translucent.lights import PointLight
 from translucent.reference.borders import Borders, Optics, border_normals
 from translucent.reference.legs import Legs
 from translucent.reference.microfacets import scattered_at_border
 from translucent.reference.opaque import irradiance_at, seen_from
+from translucent.scene.lights import PointLight
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

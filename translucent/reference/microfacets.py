@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
-from translucent.interface import reflected_direction, refracted_direction
+from translucent.formulas import optics
+from translucent.formulas.interface import reflected_direction, refracted_direction
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

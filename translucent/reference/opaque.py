@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from translucent.lights import PointLight
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.rays import Rays
-from translucent.scene import Light, Object, Scene
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Light, Object, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import check_size
 from translucent.errors import InputError
-from translucent.frame import Frame
+from translucent.frames.frame import Frame
+from translucent.planning.methods import SignedDepth
+from translucent.planning.render_plan import PassSpec, RenderPlan
 from translucent.reference.boxes import Lines
 from translucent.reference.compositing import _layers
 from translucent.reference.light_paths import LightPaths
@@ -22,9 +23,8 @@ from translucent.reference.phase import scattered_directions
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind, shade_hits
 from translucent.reference.volume import places
-from translucent.render_plan import PassSpec, RenderPlan
-from translucent.scene import Scene
-from translucent.thickness import SignedDepth
+from translucent.scene.camera import check_size
+from translucent.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

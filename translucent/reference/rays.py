@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.camera import Camera
+from translucent.scene.camera import Camera
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

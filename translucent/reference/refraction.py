@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.planning.methods import Method
 from translucent.reference.bent import BentLight, BentRays
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.volume import Volume
-from translucent.scene import Scene
-from translucent.thickness import Method
+from translucent.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 

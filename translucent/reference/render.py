@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
-from translucent.camera import check_size
 from translucent.errors import InputError
-from translucent.frame import Frame
-from translucent.plan import plan
+from translucent.formulas import optics
+from translucent.frames.frame import Frame
+from translucent.planning.methods import Method, ThinLayer
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities
 from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits, line_hits
@@ -28,9 +29,8 @@ from translucent.reference.scattering import scattered_once
 from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
 from translucent.reference.volume import Volume, volume_segments
-from translucent.render_plan import Capabilities
-from translucent.scene import Scene
-from translucent.thickness import Method, ThinLayer
+from translucent.scene.camera import check_size
+from translucent.scene.scene import Scene
 
 #: Surfaces, times objects, that are put in order at a time: the working arrays stay below 500 MB.
 CHUNK = 1 << 24

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
-from translucent.lights import PointLight
-from translucent.medium import MAX_COEFFICIENT
+from translucent.formulas import optics
+from translucent.media.medium import MAX_COEFFICIENT
 from translucent.reference.adaptive import integrate
 from translucent.reference.compositing import _layers
 from translucent.reference.equiangular import equiangular
@@ -22,7 +21,8 @@ from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.volume import places
-from translucent.scene import Light
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Light
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

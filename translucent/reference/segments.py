@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from translucent.reference.intervals import Intervals
 from translucent.reference.sheets import Crossings
-from translucent.scene import Scene
+from translucent.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
+from translucent.formulas import optics
+from translucent.planning.methods import Method, ThinLayer
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.layers import layer_depth, layer_radiance, without_holes
 from translucent.reference.rays import Rays
-from translucent.scene import Object, Scene
-from translucent.thickness import Method, ThinLayer
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.hits import Hits, cross_triangles, sorted_hits
-from translucent.scene import Object, Scene
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from translucent import optics
+from translucent.formulas import optics
 from translucent.reference.intervals import Intervals
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments, _pieces, scene_segments
 from translucent.reference.sheets import Crossings
 from translucent.reference.tracer import center_from
-from translucent.scene import Scene
+from translucent.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

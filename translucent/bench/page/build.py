@@ -18,7 +18,7 @@ from translucent.bench.page.swatch import swatch
 from translucent.bench.page.theme import css_variables
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.seeing import seen_words
-from translucent.paths import write_text_atomically
+from translucent.files.paths import write_text_atomically
 
 #: Rows of a legend that stands beside its plot; longer ones stand below.
 MOST_BESIDE = 22

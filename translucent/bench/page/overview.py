@@ -9,7 +9,7 @@ from translucent.bench.page.figure import require_packages, standalone
 from translucent.bench.page.pareto import pareto_svg, plotted
 from translucent.bench.record import CaseRecord, Report
 from translucent.errors import InputError
-from translucent.paths import write_text_atomically
+from translucent.files.paths import write_text_atomically
 
 #: Left out: the backend without OpenGL, which is off the scale, and methods for what this scene does not have.
 _LEFT_OUT = {"cpu backend", "RayMarched on the CPU", "RayMarched"}

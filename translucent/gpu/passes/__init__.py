@@ -20,7 +20,7 @@ from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.surfaces import SurfacesPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
-from translucent.render_plan import PassSpec
+from translucent.planning.render_plan import PassSpec
 
 
 class Pass(Protocol):

@@ -7,7 +7,7 @@ import moderngl
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import CONSTANTS, build_program
-from translucent.render_plan import PassSpec
+from translucent.planning.render_plan import PassSpec
 
 
 class BackFaceDepthPass:

@@ -7,12 +7,12 @@ import math
 import moderngl
 import numpy as np
 
-from translucent.backdrop import Backdrop
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import CONSTANTS, set_uniform
-from translucent.render_plan import PassSpec
+from translucent.planning.render_plan import PassSpec
+from translucent.scene.backdrop import Backdrop
 
 #: Place of what is infinitely far: behind everything, and yet seen.
 _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])

@@ -8,8 +8,8 @@ import numpy as np
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import CONSTANTS, PEEL_BATCH, PEEL_TILE, set_uniform
-from translucent.render_plan import PassSpec
-from translucent.thickness import DepthPeeling
+from translucent.planning.methods import DepthPeeling
+from translucent.planning.render_plan import PassSpec
 
 _STATE = ("near_depth", "near_emitted", "layers", "far_depth", "far_emitted", "near_winding", "far_winding")
 

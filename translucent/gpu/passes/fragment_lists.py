@@ -9,8 +9,8 @@ from translucent.errors import RenderError
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import CONSTANTS, set_uniform
-from translucent.render_plan import PassSpec
-from translucent.thickness import RayMarched
+from translucent.planning.methods import RayMarched
+from translucent.planning.render_plan import PassSpec
 
 #: Bytes of a node: a word and the number of the next node.
 _NODE = 8

@@ -9,10 +9,10 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import CONSTANTS, set_uniform
 from translucent.gpu.textures import texture_units
-from translucent.plan_borders import picture_cuts
-from translucent.render_plan import PassSpec
-from translucent.scene import Object
-from translucent.surface import Surface
+from translucent.planning.borders import picture_cuts
+from translucent.planning.render_plan import PassSpec
+from translucent.scene.scene import Object
+from translucent.scene.surface import Surface
 
 _FIRST_TEXTURE = 3
 _UNITS = {"opaque_place": 0, "entered": 1, "ordered_layers": 2} | texture_units(_FIRST_TEXTURE)

@@ -8,8 +8,8 @@ import numpy as np
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
-from translucent.render_plan import PassSpec
-from translucent.thickness import KBuffer
+from translucent.planning.methods import KBuffer
+from translucent.planning.render_plan import PassSpec
 
 
 class KBufferPass:

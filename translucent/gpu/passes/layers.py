@@ -9,9 +9,9 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import CONSTANTS, set_uniform
-from translucent.render_plan import PassSpec
-from translucent.scene import Object
-from translucent.surface import LEAST_COVER
+from translucent.planning.render_plan import PassSpec
+from translucent.scene.scene import Object
+from translucent.scene.surface import LEAST_COVER
 
 _OWN = ("opaque_place", "entered", "fronts")
 _SAMPLERS = ("layers_in_front", "layers_behind", "straight_transmittance", "shaded_radiance")

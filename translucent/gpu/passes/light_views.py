@@ -18,9 +18,9 @@ from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightViews
-from translucent.lights import PointLight
-from translucent.render_plan import PassSpec
-from translucent.scene import Light
+from translucent.planning.render_plan import PassSpec
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Light
 
 #: Bytes of a node, and of what is recorded at each.
 _NODE, _MEDIUM = 16, 16

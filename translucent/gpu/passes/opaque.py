@@ -9,8 +9,8 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import CONSTANTS, set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
-from translucent.render_plan import PassSpec
-from translucent.surface import Surface
+from translucent.planning.render_plan import PassSpec
+from translucent.scene.surface import Surface
 
 _MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table")
 _FIRST_TEXTURE = len(_MAPS)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import moderngl
 
+from translucent.formulas.tone import TONES
 from translucent.gpu.job import FrameJob
 from translucent.gpu.shaders import build_program, set_uniform
-from translucent.tone import TONES
 
 
 class PresentPass:

@@ -12,7 +12,7 @@ from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
-from translucent.render_plan import PassSpec
+from translucent.planning.render_plan import PassSpec
 
 
 class Shortcut(Protocol):

@@ -7,8 +7,8 @@ import moderngl
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
-from translucent.render_plan import PassSpec
-from translucent.surface import LEAST_COVER
+from translucent.planning.render_plan import PassSpec
+from translucent.scene.surface import LEAST_COVER
 
 
 class ThinLayerPass:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import build_program
-from translucent.scene import Object
+from translucent.scene.scene import Object
 
 
 class Variants:

@@ -1,0 +1,1 @@
+"""Baking whole glTF files: what to bake, and how maps and vertices go back into them."""

@@ -1,0 +1,164 @@
+"""Primitives of a glTF file as bodies: closed by those beside them, and where nodes put them.
+
+Modelling tools split a mesh by its materials: of a vase in four primitives none is closed, and all of them are. Such a
+primitive is joined with the other open ones of its mesh, if that closes edges, and has the thickness of all of them
+together. What is closed by itself stays alone: what lies inside it, such as wine in a glass, is another body.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import TranslucentWarning
+from translucent.geometry.mesh import Mesh, mended
+from translucent.gltf.accessors import Accessors
+from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.geometry import primitive_mesh
+from translucent.gltf.scene_media import node_transforms, primitives
+
+Array = npt.NDArray[np.float64]
+#: Mesh and primitive of a file.
+Place = tuple[int, int]
+
+_TRIANGLES = (4, 5, 6)
+
+#: Nodes whose axes differ by less than this share show a mesh in one size.
+SAME_SIZE = 1e-4
+
+
+def read_primitive(file: GltfFile, place: Place, metres: float, tex_coord: int | None = None) -> Mesh:
+    """A primitive in its own space, in metres, with a set of its UVs or none."""
+    primitive = primitives(file, file.item("meshes", place[0]))[place[1]]
+    attributes = {"POSITION": primitive["attributes"].get("POSITION")}
+    if tex_coord is not None:
+        attributes["TEXCOORD_0"] = primitive["attributes"][f"TEXCOORD_{tex_coord}"]
+    mesh = primitive_mesh(Accessors(file), {**primitive, "attributes": attributes}, primitive_name(file, place))
+    assert mesh is not None  # its mode is one of triangles
+    return mesh if metres == 1.0 else dataclasses.replace(mesh, vertices=mesh.vertices * metres)
+
+
+def primitive_name(file: GltfFile, place: Place) -> str:
+    """The name of a primitive's mesh or node, with its number where there are several."""
+    mesh = file.item("meshes", place[0])
+    users = [node for node in file.items("nodes") if node.get("mesh") == place[0] and node.get("name")]
+    name = str(mesh.get("name") or (users[0]["name"] if users else f"mesh {place[0]}"))
+    return name + (f"[{place[1]}]" if len(mesh["primitives"]) > 1 else "")
+
+
+def triangle_primitives(file: GltfFile) -> dict[Place, Json]:
+    """The primitives of triangles of all meshes that nodes use."""
+    used = {node["mesh"] for node in file.items("nodes") if "mesh" in node}
+    return {
+        (index, i): primitive
+        for index, mesh in enumerate(file.items("meshes"))
+        if index in used
+        for i, primitive in enumerate(primitives(file, mesh))
+        if primitive.get("mode", 4) in _TRIANGLES
+    }
+
+
+class Bodies:
+    """The bodies that the primitives of a file bound.
+
+    Parameters
+    ----------
+    file : GltfFile
+    metres : float
+        Per unit of the file.
+    """
+
+    def __init__(self, file: GltfFile, metres: float) -> None:
+        self._file, self._metres = file, metres
+        self._outlines: dict[Place, Mesh] = {}
+        self._joined: dict[int, tuple[Mesh, dict[Place, int]] | None] = {}
+
+    def is_closed(self, place: Place) -> bool:
+        """Whether a primitive, with those beside it that close it, has no hole."""
+        whole = self.around(place) or self._outline(place)
+        return whole.diagnosis.closed
+
+    def around(self, place: Place) -> Mesh | None:
+        """An open primitive joined with the other open ones of its mesh, if that closes edges."""
+        if self._outline(place).diagnosis.closed:
+            return None
+        joined = self._join(place[0])
+        return None if joined is None else joined[0]
+
+    def wound(self, place: Place, mesh: Mesh) -> Mesh:
+        """The mesh of a primitive, its faces turned as they are in what is `around` it."""
+        joined = self._join(place[0])
+        assert joined is not None
+        whole, starts = joined
+        normals = whole.face_normals[starts[place] : starts[place] + len(mesh.faces)]
+        turned = np.einsum("fi,fi->f", mesh.face_normals, normals) < 0
+        return dataclasses.replace(mesh, faces=np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
+
+    def _outline(self, place: Place) -> Mesh:
+        if place not in self._outlines:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", TranslucentWarning)  # of faces that are turned: what is baked tells
+                self._outlines[place] = read_primitive(self._file, place, self._metres)
+        return self._outlines[place]
+
+    def _join(self, index: int) -> tuple[Mesh, dict[Place, int]] | None:
+        """All open primitives of a mesh as one, and where the faces of each begin; None if that closes no edge."""
+        if index not in self._joined:
+            places = [place for place in triangle_primitives(self._file) if place[0] == index]
+            parts = {place: self._outline(place) for place in places}
+            parts = {place: part for place, part in parts.items() if not part.diagnosis.closed}
+            self._joined[index] = None
+            if len(parts) > 1:
+                whole, starts = _joined(parts)
+                before = sum(part.diagnosis.open_edges.count for part in parts.values())
+                if whole.diagnosis.open_edges.count < before:
+                    self._joined[index] = whole, starts
+        return self._joined[index]
+
+
+def _joined(parts: dict[Place, Mesh]) -> tuple[Mesh, dict[Place, int]]:
+    meshes = list(parts.values())
+    first_vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    first_face = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    faces = np.concatenate([mesh.faces + begin for mesh, begin in zip(meshes, first_vertex, strict=False)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TranslucentWarning)  # as above
+        whole = mended(Mesh(vertices, faces.astype(np.int32), name=meshes[0].name))
+    return whole, dict(zip(parts, first_face.tolist(), strict=False))
+
+
+def first_transforms(file: GltfFile) -> dict[int, Array]:
+    """Mesh to world (4x4) of each mesh by the first node that shows it.
+
+    Warns
+    -----
+    TranslucentWarning
+        If nodes show a mesh in several sizes.
+    """
+    transforms, first = node_transforms(file), dict[int, Array]()
+    for index, node in enumerate(file.items("nodes")):
+        matrix = transforms[index]
+        if "mesh" not in node or np.linalg.matrix_rank(matrix[:3, :3]) < 3:
+            continue  # without an extent along some axis: it is hidden, or has no inside
+        known = first.setdefault(node["mesh"], matrix)
+        if not np.allclose(_sizes(known), _sizes(matrix), rtol=SAME_SIZE, atol=SAME_SIZE * np.abs(_sizes(known)).max()):
+            name = file.item("meshes", node["mesh"]).get("name", f"mesh {node['mesh']}")
+            told = f"glTF {str(file.path)!r}: nodes show {name!r} in several sizes; its map is that of the first"
+            warnings.warn(told, TranslucentWarning, stacklevel=2)
+    return first
+
+
+def _sizes(matrix: Array) -> Array:
+    """What lengths and angles become: the same for two matrices that differ by a turn, a shift or a mirror."""
+    return np.asarray(matrix[:3, :3].T @ matrix[:3, :3])
+
+
+def transformed(mesh: Mesh, matrix: Array, metres: float) -> Mesh:
+    """A mesh in metres, moved by a matrix in units of its file; a mirrored one is turned outwards again."""
+    vertices = mesh.vertices @ matrix[:3, :3].T + metres * matrix[:3, 3]
+    faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
+    return dataclasses.replace(mesh, vertices=vertices, faces=faces)

@@ -1,0 +1,229 @@
+"""Which primitives of a glTF file get thickness, and their meshes as a baker takes them.
+
+Those whose material lets light in, but for open meshes that it makes thin walls: they have no inside. Where no material
+lets light in, all triangles, whose materials then will. Each is baked in the mesh's own space, as glTF states
+thickness, so nodes that share a mesh share the map, whatever their scale. What is open by itself belongs to a body that
+others close, see `translucent.bake.gltf.bodies`.
+
+The UVs are those that the material reads its thickness texture at (KHR_texture_transform included, as long as it keeps
+them in 0..1), else TEXCOORD_0, else new ones as the next set.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.bake.gltf.bodies import Bodies, Place, primitive_name, read_primitive, triangle_primitives
+from translucent.bake.gltf.builder import INDICES, GlbBuilder
+from translucent.bake.unwrap import unwrap
+from translucent.errors import InputError
+from translucent.geometry.mesh import Mesh
+from translucent.gltf.accessors import COMPONENTS, Accessors
+from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.materials import GltfMaterial, materials_of
+from translucent.gltf.textures import TextureTransform
+from translucent.materials.color_distance import extinction_at
+from translucent.media.medium import Medium
+
+_COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A primitive that gets thickness.
+
+    Parameters
+    ----------
+    place : (int, int)
+        Indices of its mesh, and of it in the mesh.
+    mesh : Mesh
+        In its own space, in metres, with the UVs of the texture to come, v upwards; without UVs if not `needs_uv`.
+    tex_coord : int
+        The set of these UVs: n of TEXCOORD_n.
+    keeps_transform : bool
+        Whether the UVs are those after the transform of the thickness texture that the material has.
+    medium : Medium, optional
+        What its material states to be inside.
+    made_uv : bool
+        Whether the UVs were made for it, and are nowhere but in the builder.
+    around : Mesh, optional
+        The body that it and others bound, where it is open by itself.
+    """
+
+    place: Place
+    mesh: Mesh
+    tex_coord: int = 0
+    keeps_transform: bool = False
+    medium: Medium | None = None
+    made_uv: bool = False
+    around: Mesh | None = None
+
+
+def find_targets(
+    builder: GlbBuilder,
+    metres: float = 1.0,
+    *,
+    needs_uv: bool = True,
+    new_uv: bool = False,
+    plain_uv: bool = False,
+    size: int = 1024,
+) -> list[Target]:
+    """The primitives that get thickness; those without UVs get new ones in the builder.
+
+    Parameters
+    ----------
+    builder : GlbBuilder
+    metres : float
+        Per unit of the file.
+    needs_uv : bool
+        Whether UVs are wanted at all.
+    new_uv : bool
+        Make new UVs for all of them.
+    plain_uv : bool
+        Take UVs as they are, without the transform of the thickness texture that a material has.
+    size : int
+        Texels along each side of the map to come, which the gaps between new charts depend on.
+
+    Raises
+    ------
+    InputError
+        If the file is compressed, has no triangles, or its data are wrong; if UVs are to be made and xatlas is missing.
+    """
+    file = builder.file()
+    required = file.tree.get("extensionsRequired", [])
+    if packed := [name for name in _COMPRESSIONS if name in required]:
+        raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
+    materials, bodies = materials_of(file), Bodies(file, metres)
+    lit = {place: _material(materials, builder.primitive(*place)) for place in _places(file, materials)}
+    # All that is read of the file as it is, before anything is added to it.
+    chosen = {place: bodies.around(place) for place, material in lit.items() if not _is_sheet(material, place, bodies)}
+    found: list[Target] = []
+    for place, around in chosen.items():
+        material, medium = lit[place], _medium(lit[place], metres)
+        if not needs_uv:
+            found.append(Target(place, read_primitive(file, place, metres), medium=medium))
+            continue
+        tex_coord, keeps = None if new_uv else _tex_coord(builder.primitive(*place), material), False
+        if made := tex_coord is None:
+            tex_coord = add_uv(builder, place, size)
+        mesh = read_primitive(builder.file() if made else file, place, metres, tex_coord)
+        if not (made or plain_uv):
+            mesh, keeps = _transformed(mesh, material, tex_coord)
+        if around is not None:
+            mesh = bodies.wound(place, mesh)
+        found.append(Target(place, mesh, tex_coord, keeps, medium, made, around))
+    if not found:
+        told = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
+        raise InputError(f"glTF {str(file.path)!r}", told, "give one of them a volume, or a closed mesh")
+    return found
+
+
+def _material(materials: list[GltfMaterial], primitive: Json) -> GltfMaterial | None:
+    return materials[primitive["material"]] if "material" in primitive else None
+
+
+def left_out(file: GltfFile, targets: list[Target]) -> list[str]:
+    """What gets no thickness beside the targets, a line for each reason."""
+    materials, chosen = materials_of(file), {target.place for target in targets}
+    reasons: dict[str, list[Place]] = {}
+    for place, primitive in triangle_primitives(file).items():
+        if place not in chosen:
+            material = _material(materials, primitive)
+            sheet = material is not None and material.transmits
+            reasons.setdefault("thin walls without an inside" if sheet else "opaque", []).append(place)
+    return [f"{reason}: {', '.join(_names(file, places))}" for reason, places in reasons.items()]
+
+
+def _names(file: GltfFile, places: list[Place]) -> list[str]:
+    return [primitive_name(file, place) for place in places]
+
+
+def _is_sheet(material: GltfMaterial | None, place: Place, bodies: Bodies) -> bool:
+    """Whether a primitive is an open mesh that its material makes a thin wall."""
+    return material is not None and material.kind == "thin wall" and not bodies.is_closed(place)
+
+
+def _places(file: GltfFile, materials: list[GltfMaterial]) -> list[Place]:
+    """Triangles of meshes that nodes use: with a material that lets light in, or all."""
+    everything = {place: primitive.get("material") for place, primitive in triangle_primitives(file).items()}
+    if not everything:
+        raise InputError(f"glTF {str(file.path)!r}", "no node has triangles", "give a file with a mesh")
+    lit = [place for place, index in everything.items() if index is not None and materials[index].transmits]
+    return lit or list(everything)
+
+
+def _tex_coord(primitive: Json, material: GltfMaterial | None) -> int | None:
+    """Set of UVs for the thickness texture, if the primitive has one."""
+    wanted = material.thickness_transform.tex_coord if material and material.has_thickness_texture else 0
+    return next((n for n in (wanted, 0) if f"TEXCOORD_{n}" in primitive["attributes"]), None)
+
+
+def _transformed(mesh: Mesh, material: GltfMaterial | None, tex_coord: int) -> tuple[Mesh, bool]:
+    """The mesh with UVs as the thickness texture that the material has sees them, where that is of use."""
+    if material is None or not material.has_thickness_texture or mesh.uv is None:
+        return mesh, False
+    transform = material.thickness_transform
+    if transform.tex_coord != tex_coord or transform == TextureTransform(tex_coord=tex_coord):
+        return mesh, False
+    uv = transform.apply(np.column_stack([mesh.uv[:, 0], 1.0 - mesh.uv[:, 1]]))
+    if (uv < 0).any() or (uv > 1).any():
+        return mesh, False  # a pattern that is repeated is no place for a map
+    return dataclasses.replace(mesh, uv=np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])), True
+
+
+def _medium(material: GltfMaterial | None, metres: float) -> Medium | None:
+    """What attenuation the material states, whatever its thickness is so far."""
+    if material is None or not np.isfinite(material.attenuation_distance):
+        return None
+    return Medium(absorption=extinction_at(material.attenuation_color, material.attenuation_distance) / metres)
+
+
+def add_uv(builder: GlbBuilder, place: Place, size: int) -> int:
+    """Give a primitive new UVs as its next set; vertices on seams are repeated with all that belongs to them.
+
+    Raises
+    ------
+    InputError
+        If it is a strip or fan, or compressed, or xatlas is missing.
+    """
+    file, primitive = builder.file(), builder.primitive(*place)
+    accessors, name = Accessors(file), primitive_name(file, place)
+    asked = f"new UVs for {name!r} of {str(file.path)!r}"
+    if primitive.get("mode", 4) != 4:
+        raise InputError(asked, "it is a strip or fan", "export it as a list of triangles, or with UVs")
+    if _COMPRESSIONS[0] in primitive.get("extensions", {}):
+        raise InputError(asked, "its vertices are compressed", "export it without compression")
+    positions = accessors.vectors(primitive["attributes"].get("POSITION"), "VEC3")
+    corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
+    if len(corners) % 3 or corners.max(initial=0) >= len(positions):
+        raise InputError(asked, "its indices make no triangles", "export the file again")
+    made = unwrap(Mesh(positions, corners.reshape(-1, 3).astype(np.int32), name=name), size, None)
+    assert made.mesh.uv is not None
+    for holder in [primitive["attributes"], *primitive.get("targets", [])]:
+        for key, index in holder.items():
+            holder[key] = _repeated(builder, accessors, index, made.vertex)
+    number = 0
+    while f"TEXCOORD_{number}" in primitive["attributes"]:
+        number += 1
+    uv = np.column_stack([made.mesh.uv[:, 0], 1.0 - made.mesh.uv[:, 1]]).astype(np.float32)
+    primitive["attributes"][f"TEXCOORD_{number}"] = builder.add_accessor(uv)
+    primitive["indices"] = builder.add_accessor(made.mesh.faces.astype(np.uint32).ravel(), INDICES)
+    primitive["mode"] = 4
+    return number
+
+
+def _repeated(builder: GlbBuilder, accessors: Accessors, index: int, kept: npt.NDArray[Any]) -> int:
+    """An accessor with the elements `kept` of another, of the same type."""
+    entry = accessors.file.item("accessors", index)
+    values = accessors.vectors(index, entry.get("type", ""))[kept]
+    dtype = np.dtype(COMPONENTS[entry["componentType"]])
+    normalized = entry.get("normalized") is True
+    if normalized:
+        values = np.rint(values * np.iinfo(dtype).max)
+    with np.errstate(under="ignore"):
+        return builder.add_accessor(values.astype(dtype), normalized=normalized, bounds="min" in entry)

@@ -1,0 +1,135 @@
+"""H01 to H26, the inputs that break renderers: each measured now, against what is promised for it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from translucent import reference
+from translucent.bench.record import HardCase
+from translucent.errors import InputError, TranslucentError, TranslucentWarning
+from translucent.frames.frame import Frame
+from translucent.frames.metrics import Errors, Quantity, compare, interior
+from translucent.planning.methods import Method
+from translucent.renderer import Renderer
+from translucent.scene.scene import Scene
+
+Size = tuple[int, int]
+
+#: What float32 may be off by where a promise is called exact: a hundred roundings of a path as long as the diagonal.
+EXACT = 100 * float(np.finfo(np.float32).eps) / 2
+
+#: Frames are small: each case takes a fraction of a second.
+SIZE: Size = (96, 96)
+
+
+@dataclass
+class Checks:
+    """What one hard case has found, while it goes on.
+
+    Attributes
+    ----------
+    renderer : Renderer
+    worst : float or None
+        Largest of all errors so far.
+    told, failed : list of str
+        Findings in words.
+    """
+
+    renderer: Renderer
+    limit: float
+    worst: float | None = None
+    told: list[str] = field(default_factory=list)
+    failed: list[str] = field(default_factory=list)
+
+    def error(self, what: str, value: float) -> None:
+        """Note an error, which has to stay within the limit; NaN does not."""
+        value = abs(float(value))
+        self.worst = value if self.worst is None else float(np.maximum(self.worst, value))
+        self._note(f"{what} {value:.1e}", value <= self.limit)
+
+    def holds(self, what: str, held: bool | np.bool_) -> None:
+        """Note something that has to be true."""
+        self._note(what, bool(held))
+
+    def refused(self, what: str, make: Callable[[], object], word: str) -> None:
+        """Note that something has to be an `InputError` whose message has this word."""
+        try:
+            made = make()
+        except InputError as error:
+            self._note(f"{what} refused", word in str(error))
+        else:
+            self._note(f"{what} gave {type(made).__name__}, no error", held=False)
+
+    def picture(self, what: str, scene: Scene) -> Frame:
+        """Render, and note the error in thickness: its 99.9th percentile, as a share of the diagonal."""
+        frame, truth = self.render(scene, SIZE), reference.render(scene, SIZE)
+        inside = interior(reference.hit_counts(scene, SIZE))
+        self.error(what, compare(frame, truth, mask=inside).p999 / scene.diagonal)
+        self.holds(f"{what}: no pixel marked", frame.valid[inside].all())
+        return frame
+
+    def compared(self, frame: Frame, truth: Frame, scene: Scene, quantity: Quantity = "thickness") -> Errors:
+        """Errors away from silhouettes."""
+        return compare(frame, truth, quantity, mask=interior(reference.hit_counts(scene, frame.size)))
+
+    def render(self, scene: Scene, size: Size = SIZE, method: Method | None = None) -> Frame:
+        """Render without a word about pixels that are not valid."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TranslucentWarning)
+            return self.renderer.render(scene, size, method)
+
+    def _note(self, what: str, held: bool) -> None:
+        (self.told if held else self.failed).append(what)
+
+
+@dataclass(frozen=True)
+class Hard:
+    """One hard case.
+
+    Attributes
+    ----------
+    id, title, promise : str
+        As in the record.
+    check : callable
+        Fills in `Checks`.
+    limit : float
+        Of all errors that it notes.
+    unit : str
+    """
+
+    id: str
+    title: str
+    promise: str
+    check: Callable[[Checks], None]
+    limit: float = EXACT
+    unit: str = "of the diagonal"
+
+    def measure(self, renderer: Renderer) -> HardCase:
+        """Its record; what raises has failed."""
+        checks = Checks(renderer, self.limit)
+        try:
+            self.check(checks)
+        except Exception as error:  # noqa: BLE001 - a hard case that breaks something is a finding, and the others go on
+            words = str(error) if isinstance(error, TranslucentError) else f"{type(error).__name__}: {error}"
+            checks.failed.append(words)
+        passed = not checks.failed
+        result = "; ".join(checks.told) if passed else f"wrong: {'; '.join(checks.failed)}"
+        # JSON has no word for infinity: an error that is not finite is told in words.
+        worst = checks.worst if checks.worst is not None and np.isfinite(checks.worst) else None
+        limit, unit = (self.limit, self.unit) if checks.worst is not None else (None, "")
+        return HardCase(self.id, self.title, self.promise, result, passed, worst, limit, unit)
+
+
+def measure_hard_cases(renderer: Renderer) -> Iterator[HardCase]:
+    """All of them, in their order."""
+    from translucent.bench.hard import geometry as hard_geometry
+    from translucent.bench.hard import values as hard_values
+    from translucent.bench.hard import views as hard_views
+
+    cases = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
+    for case in sorted(cases, key=lambda case: case.id):
+        yield case.measure(renderer)

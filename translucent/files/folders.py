@@ -1,0 +1,31 @@
+"""Folders that results are written into."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from translucent.frames.frame import make_folder
+
+
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Make a folder, and those above it; after an error those that were made and are empty are removed.
+
+    Raises
+    ------
+    InputError
+        If its name, or that of a folder above, is one of a file.
+    RenderError
+        If it cannot be made.
+    """
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    try:
+        make_folder(folder)
+        yield
+    except BaseException:
+        with suppress(OSError):  # something is in it
+            for made in missing:
+                made.rmdir()
+        raise

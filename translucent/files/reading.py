@@ -1,0 +1,219 @@
+"""The way in for files that others have made: what may be opened, and how much may come out of it.
+
+Every reader of the toolkit begins here. Opened are regular files only, since a device may never end and a pipe may wait
+forever; a file that another one names has to lie below that one's folder, links followed. Nothing is allocated because
+a header says so: `require_room` is asked first. A file may unpack into `FREE` bytes, or into `RATIO` times its own
+size: honest files stay far below, and a few bytes cannot fill the memory.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import stat
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, BinaryIO
+from urllib.parse import unquote
+
+from translucent.errors import InputError
+from translucent.files.paths import require_file
+
+#: Bytes of the largest file: what the header of a .glb can state.
+MAX_FILE = 2**32 - 1
+#: Bytes of the largest text that a person may have written: a material, a table, a session.
+MAX_TEXT = 8 << 20
+#: Bytes that any file may unpack into, and how many times its own size a larger one may.
+FREE, RATIO = 1 << 29, 128
+#: Levels of lists and objects within each other.
+MAX_DEPTH = 100
+#: Digits of a whole number that is still in the range of float64.
+MAX_DIGITS = 300
+
+_SCHEME = re.compile(r"file:|[A-Za-z][A-Za-z0-9+.-]+://")
+
+
+def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
+    """A regular file, open for reading.
+
+    Parameters
+    ----------
+    path : str or Path
+    asked : str
+        What the error says was asked for.
+    limit : int
+        Bytes that it may have.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be read, it is a folder, a pipe or a device, or it is larger.
+    """
+    require_file(Path(path), asked)
+    try:
+        stream = open(path, "rb", opener=_open_at_once)  # noqa: SIM115
+    except OSError as error:
+        raise InputError(asked, f"it cannot be read ({error.strerror})", "check its permissions") from None
+    found = os.fstat(stream.fileno())
+    if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
+        return stream
+    stream.close()
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(asked, "it is no file", "give a regular file")
+    raise InputError(asked, f"it has {size_text(found.st_size)}, more than {size_text(limit)}", "split it, or check it")
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open what was a file a moment ago, and does not wait if it has become a pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def read_bytes(path: str | Path, asked: str, limit: int = MAX_FILE) -> bytes:
+    """The content of a file; raises `InputError` like `open_file`."""
+    with open_file(path, asked, limit) as stream:
+        try:
+            return stream.read(os.fstat(stream.fileno()).st_size)
+        except OSError as error:
+            raise InputError(asked, f"it cannot be read ({error.strerror})", "check the disk") from None
+
+
+def read_text(path: str | Path, asked: str, limit: int = MAX_TEXT, do: str = "save it as text") -> str:
+    """The content of a file of UTF-8 text; raises `InputError` like `open_file`, or if it is none."""
+    try:
+        return read_bytes(path, asked, limit).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(asked, "not UTF-8 text", do) from None
+
+
+def linked_file(folder: Path, link: str, asked: str, allow_outside: bool = False) -> Path:
+    """The file that a file in `folder` names.
+
+    Parameters
+    ----------
+    folder : Path
+    link : str
+        Relative, percent-encoded or not.
+    asked : str
+        What the error says was asked for.
+    allow_outside : bool
+        Whether the link may lead out of the folder: to where its user could not have meant.
+
+    Raises
+    ------
+    InputError
+        If it leads out of the folder, by its text or by a symbolic link, and may not; if it names no path.
+    """
+    name = unquote(link)
+    if _SCHEME.match(name):
+        raise InputError(asked, f"{link!r} is no path", "keep its files together, and link them by relative paths")
+    if "\0" in name:
+        raise InputError(asked, f"{link!r} names no file", "export it again")
+    path = folder / name
+    if not allow_outside and not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
+        do = "keep its files together, or say --allow-outside (in Python, allow_outside=True)"
+        raise InputError(asked, f"{link!r} is outside its folder", do)
+    return path
+
+
+def require_room(asked: str, found: str, size: int, stored: int, do: str = "make it smaller") -> None:
+    """Raise unless what is read may take this much memory.
+
+    Parameters
+    ----------
+    asked : str
+        What the error says was asked for.
+    found : str
+        What takes it, such as ``"16384x16384 pixels"``.
+    size : int
+        Bytes that reading it takes at most, with all that is made in between.
+    stored : int
+        Bytes of the file that it is unpacked from.
+    do : str
+        What the user can do about it.
+
+    Raises
+    ------
+    InputError
+        If it is more than `FREE` bytes, and more than `RATIO` times what is stored.
+    """
+    if size > (allowed := max(FREE, RATIO * stored)):
+        limit = f"of so small a file at most {size_text(allowed)} are read"
+        raise InputError(asked, f"{found} take {size_text(size)}; {limit}", do)
+
+
+def size_text(size: int) -> str:
+    """Bytes, for people."""
+    for unit, scale in (("GiB", 1 << 30), ("MiB", 1 << 20), ("kiB", 1 << 10)):
+        if size >= scale:
+            return f"{size / scale:.3g} {unit}" if size < 1000 * scale else f"{size // scale} {unit}"
+    return f"{size} bytes"
+
+
+def json_value(text: str) -> Any:
+    """The value of a JSON text, without infinities, numbers beyond all use, and nesting that no reader could follow.
+
+    Raises
+    ------
+    ValueError
+        If it is no such JSON; the message says why.
+    """
+    try:
+        value = json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
+    except RecursionError:
+        raise ValueError(f"more than {MAX_DEPTH} levels") from None
+    _require_shallow(value)
+    return value
+
+
+def toml_value(text: str) -> dict[str, Any]:
+    """The table of a TOML text; raises `ValueError` like `json_value`."""
+    try:
+        value = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(f"more than {MAX_DEPTH} levels") from None
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:  # of int, which tomllib calls
+        raise ValueError("a number is too long") from error
+    _require_shallow(value)
+    return value
+
+
+def _refuse(word: str) -> None:
+    raise ValueError(f"{word} is no JSON number")
+
+
+def _finite(text: str) -> float:
+    if math.isinf(value := float(text)):
+        raise ValueError(f"{text} is beyond the range of numbers")
+    return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > MAX_DIGITS:
+        raise ValueError("a whole number is too long")
+    return int(text)
+
+
+def _require_shallow(value: Any) -> None:
+    """Raise `ValueError` where lists and objects are nested too deeply, or a whole number is too long."""
+    level: list[Any] = [[value]]
+    for _ in range(MAX_DEPTH + 1):
+        inner: list[Any] = []
+        for holder in level:
+            children: Iterable[Any] = holder.values() if isinstance(holder, dict) else holder
+            inner += [child for child in children if isinstance(child, (dict, list, int))]
+        if any(isinstance(child, int) and child.bit_length() > 1000 for child in inner):
+            raise ValueError("a whole number is too long")
+        level = [child for child in inner if not isinstance(child, int)]
+        if not level:
+            return
+    raise ValueError(f"more than {MAX_DEPTH} levels")
+
+
+def shown(error: BaseException) -> str:
+    """What an error of a library says, in a few words."""
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

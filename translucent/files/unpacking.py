@@ -1,0 +1,156 @@
+"""Arrays and pictures of files that others have made: their headers are read and believed only where there is room."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import os
+import warnings
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError, UnreadableError
+from translucent.extras import require_package
+from translucent.files.reading import open_file, require_room, shown
+
+if TYPE_CHECKING:
+    from PIL.ImageFile import ImageFile
+
+#: Kinds of pictures that are read: Pillow knows more, some of which run other programs.
+PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
+
+
+def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it with numpy.save") -> npt.NDArray[Any]:
+    """The array of numbers of a .npy file.
+
+    Parameters
+    ----------
+    stream : file
+    size : int
+        Bytes of the file.
+    asked : str
+        What the error says was asked for.
+    do : str
+        What the user can do about it.
+
+    Raises
+    ------
+    InputError
+        If it is none, or has not as many bytes as its header says.
+    """
+    form = np.lib.format
+    try:
+        version = form.read_magic(stream)
+        read_header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
+        shape, _, dtype = read_header(stream)
+    except MemoryError:  # what Python's parser says of too many brackets
+        raise InputError(asked, "not a NumPy array", do) from None
+    except Exception as error:  # a header is Python, and what is broken in it raises whatever Python does
+        raise InputError(asked, f"not a NumPy array ({shown(error)})", do) from error
+    if dtype.hasobject or dtype.kind not in "biufU" or not dtype.itemsize:
+        raise InputError(asked, f"its type is {str(dtype)!r}, not numbers", do)
+    needed, held = math.prod(shape) * dtype.itemsize, size - stream.tell()
+    if not 0 <= needed <= held:
+        raise InputError(asked, f"it is cut short: {held} of {needed} bytes", do)
+    stream.seek(0)
+    return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> dict[str, npt.NDArray[Any]]:
+    """Arrays of a .npz file by their names; raises `InputError` if one is missing or broken."""
+    found = {}
+    with open_file(path, asked) as stream:
+        try:
+            with zipfile.ZipFile(stream) as archive:
+                for name in names:
+                    member = archive.getinfo(f"{name}.npy")
+                    require_room(asked, f"{name} would", member.file_size, member.compress_size, do)
+                    found[name] = read_array(io.BytesIO(archive.read(member)), member.file_size, asked, do)
+        except InputError:
+            raise
+        except Exception as error:  # of zipfile and of each kind of compression
+            raise InputError(asked, f"it cannot be read ({shown(error)})", do) from error
+    return found
+
+
+def open_picture(
+    data: bytes,
+    asked: str,
+    formats: tuple[str, ...] = PICTURES,
+    *,
+    per_pixel: int,
+    do: str = "check the file",
+) -> ImageFile:
+    """A picture, whose pixels are still to be decoded, and may be: there is room for them.
+
+    Parameters
+    ----------
+    data : bytes
+        Of a whole file: a chunk may say that it is longer than that, and what reads on in a file makes room first.
+    asked : str
+        What the error says was asked for.
+    formats : tuple of str
+        Of Pillow.
+    per_pixel : int
+        Bytes that the reader makes of a pixel.
+    do : str
+        What the user can do about it.
+
+    Raises
+    ------
+    InputError
+        If it has too many pixels for its file, or, as `UnreadableError`, is no such picture.
+    """
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of many pixels, which are counted below, and of odd metadata
+            image = Image.open(io.BytesIO(data), formats=formats)
+    except Image.DecompressionBombError:
+        raise InputError(asked, "it has too many pixels", "make it smaller") from None
+    except Exception as error:  # each of Pillow's readers raises its own kinds
+        found = f"it is not an image that can be read: none of {', '.join(formats)}"
+        raise UnreadableError(asked, found, do) from error
+    width, height = image.size
+    require_room(asked, f"{width}x{height} pixels", per_pixel * width * height, len(data))
+    return image
+
+
+def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Header and channels of the first part of an OpenEXR file; the package has to be installed.
+
+    Raises
+    ------
+    InputError
+        If it is none, is damaged, or has too many pixels for its file.
+    """
+    OpenEXR = require_package("OpenEXR", asked)
+    with open_file(path, asked) as stream:
+        stored = os.fstat(stream.fileno()).st_size
+    try:
+        with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+            sizes = [_exr_size(part.header) for part in file.parts]
+        width, height, _ = sizes[0]
+        require_room(asked, f"{width}x{height} pixels", sum(12 * w * h * n for w, h, n in sizes), stored)
+        # The library prints what is wrong with pixels, and leaves their part out.
+        with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:
+                raise InputError(asked, "its pixels are damaged", "copy the file again")
+            return dict(file.header()), {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+    except InputError:
+        raise
+    except Exception as error:  # of the library's C++
+        raise InputError(asked, f"not an OpenEXR file ({shown(error)})", "check the file") from error
+
+
+def _exr_size(header: dict[str, Any]) -> tuple[int, int, int]:
+    """Width, height and number of channels."""
+    (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
+    return right - left + 1, bottom - top + 1, len(header["channels"])

@@ -1,0 +1,140 @@
+"""What boundaries between media do with light, in float64. Each has a twin in ``shaders/lib/interface.glsl``.
+
+All functions are pure and broadcast. Directions (..., 3) are unit vectors in which light travels; a normal looks to the
+side that the light comes from; ``ior`` is the index of the other side relative to this one. The share that a smooth
+boundary reflects is `optics.fresnel_dielectric`, the cosine inside `optics.refracted_cosine`.
+
+References
+----------
+Stokes 1862, "On the intensity of the light reflected from or transmitted through a pile of plates"; Walter et
+al. 2007, "Microfacet models for refraction through rough surfaces"; Heitz 2014, "Understanding the masking-shadowing
+function in microfacet-based BRDFs"; Khronos Group 2024, KHR_materials_dispersion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.formulas import optics
+
+Array = npt.NDArray[np.float64]
+
+
+@np.errstate(under="ignore")
+def reflected_direction(direction: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
+    """Direction d - 2 (d.n) n of mirrored light, (..., 3); the normal may look to either side."""
+    d, n = np.asarray(direction, dtype=np.float64), np.asarray(normal, dtype=np.float64)
+    return np.asarray(d - 2.0 * np.sum(d * n, axis=-1, keepdims=True) * n)
+
+
+@np.errstate(under="ignore")
+def refracted_direction(direction: npt.ArrayLike, normal: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
+    """Direction of the light behind a boundary (Snell), (..., 3); zero under total internal reflection.
+
+    It is zero where `optics.fresnel_dielectric` of the same cosine is 1, but for grazing incidence on a denser medium,
+    which has a direction and carries nothing.
+
+    Parameters
+    ----------
+    direction, normal : array_like (..., 3)
+        Unit vectors; their scalar product is not above 0.
+    ior : array_like (...)
+        Relative index of refraction, above 0; 1 leaves the direction as it is.
+    """
+    d, n = np.asarray(direction, dtype=np.float64), np.asarray(normal, dtype=np.float64)
+    relative = np.asarray(ior, dtype=np.float64)[..., None]
+    c = -np.sum(d * n, axis=-1, keepdims=True)
+    ior_squared_minus_1 = (relative - 1.0) * (relative + 1.0)
+    k = ior_squared_minus_1 + c * c
+    total = (k <= 0.0) & (ior_squared_minus_1 != 0.0)
+    below = c + np.sqrt(np.maximum(k, 0.0))
+    # (n^2 - 1) / (c + sqrt(k)) is sqrt(k) - c without its cancellation where the index is near 1.
+    turn = np.where(ior_squared_minus_1 == 0.0, 0.0, ior_squared_minus_1 / np.where(below > 0.0, below, 1.0))
+    return np.where(total, 0.0, (d - turn * n) / relative)
+
+
+def channel_iors(ior: npt.ArrayLike, dispersion: npt.ArrayLike) -> Array:
+    """Indices of refraction for red, green and blue, (..., 3), none below 1 (KHR_materials_dispersion).
+
+    Parameters
+    ----------
+    ior : array_like
+        Of green light (587.6 nm), >= 1.
+    dispersion : array_like
+        20 / V with the Abbe number V = (n_d - 1) / (n_F - n_C), >= 0: water and diamond 0.36; 0 is none.
+    """
+    n = np.asarray(ior, dtype=np.float64)
+    # Half of n_F - n_C = (n_d - 1) / V.
+    half_spread = 0.025 * (n - 1.0) * np.asarray(dispersion, dtype=np.float64)
+    return np.stack(np.broadcast_arrays(np.maximum(n - half_spread, 1.0), n, n + half_spread), axis=-1)
+
+
+@np.errstate(under="ignore")
+def ggx_distribution(cos_half: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """Density D of microfacet normals in 1/sr: alpha^2 / (pi ((alpha^2 - 1) cos^2 + 1)^2) (Walter et al. 2007, eq. 33).
+
+    Parameters
+    ----------
+    cos_half : array_like
+        Cosine between the microfacets' and the surface's normal, 0..1.
+    alpha : array_like
+        Square of the perceptual roughness, above 0: a smooth surface has no density.
+    """
+    c, a = np.asarray(cos_half, dtype=np.float64), np.asarray(alpha, dtype=np.float64)
+    base = (1.0 - c) * (1.0 + c) + a * a * c * c
+    return np.asarray((a / base) ** 2 / np.pi)
+
+
+@np.errstate(under="ignore")
+def ggx_visibility(cos_light: npt.ArrayLike, cos_view: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """Height-correlated masking and shadowing G2 / (4 cos_light cos_view) of GGX (Heitz 2014, eq. 99).
+
+    The light that a rough boundary reflects is F D V of what arrives, with `optics.fresnel_dielectric` at the
+    microfacet. Exactly edge-on from both sides, where nothing is seen, V is 0.
+
+    Parameters
+    ----------
+    cos_light, cos_view : array_like
+        Cosines between the surface's normal and the directions to the light and to the viewer, 0..1.
+    alpha : array_like
+        As for `ggx_distribution`.
+    """
+    light, view, a = (np.asarray(x, dtype=np.float64) for x in (cos_light, cos_view, alpha))
+    sum_ = view * _smith_root(light, a) + light * _smith_root(view, a)
+    return np.where(sum_ > 0.0, 0.5 / np.where(sum_ > 0.0, sum_, 1.0), 0.0)
+
+
+def _smith_root(cosine: Array, alpha: Array) -> Array:
+    """sqrt(cos^2 + alpha^2 sin^2) = cos (1 + 2 Lambda)."""
+    return np.sqrt(cosine * cosine + alpha * alpha * (1.0 - cosine) * (1.0 + cosine))
+
+
+@np.errstate(under="ignore")
+def slab_transmittance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
+    """Share of light that a thin wall lets through: (1 - r)^2 a / (1 - r^2 a^2), a = exp(-tau) (Stokes 1862).
+
+    All reflections between the two parallel boundaries are added up as powers, not amplitudes: the wall is many
+    wavelengths thick. The light leaves in the direction in which it came. Together with `slab_reflectance` this is 1 at
+    tau = 0.
+
+    Parameters
+    ----------
+    reflectance : array_like
+        r of one boundary, the same from both sides, 0..1.
+    optical_depth : array_like
+        tau of one passage, along the refracted ray: sigma_t d / cosine inside.
+    """
+    r = np.asarray(reflectance, dtype=np.float64)
+    passage = optics.transmittance(optical_depth)
+    # 1 - r a as (1 - r) + r (1 - a), so that nothing cancels near grazing incidence.
+    kept = (1.0 - r) + r * optics.opacity(optical_depth)
+    shared = np.where(r < 1.0, (1.0 - r) / np.where(r < 1.0, kept, 1.0), 0.0)
+    return np.asarray(shared * (1.0 - r) / (1.0 + r * passage) * passage)
+
+
+@np.errstate(under="ignore")
+def slab_reflectance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
+    """Share of light that a thin wall sends back: r + r (1 - r)^2 a^2 / (1 - r^2 a^2); as for `slab_transmittance`."""
+    through = slab_transmittance(reflectance, optical_depth)
+    return np.asarray(np.asarray(reflectance, np.float64) * (1.0 + optics.transmittance(optical_depth) * through))

@@ -1,0 +1,92 @@
+"""Which side of a surface a point is on, and which parts of a mesh are inside out."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.geometry.grouping import shared_edges, side_ends
+
+Array = npt.NDArray[np.float64]
+
+#: A closed part counts as inside out if its volume is below minus this share of its cubed size: less is rounding.
+_FLAT = 1e-12
+
+
+def winding_number(corners: Array, point: npt.ArrayLike) -> float:
+    """How often triangles wind around a point: the sum of their solid angles over 4 pi (van Oosterom & Strackee 1983).
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float64
+    point : array_like (3,)
+
+    Returns
+    -------
+    float
+        0 outside of a closed surface, 1 inside, a fraction on it or near a hole.
+    """
+    a, b, c = (corners - np.asarray(point, dtype=np.float64)).transpose(1, 0, 2)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    with np.errstate(under="ignore"):
+        triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dots = [np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a))]
+        lengths = la * lb * lc
+        half_angle = np.arctan2(triple, lengths + dots[0] * lc + dots[1] * la + dots[2] * lb)
+    # Across a face its solid angle jumps from 2 pi to -2 pi: on it, as far as rounding can tell, it is the mean.
+    half_angle[np.abs(triple) <= 16 * np.finfo(np.float64).eps * lengths] = 0.0
+    return float(half_angle.sum() / (2.0 * np.pi))
+
+
+def inside_out_parts(
+    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64]
+) -> npt.NDArray[np.int64]:
+    """Closed parts that look inwards without being a cavity: they lie inside no other part.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int
+        Welded: equal positions have equal indices.
+    part : (m,) int64
+        Part of each face, from 0.
+
+    Returns
+    -------
+    (k,) int64
+        Their numbers.
+    """
+    count = int(part.max()) + 1
+    corners = vertices[faces]
+    order = np.argsort(part, kind="stable")
+    starts = np.searchsorted(part[order], np.arange(count))
+    low = np.minimum.reduceat(corners.min(axis=1)[order], starts)
+    high = np.maximum.reduceat(corners.max(axis=1)[order], starts)
+    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
+        relative = corners - corners[order[starts], 0][part][:, None]
+        triple = np.einsum("ij,ij->i", relative[:, 0], np.cross(relative[:, 1], relative[:, 2]))
+        flat = -_FLAT * np.linalg.norm(high - low, axis=1) ** 3
+        negative = np.bincount(part, weights=triple, minlength=count) / 6.0 < flat
+    if not negative.any():
+        return np.empty(0, dtype=np.int64)
+    suspects = np.flatnonzero(negative & _balanced_parts(faces, part, count))
+    return np.array([p for p in suspects if not _is_cavity(corners, part, low, high, int(p))], dtype=np.int64)
+
+
+def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Array, p: int) -> bool:
+    around = (low <= low[p]).all(axis=1) & (high >= high[p]).all(axis=1)
+    around[p] = False
+    if not around.any():
+        return False
+    inside = corners[np.flatnonzero(part == p)[0]].mean(axis=0)
+    return round(winding_number(corners[around[part]], inside)) != 0
+
+
+def _balanced_parts(faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:
+    """Whether every directed edge of a part has its opposite."""
+    start, end = side_ends(faces)
+    edge = shared_edges(faces).of
+    net = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
+    unbalanced = np.zeros(count, dtype=bool)
+    unbalanced[np.repeat(part, 3)[net[edge] != 0]] = True
+    return ~unbalanced

@@ -1,0 +1,308 @@
+"""glTF 2.0 materials that light passes: what the KHR extensions say of the volume, read and checked.
+
+============================  =======================================================  =======================
+extension                     field here                                               default
+============================  =======================================================  =======================
+KHR_materials_transmission    transmission: share of light that enters, 0..1           0
+KHR_materials_volume          attenuation_color: linear, 0..1 per channel              (1, 1, 1)
+KHR_materials_volume          attenuation_distance: metres of the **world**, > 0       infinity
+KHR_materials_volume          thickness (factor), >= 0, in **mesh** space              0: thin-walled
+KHR_materials_volume          thickness_texture: its G channel multiplies the factor   none
+KHR_texture_transform         thickness_transform: of the UVs of that texture          none
+KHR_materials_ior             ior: 0 or >= 1                                           1.5
+KHR_materials_dispersion      dispersion = 20 / Abbe number, >= 0                      0
+KHR_materials_emissive_...    emissive: factor times strength, linear, of the surface  (0, 0, 0)
+============================  =======================================================  =======================
+
+Formula: sigma_t = -ln(attenuation_color) / attenuation_distance; T(x) = attenuation_color^(x / attenuation_distance).
+The extension's text calls the distance "the average distance that light travels before interacting with a particle";
+by its formula that is so only for a color of 1/e. Here the formula rules: it is where white light has the color.
+A node's scale acts on the thickness and not on the distance; `translucent.gltf.scene_media` does that.
+
+Source: Khronos, glTF 2.0, and the ratified texts of the extensions above.
+
+Not carried into a `Medium`: emission of the surface, dispersion, base color, roughness, textures of transmission. Not
+known to glTF: scattering, anisotropy and emission of the volume. A medium that scatters is written as its extinction,
+so that what passes straight on is the same; `translucent.gltf.write` says so in a warning.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any, Literal
+
+from translucent.errors import InputError
+from translucent.gltf.file import GltfFile, Json, read_gltf
+from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform
+from translucent.materials.color_distance import BLACKEST, extinction_at
+from translucent.media.medium import Medium
+from translucent.media.swatches import html_strip
+
+TRANSMISSION = "KHR_materials_transmission"
+VOLUME = "KHR_materials_volume"
+IOR = "KHR_materials_ior"
+EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
+DISPERSION = "KHR_materials_dispersion"
+#: A volume must not be used with these.
+EXCLUDED = ("KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness")
+
+#: Index of refraction of a material that states none.
+DEFAULT_IOR = 1.5
+
+Triple = tuple[float, float, float]
+
+_VOLUME_KEYS = {
+    "thicknessFactor",
+    "thicknessTexture",
+    "attenuationDistance",
+    "attenuationColor",
+    "extensions",
+    "extras",
+}
+
+
+@dataclass(frozen=True)
+class GltfMaterial:
+    """What a glTF material says of light inside; lengths and ranges are those of the module's table.
+
+    Parameters
+    ----------
+    index : int
+        In the file's list of materials.
+    name : str
+        Empty if it has none.
+    has_volume : bool
+        Whether KHR_materials_volume is there.
+    transmits : bool
+        Whether light can enter: by transmission, by diffuse transmission, or by an extension that is not known.
+    thickness_texture : int, optional
+        Index in the file's list of textures.
+    thickness_transform : TextureTransform
+        Which UVs it is read at; see `translucent.gltf.scene_media.thickness_at`.
+    warnings : tuple of str
+        What is allowed, and yet not as it should be.
+    """
+
+    index: int
+    name: str = ""
+    transmission: float = 0.0
+    ior: float = DEFAULT_IOR
+    thickness: float = 0.0
+    attenuation_color: Triple = (1.0, 1.0, 1.0)
+    attenuation_distance: float = math.inf
+    dispersion: float = 0.0
+    emissive: Triple = (0.0, 0.0, 0.0)
+    thickness_texture: int | None = None
+    thickness_transform: TextureTransform = field(default_factory=TextureTransform)
+    has_volume: bool = False
+    transmits: bool = False
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def has_thickness_texture(self) -> bool:
+        """Whether a texture scales the thickness."""
+        return self.thickness_texture is not None
+
+    @property
+    def kind(self) -> Literal["opaque", "thin wall", "volume"]:
+        """What it makes of an object."""
+        return "opaque" if not self.transmits else "thin wall" if self.medium() is None else "volume"
+
+    def medium(self) -> Medium | None:
+        """The medium inside, or None: the material is opaque, or a thin wall without an inside (thickness 0).
+
+        A black channel is read as `BLACKEST`, and an ior of 0 (which glTF has for old materials) as 1.5; both are among
+        the warnings. The index of refraction is the only thing that a medium takes from the surface.
+        """
+        if not (self.has_volume and self.transmits and self.thickness > 0):
+            return None
+        extinction = extinction_at(self.attenuation_color, self.attenuation_distance)
+        return Medium(absorption=extinction, ior=self.ior or DEFAULT_IOR)
+
+    def _repr_html_(self) -> str:
+        """Name and swatches of the medium, for notebooks."""
+        medium, distance = self.medium(), self.attenuation_distance
+        head = f"<div>{self.index} {escape(repr(self.name))}: {self.kind}</div>"
+        if medium is None:
+            return head
+        return head + html_strip(medium.extinction, distance if math.isfinite(distance) else None)
+
+    def summary(self) -> dict[str, Any]:
+        """The fields and the medium in values that JSON can hold; None stands for an infinite distance."""
+        medium = self.medium()
+        return {
+            "index": self.index,
+            "name": self.name,
+            "transmission": self.transmission,
+            "ior": self.ior,
+            "thickness": self.thickness,
+            "thickness_texture": self.thickness_texture,
+            "thickness_transform": vars(self.thickness_transform) if self.has_thickness_texture else None,
+            "attenuation_color": list(self.attenuation_color),
+            "attenuation_distance": self.attenuation_distance if math.isfinite(self.attenuation_distance) else None,
+            "dispersion": self.dispersion,
+            "emissive": list(self.emissive),
+            "extinction": None if medium is None else medium.extinction.tolist(),
+            "warnings": list(self.warnings),
+        }
+
+
+def read_materials(path: str | Path) -> list[GltfMaterial]:
+    """All materials of a .gltf or .glb file, in its order; no file that it links to is read.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a value has a wrong type or is out of its range; all such values of the first
+        bad material are named.
+    """
+    return materials_of(read_gltf(path))
+
+
+def materials_of(file: GltfFile) -> list[GltfMaterial]:
+    """All materials of a file that has been read; see `read_materials`."""
+    return [_material(file, index, entry) for index, entry in enumerate(file.items("materials"))]
+
+
+class _Fields:
+    """Values of one JSON object, checked; what is wrong goes into `problems`."""
+
+    def __init__(self, owner: object, where: str, problems: list[str]) -> None:
+        self.problems = problems
+        if not isinstance(owner, dict):
+            problems.append(f"{where} is {owner!r}, not an object")
+        self.values: Json = owner if isinstance(owner, dict) else {}
+
+    def number(self, key: str, default: float, low: float, high: float = math.inf, *, above: bool = False) -> float:
+        """A number in `low`..`high`; with `above` not `low` itself."""
+        value = self.values.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self.problems.append(f"{key} is {value!r}, not a number")
+            return default
+        if not low <= value <= high or (above and value == low):
+            allowed = f"above {low:g}" if above else f"{low:g} or more" if math.isinf(high) else f"in {low:g}..{high:g}"
+            self.problems.append(f"{key} {value:g} is not {allowed}")
+            return default
+        return float(value)
+
+    def triple(self, key: str, default: Triple) -> Triple:
+        """Three numbers in 0..1."""
+        value = self.values.get(key, list(default))
+        if not isinstance(value, list) or len(value) != 3:
+            self.problems.append(f"{key} is {value!r}, not three numbers")
+            return default
+        channels = _Fields({f"{key}[{i}]": channel for i, channel in enumerate(value)}, key, self.problems)
+        red, green, blue = (channels.number(f"{key}[{i}]", default[i], 0.0, 1.0) for i in range(3))
+        return red, green, blue
+
+    def pair(self, key: str, default: tuple[float, float]) -> tuple[float, float]:
+        """Two numbers."""
+        value = self.values.get(key, list(default))
+        if not isinstance(value, list) or len(value) != 2:
+            self.problems.append(f"{key} is {value!r}, not two numbers")
+            return default
+        parts = _Fields({f"{key}[{i}]": part for i, part in enumerate(value)}, key, self.problems)
+        return parts.number(f"{key}[0]", default[0], -math.inf), parts.number(f"{key}[1]", default[1], -math.inf)
+
+    def whole(self, key: str, default: int) -> int:
+        """A whole number of 0 and above."""
+        value = self.values.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            self.problems.append(f"{key} is {value!r}, not a whole number of 0 or more")
+            return default
+        return value
+
+    def texture(self, key: str, count: int) -> tuple[int | None, TextureTransform]:
+        """Index of a texture, if there is one, and its transform."""
+        if key not in self.values:
+            return None, TextureTransform()
+        info = _Fields(self.values[key], key, self.problems)
+        index = info.values.get("index")
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
+            self.problems.append(f"{key} index {index!r} is not one of {count} textures")
+            return None, TextureTransform()
+        extensions = _Fields(info.values.get("extensions", {}), f"{key} extensions", self.problems).values
+        stated = _Fields(extensions.get(TEXTURE_TRANSFORM, {}), TEXTURE_TRANSFORM, self.problems)
+        return index, TextureTransform(
+            stated.pair("offset", (0.0, 0.0)),
+            stated.number("rotation", 0.0, -math.inf),
+            stated.pair("scale", (1.0, 1.0)),
+            stated.whole("texCoord", info.whole("texCoord", 0)),
+        )
+
+
+def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
+    name = str(entry.get("name", ""))
+    problems: list[str] = []
+    extensions = _Fields(entry.get("extensions", {}), "extensions", problems).values
+    transmission, volume, ior, strength, dispersion = (
+        _Fields(extensions.get(key, {}), key, problems)
+        for key in (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, DISPERSION)
+    )
+    surface = _Fields(entry.get("pbrMetallicRoughness", {}), "pbrMetallicRoughness", problems).values
+    problems += [
+        f"{key} is below pbrMetallicRoughness, where it has no meaning"
+        for key in _Fields(surface.get("extensions", {}), "extensions", problems).values
+        if key.startswith("KHR_materials_")
+    ]
+    scale = strength.number("emissiveStrength", 1.0, 0.0)
+    red, green, blue = _Fields(entry, "material", problems).triple("emissiveFactor", (0.0, 0.0, 0.0))
+    index_of_refraction = ior.number("ior", DEFAULT_IOR, 0.0)
+    texture, transform = volume.texture("thicknessTexture", len(file.items("textures")))
+    if 0 < index_of_refraction < 1:
+        problems.append(f"ior {index_of_refraction:g} is not 0, and not 1 or more")
+    found = GltfMaterial(
+        index=index,
+        name=name,
+        transmission=(share := transmission.number("transmissionFactor", 0.0, 0.0, 1.0)),
+        ior=index_of_refraction,
+        thickness=volume.number("thicknessFactor", 0.0, 0.0),
+        attenuation_color=volume.triple("attenuationColor", (1.0, 1.0, 1.0)),
+        attenuation_distance=volume.number("attenuationDistance", math.inf, 0.0, above=True),
+        dispersion=dispersion.number("dispersion", 0.0, 0.0),
+        emissive=(scale * red, scale * green, scale * blue),
+        thickness_texture=texture,
+        thickness_transform=transform,
+        has_volume=VOLUME in extensions,
+        transmits=share > 0 or _lets_light_in(extensions),
+    )
+    if problems:
+        raise InputError(
+            f"glTF {str(file.path)!r}", f"material {index} {name!r}: {', '.join(problems)}", "mend the file"
+        )
+    return GltfMaterial(**{**vars(found), "warnings": tuple(_warnings(found, entry, extensions, volume.values))})
+
+
+def _lets_light_in(extensions: Json) -> bool:
+    """Whether light may enter by another way than transmission: diffusely, or by an extension that is not known."""
+    return any(
+        key == "KHR_materials_diffuse_transmission" or (not key.startswith("KHR_") and key not in EXCLUDED)
+        for key in extensions
+    )
+
+
+def _warnings(found: GltfMaterial, entry: Json, extensions: Json, volume: Json) -> list[str]:
+    """What is allowed and yet suspicious; the first three are what the glTF validator warns of."""
+    if not found.has_volume:
+        return []
+    told = [f"{VOLUME} has an unknown property {key!r}" for key in volume if key not in _VOLUME_KEYS]
+    if TRANSMISSION not in extensions and not _lets_light_in(extensions):
+        told.append(f"{VOLUME} without {TRANSMISSION}: no light enters, so it is opaque")
+    if entry.get("doubleSided") is True and found.thickness > 0:
+        told.append("it is double-sided, which a volume should not be")
+    told += [f"{key} excludes {VOLUME}" for key in EXCLUDED if key in extensions]
+    black = [c for c, value in zip(("red", "green", "blue"), found.attenuation_color, strict=True) if value == 0]
+    if black and math.isfinite(found.attenuation_distance):
+        told.append(f"attenuationColor {' and '.join(black)} is 0, read as {BLACKEST:g}: no extinction makes black")
+    if found.ior == 0:
+        told.append(f"ior is 0, read as {DEFAULT_IOR:g}")
+    if found.thickness == 0 and math.isfinite(found.attenuation_distance):
+        told.append("thicknessFactor is 0, so it is a thin wall and attenuation has no effect")
+    texture = volume.get("thicknessTexture")
+    for key in texture.get("extensions", {}) if isinstance(texture, dict) else ():
+        if key != TEXTURE_TRANSFORM:
+            told.append(f"thicknessTexture has {key}, which is not read")
+    return told

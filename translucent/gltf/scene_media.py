@@ -1,0 +1,210 @@
+"""Where glTF materials are used: nodes, their transforms, and the thickness that a node's material has in the world.
+
+Formula: the thickness factor (times the texture's G channel) is a length in the mesh's own space. Along a direction v,
+a unit vector **of that space**, it is |M v| times as long in the world, with M the node's matrix. Scaling a world
+direction by the lengths of M's columns instead, as several renderers do, is right only where the axes of mesh and
+world coincide. Source: KHR_materials_volume ("thickness in the coordinate space of the mesh"), glTF 2.0 section 3.5.
+
+Not read: animation, skins, morph targets, instancing extensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.files.reading import shown
+from translucent.files.unpacking import open_picture
+from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.materials import GltfMaterial
+from translucent.gltf.textures import sample
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialUse:
+    """One node that uses a material: the node's index and name, the material's index, and node to world (4x4)."""
+
+    node: int
+    name: str
+    material: int
+    transform: Array
+
+
+def material_uses(file: GltfFile) -> list[MaterialUse]:
+    """All uses of materials by the nodes of the file, each material once per node.
+
+    Raises
+    ------
+    InputError
+        If the nodes form no trees, or an index or a transform is wrong.
+    """
+    nodes, transforms = file.items("nodes"), node_transforms(file)
+    uses = []
+    for index, node in enumerate(nodes):
+        if "mesh" in node:
+            mesh = file.item("meshes", node["mesh"])
+            name = str(node.get("name", mesh.get("name", "")))
+            for material in sorted({p["material"] for p in primitives(file, mesh) if "material" in p}):
+                uses.append(MaterialUse(index, name, material, transforms[index]))
+    return uses
+
+
+def node_transforms(file: GltfFile) -> dict[int, Array]:
+    """Node to world (4x4) of every node, by its index.
+
+    Raises
+    ------
+    InputError
+        If the nodes form no trees, or an index or a transform is wrong.
+    """
+    nodes = file.items("nodes")
+    transforms: dict[int, Array] = {}
+    children = {child for node in nodes for child in _indices(file, node)}
+    pending = [(index, np.eye(4)) for index in range(len(nodes)) if index not in children]
+    while pending:
+        index, above = pending.pop()
+        if index in transforms:
+            raise InputError(f"glTF {str(file.path)!r}", f"node {index} has two parents", "export the file again")
+        transforms[index] = above @ _local(file, index, nodes[index])
+        pending += [(child, transforms[index]) for child in _indices(file, nodes[index])]
+    if len(transforms) < len(nodes):
+        raise InputError(f"glTF {str(file.path)!r}", "nodes are their own parents", "export the file again")
+    return transforms
+
+
+def primitives(file: GltfFile, mesh: Json) -> list[Json]:
+    """The primitives of a mesh; raises `InputError` if they are no list of objects."""
+    found = mesh.get("primitives")
+    if not (isinstance(found, list) and all(isinstance(item, dict) for item in found)):
+        raise InputError(f"glTF {str(file.path)!r}", "a mesh has no list of primitives", "export the file again")
+    for primitive in found:
+        if not isinstance(primitive.get("attributes"), dict):
+            raise InputError(f"glTF {str(file.path)!r}", "a primitive has no attributes", "export the file again")
+        if "material" in primitive:
+            file.item("materials", primitive["material"])
+    return found
+
+
+def _indices(file: GltfFile, node: Json) -> list[int]:
+    found = node.get("children", [])
+    if not isinstance(found, list):
+        raise InputError(f"glTF {str(file.path)!r}", f"children {found!r}", "export the file again")
+    for index in found:
+        file.item("nodes", index)
+    return found
+
+
+def _local(file: GltfFile, index: int, node: Json) -> Array:
+    """A node's own 4x4 matrix; glTF lists matrices by columns, and quaternions as x, y, z, w."""
+    try:
+        if "matrix" in node:
+            return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), dtype=np.float64)
+        scale = np.array(node.get("scale", [1, 1, 1]), dtype=np.float64).reshape(3)
+        matrix = np.eye(4)
+        turn = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        matrix[:3, :3] = turn * scale
+        matrix[:3, 3] = np.array(node.get("translation", [0, 0, 0]), dtype=np.float64).reshape(3)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"glTF {str(file.path)!r}", f"node {index} has no valid transform", "export it again"
+        ) from error
+    return matrix
+
+
+def world_thickness(thickness: npt.ArrayLike, transform: npt.ArrayLike, direction: npt.ArrayLike) -> Array:
+    """Length in the world of a thickness in mesh space, measured along a direction of the world.
+
+    Parameters
+    ----------
+    thickness : array_like
+        In mesh space: the factor, or the factor times the texture's G channel.
+    transform : array_like (4, 4) or (3, 3)
+        Mesh to world; column vectors. It may mirror.
+    direction : array_like (3,)
+        Direction in the world, of any length.
+
+    Returns
+    -------
+    array
+        thickness |v_world| / |v_mesh| in metres, with v_mesh the direction taken into mesh space.
+
+    Raises
+    ------
+    InputError
+        If the transform flattens the mesh, or the direction is zero.
+    """
+    matrix = np.asarray(transform, dtype=np.float64)[:3, :3]
+    world = np.asarray(direction, dtype=np.float64)
+    try:
+        local = np.linalg.solve(matrix, world)
+    except np.linalg.LinAlgError:
+        raise InputError("thickness in the world", "the transform flattens the mesh", "give a scale above 0") from None
+    if not (length := float(np.linalg.norm(local))) > 0:
+        raise InputError(f"direction {world.tolist()}", "it has no length", "give for example (0, 0, 1)")
+    return np.asarray(thickness, dtype=np.float64) * (float(np.linalg.norm(world)) / length)
+
+
+def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
+    """(h, w): thickness in mesh space, factor times the G channel of the texture; None if it has no texture.
+
+    Row 0 is v = 0, the top of the image. The values are linear, as stored. 8-bit images have steps of factor / 255.
+
+    Raises
+    ------
+    InputError
+        If the image is missing or cannot be read.
+    """
+    if material.thickness_texture is None:
+        return None
+    texture = file.item("textures", material.thickness_texture)
+    data = file.resource(file.item("images", texture.get("source")))
+    asked = f"glTF {str(file.path)!r}: its thickness texture"
+    try:
+        with open_picture(data, asked, ("PNG", "JPEG"), per_pixel=40, do="export the file again") as image:
+            # Pillow reads 16-bit grey as it is, and 16-bit RGB as 8-bit.
+            deep = image.mode.startswith("I")
+            levels = np.asarray(image if deep else image.convert("RGB"), dtype=np.float64)
+    except InputError:
+        raise
+    except Exception as error:  # each of Pillow's decoders raises its own kinds
+        raise InputError(asked, f"it cannot be read ({shown(error)})", "export the file again") from error
+    return material.thickness * (levels / 65535.0 if deep else levels[..., 1] / 255.0)
+
+
+def thickness_at(file: GltfFile, material: GltfMaterial, uv: npt.ArrayLike) -> Array:
+    """(...,): thickness in mesh space at UVs of the mesh, with the texture's transform, wrapping and interpolation.
+
+    Parameters
+    ----------
+    file : GltfFile
+    material : GltfMaterial
+        Of that file. Without a thickness texture, its thickness is the same everywhere.
+    uv : array_like (..., 2)
+        As glTF has them, v = 0 at the top of the image; those of the set `material.thickness_transform.tex_coord`.
+
+    Raises
+    ------
+    InputError
+        If the image is missing or cannot be read, or the UVs are not finite pairs.
+    """
+    coordinates = np.asarray(uv, dtype=np.float64)
+    if coordinates.shape[-1:] != (2,) or not np.isfinite(coordinates).all():
+        raise InputError(f"UVs of shape {coordinates.shape}", "not finite pairs (..., 2)", "give u and v")
+    image = thickness_map(file, material)
+    if image is None:
+        return np.full(coordinates.shape[:-1], material.thickness)
+    texture = file.item("textures", material.thickness_texture)
+    sampler = file.item("samplers", texture["sampler"]) if "sampler" in texture else {}
+    return sample(image, material.thickness_transform.apply(coordinates), sampler)

@@ -1,0 +1,247 @@
+"""A medium written into the materials of a glTF file; everything else in the file keeps its meaning.
+
+Per target material: KHR_materials_transmission (factor 1, unless it is already above 0), KHR_materials_volume
+(color at a distance, thickness) and KHR_materials_ior. metallicFactor becomes 0, since metal transmits nothing, and
+doubleSided is dropped, since it has no effect on the boundary of a volume. Names, other extensions, textures,
+animations and binary data stay. The formulas, their source and what glTF cannot hold: see `translucent.gltf.materials`.
+Material variants (KHR_materials_variants) keep the materials that they name.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+from translucent.errors import InputError, TranslucentWarning
+from translucent.gltf.file import GltfFile, Json, check_gltf_output, read_gltf, write_gltf
+from translucent.gltf.materials import DEFAULT_IOR, EXCLUDED, IOR, TRANSMISSION, VOLUME, materials_of
+from translucent.gltf.scene_media import primitives
+from translucent.materials.color_distance import color_at
+from translucent.media.medium import Medium
+
+
+def volume_extensions(medium: Medium, distance: float | None, thickness: float, ior: float) -> Json:
+    """The extensions of a material that holds this medium.
+
+    Parameters
+    ----------
+    medium : Medium
+        Its extinction is written as absorption.
+    distance : float, optional
+        Where the color is stated, in metres; None: where the densest channel lets 1/e pass. See `color_at`.
+    thickness : float
+        thicknessFactor, in mesh space, > 0.
+    ior : float
+        Index of refraction, >= 1.
+    """
+    color, metres = color_at(medium, distance)
+    volume: Json = {"thicknessFactor": thickness}
+    if medium.extinction.any():
+        volume |= {"attenuationColor": color.tolist(), "attenuationDistance": metres}
+    return {TRANSMISSION: {"transmissionFactor": 1}, VOLUME: volume, IOR: {"ior": ior}}
+
+
+def write_medium(
+    path_in: str | Path,
+    path_out: str | Path,
+    medium: Medium,
+    *,
+    distance: float | None = None,
+    object_name: str | None = None,
+    thickness: float | None = None,
+    keep_ior: bool = False,
+    allow_outside: bool = False,
+) -> list[int]:
+    """Give a medium to the objects of a glTF file, and write the file; it is complete or not there.
+
+    Parameters
+    ----------
+    path_in, path_out : path
+        .gltf or .glb, in any combination; they may be the same.
+    medium : Medium
+        Scattering, emission and anisotropy are lost, with a `TranslucentWarning`.
+    distance : float, optional
+        Where the color is stated, in metres: what the medium was made with. None: where the densest channel lets 1/e
+        pass.
+    object_name : str, optional
+        Name of nodes or meshes. A material that others use, too, is duplicated. None: what light enters already, or
+        all objects where that is none.
+    thickness : float, optional
+        thicknessFactor in the mesh's own units, > 0. None: what the material has, else the smallest side of the
+        object's box (of the largest of several).
+    keep_ior : bool
+        Leave each material its index of refraction instead of writing that of the medium.
+    allow_outside : bool
+        Whether files that it links to may lie outside its folder; a .glb holds a copy of them.
+
+    Returns
+    -------
+    list of int
+        Indices of the materials that hold the medium.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, no object has that name, or a material excludes a volume.
+    RenderError
+        If the file cannot be written.
+    """
+    check_gltf_output(Path(path_out))
+    if thickness is not None and not 0 < thickness < math.inf:
+        raise InputError(f"thickness {thickness!r}", "not above 0 and finite", "give a length, for example 0.02")
+    file = read_gltf(path_in, allow_outside)
+    entered = {material.index for material in materials_of(file) if material.transmission > 0}
+    tree = copy.deepcopy(file.tree)
+    edited = GltfFile(file.path, tree, file.chunks, file.allow_outside)
+    targets = _own_materials(edited, object_name, entered)
+    for index, sizes in targets.items():
+        _give(edited, index, medium, distance, thickness, sizes, keep_ior)
+    used = tree.setdefault("extensionsUsed", [])
+    if not isinstance(used, list):
+        raise InputError(f"glTF {str(file.path)!r}", f"extensionsUsed is {used!r}, not a list", "export the file again")
+    used += [name for name in (TRANSMISSION, VOLUME, IOR) if name not in used and _uses(tree, name)]
+    if medium.scatters or medium.emits:
+        lost = "glTF holds absorption only: scattering is written as extinction, emission is lost"
+        warnings.warn(lost, TranslucentWarning, stacklevel=2)
+    write_gltf(edited, path_out)
+    return sorted(targets)
+
+
+def _uses(tree: Json, extension: str) -> bool:
+    return any(extension in material.get("extensions", {}) for material in tree["materials"])
+
+
+def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -> dict[int, list[float]]:
+    """Indices of the materials of the named objects and of them alone, each with the sizes of its objects.
+
+    Without a name: those that light enters, or all of them where nothing has one.
+    """
+    meshes = file.items("meshes")
+    mine = set(range(len(meshes))) if object_name is None else _meshes_named(file, object_name)
+    if not mine:
+        raise InputError(f"glTF {str(file.path)!r}", "it has no mesh", "give a model with a mesh")
+    used = {primitive.get("material") for index in mine for primitive in primitives(file, meshes[index])}
+    chosen = used & entered if object_name is None else set()
+    taken = {
+        primitive.get("material")
+        for index, mesh in enumerate(meshes)
+        for primitive in primitives(file, mesh)
+        if index not in mine
+    } | _in_variants(file)
+    copies: dict[Any, int] = {}
+    sizes: dict[int, list[float]] = {}
+    materials = file.tree.setdefault("materials", [])
+    for index in sorted(mine):
+        for primitive in primitives(file, meshes[index]):
+            old = primitive.get("material")
+            if chosen and old not in chosen:
+                continue
+            if old is None or old in taken:
+                if old not in copies:
+                    copies[old] = len(materials)
+                    materials.append(_copy(file, old, object_name))
+                primitive["material"] = copies[old]
+            sizes.setdefault(primitive["material"], []).append(_smallest_side(file, primitive))
+    return sizes
+
+
+def _copy(file: GltfFile, index: object, object_name: str | None) -> Json:
+    """A duplicate of a material under the object's name, or a new one where there was none."""
+    if index is None:
+        return {"name": object_name or "medium", "pbrMetallicRoughness": {"roughnessFactor": 0}}
+    made = copy.deepcopy(file.item("materials", index))
+    made["name"] = f"{made.get('name', 'material')} ({object_name or 'medium'})"
+    return made
+
+
+def _meshes_named(file: GltfFile, name: str) -> set[int]:
+    """Meshes of the nodes with this name, or with this name themselves; meshes that other nodes use are duplicated."""
+    nodes, meshes = file.items("nodes"), file.items("meshes")
+    named = [node for node in nodes if "mesh" in node and node.get("name") == name]
+    if not named:
+        found = {index for index, mesh in enumerate(meshes) if mesh.get("name") == name}
+        if not found:
+            known = {str(n.get("name", file.item("meshes", n["mesh"]).get("name", ""))) for n in nodes if "mesh" in n}
+            raise InputError(
+                f"object {name!r}",
+                f"{str(file.path)!r} has no mesh of that name",
+                f"use one of {', '.join(sorted(known - {''})) or 'none: its objects have no names'}",
+            )
+        return found
+    copies: dict[int, int] = {}
+    for node in named:
+        old = node["mesh"]
+        mesh = file.item("meshes", old)
+        if any(other.get("mesh") == old and other.get("name") != name for other in nodes):
+            if old not in copies:
+                copies[old] = len(meshes)
+                meshes.append(copy.deepcopy(mesh))
+            node["mesh"] = copies[old]
+        else:
+            copies[old] = old
+    return set(copies.values())
+
+
+def _in_variants(file: GltfFile) -> set[Any]:
+    """Materials that variants name."""
+    try:
+        return {
+            mapping.get("material")
+            for mesh in file.items("meshes")
+            for primitive in primitives(file, mesh)
+            for mapping in primitive.get("extensions", {}).get("KHR_materials_variants", {}).get("mappings", [])
+        }
+    except (AttributeError, TypeError) as error:
+        raise InputError(
+            f"glTF {str(file.path)!r}", "KHR_materials_variants is malformed", "export it again"
+        ) from error
+
+
+def _smallest_side(file: GltfFile, primitive: Json) -> float:
+    """Smallest side of a primitive's box, which glTF states with its positions."""
+    accessor = file.item("accessors", primitive["attributes"].get("POSITION"))
+    try:
+        return min(float(high) - float(low) for low, high in zip(accessor["min"], accessor["max"], strict=True))
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"glTF {str(file.path)!r}", "positions without min and max", "export the file again"
+        ) from error
+
+
+def _give(
+    file: GltfFile,
+    index: int,
+    medium: Medium,
+    distance: float | None,
+    thickness: float | None,
+    sizes: list[float],
+    keep_ior: bool,
+) -> None:
+    """Write the medium into one material."""
+    material = file.item("materials", index)
+    asked = f"material {index} {material.get('name', '')!r}"
+    extensions = material.setdefault("extensions", {})
+    if excluded := [name for name in EXCLUDED if name in extensions]:
+        raise InputError(asked, f"{excluded[0]} excludes a volume", "give the object another material")
+    before = extensions.get(VOLUME, {})
+    factor = before.get("thicknessFactor", 0) or max(sizes) if thickness is None else thickness
+    if not factor > 0:
+        raise InputError(asked, "its objects are flat and have no thickness", "give one, or choose another object")
+    ior = extensions.get(IOR, {}).get("ior", DEFAULT_IOR) if keep_ior else medium.ior
+    made = volume_extensions(medium, distance, factor, ior)
+    kept = {key: value for key, value in before.items() if key not in ("attenuationColor", "attenuationDistance")}
+    made[VOLUME] = kept | made[VOLUME]
+    made[IOR] = extensions.get(IOR, {}) | made[IOR]
+    if keep_ior and IOR not in extensions:
+        del made[IOR]
+    passing = extensions.get(TRANSMISSION, {})
+    if passing.get("transmissionFactor", 0) > 0:
+        del made[TRANSMISSION]
+    else:
+        made[TRANSMISSION] = passing | made[TRANSMISSION]
+    extensions.update(made)
+    material.setdefault("pbrMetallicRoughness", {})["metallicFactor"] = 0
+    material.pop("doubleSided", None)

@@ -1,0 +1,276 @@
+"""From colors at a distance to extinction and back, over whole arrays, and what to doubt about the result.
+
+Symbols: transmitted linear color t_c in 0 < t_c <= 1, distance d in m, extinction sigma_t in 1/m. Beer-Lambert:
+t_c = exp(-sigma_t d) for white light in a medium without in-scattering.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.formulas import optics
+from translucent.units import metres_per_unit
+
+Array = npt.NDArray[np.float64]
+
+#: What a channel of 0 becomes where clamping is asked for: an optical depth of 9.2.
+CLAMP = 1e-4
+
+#: Multiples of the distance at which a medium's colors are shown.
+FACTORS = (0.1, 0.5, 1.0, 2.0, 10.0)
+
+#: Distances in m between which a color at a distance describes an object of every-day size.
+USUAL_DISTANCES = (1e-5, 1e2)
+
+NEAR_BLACK, NEAR_WHITE = 1e-3, 0.98
+CHANNELS = ("red", "green", "blue")
+
+_BLOCK = 8192  # numbers that stay in the first cache between the check, the logarithm and the division
+
+
+def extinction_from_colors(colors: npt.ArrayLike, distances: npt.ArrayLike) -> Array:
+    """Extinction of many colors, each left of white light after its distance: sigma_t = -log(t_c) / d.
+
+    Parameters
+    ----------
+    colors : array_like (..., 3)
+        Linear, 0 < t_c <= 1; t_c = 1 gives exactly 0. For channels of 0 see `clamp_colors`.
+    distances : array_like (...,)
+        Metres, > 0, or one number for all; they broadcast over the colors.
+
+    Returns
+    -------
+    (..., 3) float64
+        1/m. Its relative error is that of the color times `condition_number`.
+
+    Raises
+    ------
+    InputError
+        If a channel or a distance is outside its range, or an extinction overflows.
+    """
+    t, d = _triples(colors), np.asarray(distances, dtype=np.float64)
+    if not (d > 0).all():
+        raise InputError(f"distance {float(d[~(d > 0)].flat[0]):g} m", "not above 0", "give distances in metres")
+    if d.ndim:
+        t, d = np.broadcast_arrays(t, d[..., None])
+    flat, result = np.ascontiguousarray(t).reshape(-1), np.empty(t.shape)
+    out = result.reshape(-1)
+    for start in range(0, flat.size, _BLOCK):
+        part, into = flat[start : start + _BLOCK], out[start : start + _BLOCK]
+        if not (part.min() > 0 and part.max() <= 1):
+            raise _outside(t)
+        np.log(part, out=into)
+        np.subtract(0.0, into, out=into)  # not a negation: the logarithm of white is to be 0, not -0
+    with np.errstate(over="ignore", under="ignore"):
+        result /= d
+    if not np.isfinite(result).all():
+        raise InputError("extinction of a color at a distance", "it overflows", "check the unit of the distance")
+    return result
+
+
+def clamp_colors(colors: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Colors whose channels of 0 became `CLAMP` (1e-4), which has an extinction, and which channels those were.
+
+    Parameters
+    ----------
+    colors : array_like (..., 3)
+        Linear. Only channels in 0 <= t < 1e-4 change: a negative one stays, to be refused.
+
+    Returns
+    -------
+    clamped : (..., 3) float64
+    changed : (..., 3) bool
+    """
+    t = _triples(colors)
+    changed = (t >= 0) & (t < CLAMP)
+    return np.where(changed, CLAMP, t), changed
+
+
+def color_at_distance(extinction: npt.ArrayLike, distances: npt.ArrayLike) -> Array:
+    """(..., 3): linear color left of white light after `distances` (...,) metres: exp(-sigma_t d)."""
+    with np.errstate(under="ignore"):
+        return optics.transmittance(_triples(extinction) * np.asarray(distances, dtype=np.float64)[..., None])
+
+
+def condition_number(colors: npt.ArrayLike) -> Array:
+    """Relative error of sigma_t per relative error of t_c: 1 / -log(t_c).
+
+    It is infinite at t_c = 1 (near white, rounding a color to 8 bits changes everything), and below 1 for t_c < 1/e.
+    The way back multiplies by -log(t_c): a relative error e of sigma_t is one of e -log(t_c) in the color.
+    """
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.abs(np.log(np.asarray(colors, dtype=np.float64)))
+
+
+def mean_free_path(extinction: npt.ArrayLike) -> Array:
+    """1 / sigma_t in m, the mean distance to the first event, after which 1/e (37 %) is left; inf where sigma_t = 0."""
+    with np.errstate(divide="ignore", over="ignore"):
+        return 1.0 / np.asarray(extinction, dtype=np.float64)
+
+
+def half_value_thickness(extinction: npt.ArrayLike) -> Array:
+    """ln 2 / sigma_t in m, after which half the light is left; inf where sigma_t = 0."""
+    with np.errstate(divide="ignore", over="ignore"):
+        return np.asarray(np.log(2.0) / np.asarray(extinction, dtype=np.float64))
+
+
+@dataclass(frozen=True)
+class DistanceMatch:
+    """Where a medium has a color.
+
+    Attributes
+    ----------
+    distance : float
+        Metres, >= 0: the best for all channels, by least squares in log space.
+    per_channel : tuple of (float or None)
+        Metres at which each channel has its value; inf if it never darkens so far, None if any distance does.
+    residual : tuple of float
+        log(color at `distance` / color) per channel, 0 where it is met.
+    color : tuple of float
+        The linear color that was asked for.
+    """
+
+    distance: float
+    per_channel: tuple[float | None, ...]
+    residual: tuple[float, ...]
+    color: tuple[float, ...]
+
+    def _repr_html_(self) -> str:
+        """Swatches of the color that was asked for and of the one that is found, for notebooks."""
+        from translucent.media.swatches import html_swatches
+
+        with np.errstate(under="ignore"):
+            found = np.array(self.color) * np.exp(self.residual)
+        return html_swatches([(self.color, "asked for"), (found, f"after {self.distance:.4g} m")])
+
+
+def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> DistanceMatch:
+    """Distance after which a medium leaves `color` of white light: the d that minimizes sum (sigma_t d + log t_c)^2.
+
+    Parameters
+    ----------
+    extinction : array_like (3,)
+        1/m, >= 0, with at least one channel above 0.
+    color : array_like (3,)
+        Linear, each channel in 0 < t_c <= 1.
+
+    Raises
+    ------
+    InputError
+        If the medium extinguishes nothing, or a channel is outside its range.
+    """
+    sigma, depth = _triples(extinction), extinction_from_colors(color, 1.0)
+    if not (np.isfinite(sigma).all() and (sigma >= 0).all() and (sigma > 0).any()):
+        raise InputError(f"extinction {sigma.tolist()}", "not three numbers >= 0, one above", "give one that absorbs")
+    peak = sigma.max()
+    with np.errstate(under="ignore", over="ignore"):  # relative to the largest channel, no square can overflow
+        share = sigma / peak
+        distance = float((share * depth).sum() / (share * share).sum() / peak)
+        if not np.isfinite(distance):
+            raise InputError(f"distance for color {np.asarray(color).tolist()}", "it overflows", "check the extinction")
+        per_channel = tuple(
+            (float(x / s) if s > 0 else np.inf if x > 0 else None) for s, x in zip(sigma, depth, strict=True)
+        )
+        residual = tuple((depth - sigma * distance).tolist())
+        return DistanceMatch(distance, per_channel, residual, tuple(_triples(color).tolist()))
+
+
+def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:
+    """What an artist should know about a color at a distance: ill-conditioned channels, a unit that looks wrong.
+
+    Parameters
+    ----------
+    color : array_like (3,)
+        Linear, each channel in 0 < t_c <= 1.
+    distance : float
+        Metres, > 0.
+
+    Returns
+    -------
+    tuple of str
+        One line each; empty if there is nothing to say.
+    """
+    t = _triples(color)
+    lines = [line for name, value in zip(CHANNELS, t.tolist(), strict=True) if (line := _channel_doubt(name, value))]
+    low, high = USUAL_DISTANCES
+    if not low <= distance <= high:
+        lines.append(f"the distance {distance:g} m is outside {low:g} to {high:g} m; check the unit")
+    near, far = (color_at_distance(extinction_from_colors(t, 1.0), factor) for factor in (FACTORS[0], FACTORS[-1]))
+    if near.max() < 0.01:
+        lines.append("all but black at a tenth of the distance already; check the unit, or give a lighter color")
+    if far.min() > 0.9 and t.min() < 1:
+        lines.append("all but clear at ten times the distance still; check the unit, or give a darker color")
+    return tuple(lines)
+
+
+def summary(color: npt.ArrayLike, distance: float, extinction: npt.ArrayLike, unit: str = "m") -> dict[str, Any]:
+    """All of this for one color, as JSON can hold it: None stands for infinity. Lengths in metres.
+
+    Parameters
+    ----------
+    color : array_like (3,)
+        Linear, after `distance`, each channel in 0 < t_c <= 1.
+    distance : float
+        Metres, > 0.
+    extinction : array_like (3,)
+        1/m, as converted.
+    unit : str
+        ``extinction_per_unit`` is per this unit.
+    """
+    t, sigma = _triples(color), _triples(extinction)
+    with np.errstate(over="ignore"):
+        distances = np.minimum(np.array(FACTORS) * distance, np.finfo(np.float64).max)
+    colors = color_at_distance(sigma, distances)
+    with np.errstate(under="ignore"):
+        per_unit = sigma * metres_per_unit(unit)
+    return {
+        "color": t.tolist(),
+        "distance": distance,
+        "extinction": sigma.tolist(),
+        "mean_free_path": _finite_or_none(mean_free_path(sigma)),
+        "half_value_thickness": _finite_or_none(half_value_thickness(sigma)),
+        "condition_number": _finite_or_none(condition_number(t)),
+        "transmittance": {f"{factor:g}": row.tolist() for factor, row in zip(FACTORS, colors, strict=True)},
+        "unit": unit,
+        "extinction_per_unit": per_unit.tolist(),
+        "warnings": list(doubts(t, distance)),
+    }
+
+
+def _finite_or_none(values: Array) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in values.tolist()]
+
+
+def _channel_doubt(name: str, value: float) -> str | None:
+    if value == 1:
+        return f"{name} is 1 (saturated): exactly no extinction, at any distance; if it was clipped, lower it"
+    if value > NEAR_WHITE:
+        # Next to white, a step of 1/255 in sRGB is one of 2.4 / 1.055 / 255 = 0.9 % in the linear value.
+        percent = 100 * 0.5 * 2.4 / 1.055 / 255 * float(condition_number(value))
+        return f"{name} {value:g} is near white: rounding it to 8 bits changes its extinction by up to {percent:.0f} %"
+    if value < NEAR_BLACK:
+        return f"{name} {value:g} is near black: 8 bits hardly tell it from 0, which no extinction makes"
+    return None
+
+
+def _triples(values: npt.ArrayLike) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise InputError(f"colors of shape {array.shape}", "not (..., 3)", "give red, green and blue on the last axis")
+    return array
+
+
+def _outside(t: Array) -> InputError:
+    wrong = ~((t > 0) & (t <= 1))
+    first = tuple(np.argwhere(wrong)[0].tolist())
+    where = f" in color {', '.join(str(i) for i in first[:-1])}" if len(first) > 1 else ""
+    return InputError(
+        f"{int(wrong.sum())} of {t.size} channels",
+        f"not in 0 < t <= 1, the first {CHANNELS[first[-1]]} = {t[first]:g}{where}",
+        "clamp zeros on purpose, and scale colors to at most 1",
+    )

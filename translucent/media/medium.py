@@ -1,0 +1,217 @@
+"""Homogeneous media: what light meets between the entry and the exit of a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.formulas import optics
+from translucent.formulas.color import parse_color
+from translucent.frozen import Frozen
+from translucent.media import conversion
+
+Array = npt.NDArray[np.float64]
+Channels = npt.ArrayLike
+
+#: Largest absorption and scattering in 1/m: far beyond any matter, and their products with lengths stay finite.
+MAX_COEFFICIENT = 1e300
+
+#: Largest emission in radiance per metre: its product with a length stays within float32.
+MAX_EMISSION = 1e18
+
+#: Largest index of refraction; germanium in the infrared has 4.
+MAX_IOR = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class Medium(Frozen):
+    """A homogeneous participating medium. Triples are linear Rec.709 channels; a single number stands for all three.
+
+    Parameters
+    ----------
+    absorption : array_like (3,)
+        sigma_a in 1/m, >= 0.
+    scattering : array_like (3,)
+        sigma_s in 1/m, >= 0: light that leaves the ray sideways.
+    emission : array_like (3,)
+        q in radiance per metre, >= 0.
+    anisotropy : float
+        Henyey-Greenstein g, -1 < g < 1.
+    ior : float
+        Index of refraction, >= 1; 1 is index-matched.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range or not finite.
+    """
+
+    absorption: Channels = (0.0, 0.0, 0.0)
+    scattering: Channels = (0.0, 0.0, 0.0)
+    emission: Channels = (0.0, 0.0, 0.0)
+    anisotropy: float = 0.0
+    ior: float = 1.0
+
+    def __post_init__(self) -> None:
+        for field in ("absorption", "scattering", "emission"):
+            object.__setattr__(self, field, _channels(field, getattr(self, field)))
+        if not -1 < self.anisotropy < 1:
+            raise InputError(f"medium anisotropy {self.anisotropy}", "not between -1 and 1", "give for example 0.8")
+        if not 1 <= self.ior <= MAX_IOR:
+            raise InputError(f"medium ior {self.ior}", f"not in 1 to {MAX_IOR:g}", "give for example 1.5 for glass")
+
+    @classmethod
+    def from_color(cls, color: str | npt.ArrayLike, distance: float, ior: float = 1.0) -> Medium:
+        """Absorbing medium that turns white light into `color` after `distance`: sigma_a = -log(t_c) / d.
+
+        Parameters
+        ----------
+        color : str or array_like (3,)
+            Transmitted color: hex and names are sRGB, bare triples linear; each channel in 0 < t_c <= 1.
+        distance : float
+            In metres, > 0. Infinity leaves white light white, as an absent glTF attenuationDistance does.
+        ior : float
+            Index of refraction.
+
+        Raises
+        ------
+        InputError
+            If a channel is 0 (no finite extinction makes it: see `clamp_colors`), above 1 or not finite, or the
+            distance is not positive.
+        """
+        triple = parse_color(color)
+        for channel, value in zip(("red", "green", "blue"), triple, strict=True):
+            if not 0 < value <= 1:
+                raise InputError(
+                    f"color {color!r}" if isinstance(color, str) else f"color {tuple(triple.tolist())}",
+                    f"{channel} = {value:g} is not in 0 < t <= 1",
+                    "no finite extinction gives 0 or above 1; use for example 0.001 for nearly black"
+                    if value <= 0
+                    else "a medium cannot add light; scale the color to at most 1",
+                )
+        try:
+            metres = float(distance)
+        except (TypeError, ValueError):
+            metres = np.nan
+        if not metres > 0:
+            raise InputError(f"distance {distance!r}", "not above 0", "give the distance in metres, for example 0.02")
+        with np.errstate(over="ignore", under="ignore"):
+            extinction = optics.extinction_from_color(triple, metres)
+        if not (extinction <= MAX_COEFFICIENT).all():
+            raise InputError(f"distance {metres:g} m", "so short that the extinction overflows", "check the unit")
+        return cls(absorption=extinction, ior=ior)
+
+    @classmethod
+    def from_particles(
+        cls,
+        number_density: float,
+        radius: float,
+        albedo: Channels = 0.0,
+        glow: Channels = 0.0,
+        anisotropy: float = 0.0,
+    ) -> Medium:
+        """Medium of many small opaque spheres: sigma_t = rho A with their projected area A = pi r^2.
+
+        Max 1995, sections 2 to 5: of the light that meets a particle it scatters the share `albedo` and absorbs
+        the rest, and it sends out the radiance `glow` where it absorbs, so that q = sigma_a glow.
+
+        Parameters
+        ----------
+        number_density : float
+            rho, particles per cubic metre, >= 0.
+        radius : float
+            r in metres, >= 0.
+        albedo : array_like (3,)
+            0 to 1: black particles, which only absorb, to white ones.
+        glow : array_like (3,)
+            Radiance of the particles themselves, >= 0.
+        anisotropy : float
+            Henyey-Greenstein g, -1 < g < 1.
+
+        Raises
+        ------
+        InputError
+            If a value is outside its range or not finite.
+        """
+        for name, value in (("number_density", number_density), ("radius", radius)):
+            if not 0 <= value < np.inf:
+                raise InputError(f"particles of {name} {value}", "not a number of 0 and above", "give it in metres")
+        shares = _channels("albedo", albedo)
+        if (shares > 1).any():
+            raise InputError(
+                f"medium albedo {tuple(shares.tolist())}",
+                "above 1",
+                "particles scatter at most all light that they meet",
+            )
+        # What overflows is refused as any medium is.
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            extinction = number_density * np.pi * radius * radius
+            absorption, scattering = extinction * (1.0 - shares), extinction * shares
+            return cls(absorption, scattering, absorption * _channels("glow", glow), anisotropy)
+
+    @property
+    def extinction(self) -> Array:
+        """(3,): sigma_t = sigma_a + sigma_s in 1/m."""
+        return np.asarray(np.add(self.absorption, self.scattering))
+
+    def transmittance(self, distance: npt.ArrayLike) -> Array:
+        """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
+        with np.errstate(under="ignore", invalid="ignore", over="ignore"):
+            optical_depth = np.asarray(distance, dtype=np.float64)[..., None] * self.extinction
+        # Without extinction even an infinite way, 0 times infinity, loses nothing.
+        return optics.transmittance(np.where(self.extinction == 0, 0.0, optical_depth))
+
+    @property
+    def mean_free_path(self) -> Array:
+        """(3,): 1 / sigma_t in m, after which 1/e is left; inf where there is no extinction."""
+        return conversion.mean_free_path(self.extinction)
+
+    @property
+    def half_value_thickness(self) -> Array:
+        """(3,): ln 2 / sigma_t in m, after which half is left; inf where there is no extinction."""
+        return conversion.half_value_thickness(self.extinction)
+
+    def _repr_html_(self) -> str:
+        """Swatches of white light after 0.1 to 10 times the 1/e distance, for notebooks."""
+        from translucent.media.swatches import html_strip
+
+        return html_strip(self.extinction)
+
+    @property
+    def emits(self) -> bool:
+        """Whether any channel emits."""
+        return bool(np.any(np.asarray(self.emission) > 0))
+
+    @property
+    def scatters(self) -> bool:
+        """Whether any channel scatters."""
+        return bool(np.any(np.asarray(self.scattering) > 0))
+
+    def _key(self) -> tuple[object, ...]:
+        triples = (np.asarray(v) for v in (self.absorption, self.scattering, self.emission))
+        return (*(tuple(t.tolist()) for t in triples), self.anisotropy, self.ior)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Medium) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+
+def _channels(field: str, value: Channels) -> Array:
+    try:
+        triple = np.broadcast_to(np.array(value, dtype=np.float64), (3,)).copy()
+    except (TypeError, ValueError):
+        raise InputError(f"medium {field} {value!r}", "not one or three numbers", "give (r, g, b)") from None
+    limit = MAX_EMISSION if field == "emission" else MAX_COEFFICIENT
+    if (triple > limit).any() and np.isfinite(triple).all():
+        raise InputError(f"medium {field} {tuple(triple.tolist())}", f"above {limit:g}", "check the unit")
+    if not (np.isfinite(triple).all() and (triple >= 0).all()):
+        raise InputError(
+            f"medium {field} {tuple(triple.tolist())}", "negative or not finite", "give values of 0 and above"
+        )
+    triple.setflags(write=False)
+    return triple

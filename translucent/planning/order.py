@@ -1,0 +1,47 @@
+"""When a sum over each ray does not tell the picture, so that the order of the surfaces on it has to be found."""
+
+from __future__ import annotations
+
+from translucent.planning.borders import touching_borders
+from translucent.planning.methods import BackFaceDepth, Method, ThinLayer
+from translucent.planning.render_plan import Borders
+from translucent.planning.slots import MAX_SLOTS, medium_slots, overlapping_pair, same_medium
+from translucent.scene.scene import Scene
+
+
+def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> str | None:
+    """Why a sum over each ray, found by the method, does not tell the picture of this scene; None if it does."""
+    bodies = scene.bodies
+    if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
+        return "emission among several media: what is in front dims what is behind"
+    if method is None and borders == "both" and (touching := touching_borders(scene)) is not None:
+        return touching
+    if method is None and (why := _inside_out(scene)) is not None:
+        return why
+    # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
+    if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
+        return None
+    solids = [body for body in bodies if body.sheet_thickness is None]
+    if (found := overlapping_pair(solids)) is not None:
+        earlier, later = (solids[place] for place in found)
+        return (
+            f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
+            "would count both"
+        )
+    for body in solids:
+        if not body.mesh.diagnosis.convex:
+            return f'overlap="{scene.overlap}": {body.mesh.name!r} may overlap itself, and a sum would count it twice'
+    return None
+
+
+def _inside_out(scene: Scene) -> str | None:
+    """Which body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals cannot."""
+    broken = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.inside_out]
+    if not broken or len(medium_slots(scene)) > MAX_SLOTS:
+        return None
+    return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
+
+
+def media_differ(scene: Scene) -> bool:
+    """Whether not all bodies are filled with the same medium."""
+    return any(not same_medium(scene.bodies[0], body) for body in scene.bodies[1:])

@@ -1,0 +1,115 @@
+"""What the intervals of a ray tell apart: bodies grouped into slots, one winding number for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.media.medium import Medium
+from translucent.scene.overlaps import first_overlap
+from translucent.scene.scene import Object, Scene
+
+#: Winding numbers that a ray keeps apart.
+MAX_SLOTS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """Bodies whose intervals need not be told apart.
+
+    Attributes
+    ----------
+    objects : tuple of int
+        Indices into `Scene.objects`.
+    medium : Medium
+    priority : int
+    """
+
+    objects: tuple[int, ...]
+    medium: Medium
+    priority: int
+
+
+def medium_slots(scene: Scene) -> tuple[Slot, ...]:
+    """The slots of a scene, of the highest priority first.
+
+    Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
+    often, and whether at all, the medium fills a place. An open body keeps a slot of its own, lest its holes cancel
+    those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority
+    share one.
+    """
+    groups: dict[Hashable, list[int]] = {}
+    for i, body in enumerate(scene.objects):
+        if body.medium is None or body.sheet_thickness is not None:
+            continue
+        own = i if not _never_negative(body) else None
+        priority = body.priority if scene.overlap == "priority" else 0
+        groups.setdefault((own, priority, _filling(scene, i)), []).append(i)
+    slots = []
+    for group in sorted(groups.values(), key=lambda group: -scene.objects[group[0]].priority):
+        first = scene.objects[group[0]]
+        assert first.medium is not None
+        slots.append(Slot(tuple(group), first.medium, first.priority))
+    return tuple(slots)
+
+
+def require_clear_priorities(scene: Scene) -> None:
+    """Raise where two bodies of different media and equal priority may claim the same place."""
+    bodies = [i for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None]
+    priorities = np.unique([scene.objects[i].priority for i in bodies], return_inverse=True)[1]
+    known: dict[Hashable, int] = {}
+    fillings = np.array([known.setdefault(_filling(scene, i), len(known)) for i in bodies])
+    found = overlapping_pair(
+        [scene.objects[i] for i in bodies],
+        lambda one, other: (priorities[one] == priorities[other]) & (fillings[one] != fillings[other]),
+    )
+    if found is not None:
+        i, j = (bodies[place] for place in found)
+        earlier, later = scene.objects[i], scene.objects[j]
+        raise InputError(
+            'overlap="priority"',
+            f"objects {i} ({earlier.mesh.name!r}) and {j} ({later.mesh.name!r}) may overlap with different "
+            f"media, and both have priority {later.priority}",
+            "give the one that displaces the other a higher priority",
+        )
+
+
+def same_medium(a: Object, b: Object) -> bool:
+    """Whether two bodies are filled alike, as far as thickness, absorption and emission go."""
+    if a.medium is None or b.medium is None or a.medium is b.medium:
+        return a.medium is b.medium
+    return np.array_equal(a.medium.extinction, b.medium.extinction) and np.array_equal(
+        a.medium.emission, b.medium.emission
+    )
+
+
+def overlapping_pair(
+    bodies: Sequence[Object],
+    matters: Callable[[npt.NDArray[np.intp], npt.NDArray[np.intp]], npt.NDArray[np.bool_]] | None = None,
+) -> tuple[int, int] | None:
+    """Places of two bodies whose bounds share more than their border; bodies that touch there share no volume.
+
+    `matters` gets the places of many pairs, and says which of them count; default: all.
+    """
+    if len(bodies) < 2:
+        return None
+    return first_overlap(np.stack([body.bounds for body in bodies]), matters)
+
+
+def _never_negative(body: Object) -> bool:
+    return body.mesh.diagnosis.sound
+
+
+def _filling(scene: Scene, i: int) -> Hashable:
+    """What an object fills a place with: equal for two of them where it makes no difference which of the two does."""
+    medium, varies = scene.objects[i].medium, scene.objects[i].density is not None
+    if medium is None or varies:
+        return i
+    told = [*medium.extinction, *np.asarray(medium.emission)]
+    if scene.lights:
+        told += [*np.asarray(medium.scattering), medium.anisotropy]
+    return tuple(map(float, told))

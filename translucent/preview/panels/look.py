@@ -1,0 +1,118 @@
+"""The look panel: camera, environment, light, exposure. And the files panel: sessions, pictures, bakes."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from translucent.formulas.tone import TONES
+from translucent.preview.actions import Change, View
+from translucent.preview.desk import FAINT, Desk, begin_rows, check, choice, fact, row, slider, wrapped
+
+ENVIRONMENTS = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
+
+
+def look_panel(desk: Desk) -> None:
+    """The whole panel."""
+    imgui.separator_text("Camera")
+    orbit = desk.work.document.orbit
+    if orbit is not None and begin_rows("camera"):
+        slider(desk, "field of view", "orbit.fov_y", 5.0, 120.0, "%.0f deg")
+        check(desk, "orthographic", "orbit.orthographic")
+        imgui.end_table()
+    if imgui.button("Frame (F)"):
+        desk.work.frame()
+    imgui.same_line()
+    if imgui.button("Reset") and orbit is not None:
+        desk.work.do(View(None))
+        desk.work.reframe()
+    imgui.separator_text("Environment")
+    if begin_rows("environment"):
+        _environment(desk, "lights with", "look.environment", "the model's own")
+        _environment(desk, "background", "look.background", "the same")
+        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
+        imgui.end_table()
+    imgui.separator_text("Light")
+    if begin_rows("light"):
+        check(desk, "directional light", "look.light", tip="Seen in media that scatter, and on opaque objects.")
+        if desk.get("look.light"):
+            slider(desk, "from around", "look.light_yaw", -180.0, 180.0, "%.0f deg", tip="Or drag with L held.")
+            slider(desk, "from above", "look.light_pitch", -89.0, 89.0, "%.0f deg")
+            slider(desk, "irradiance", "look.light_irradiance", 0.0, 50.0, "%.2f W/m2")
+        imgui.end_table()
+    imgui.separator_text("Picture")
+    if begin_rows("picture"):
+        slider(desk, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
+        choice(desk, "tone curve", "look.tone", TONES)
+        imgui.end_table()
+
+
+def _environment(desk: Desk, label: str, name: str, empty: str) -> None:
+    row(label)
+    now = desk.get(name)
+    if imgui.begin_combo(f"##{name}", now or empty):
+        for word in ENVIRONMENTS:
+            if imgui.selectable(word or empty, word == now)[0]:
+                desk.work.do(Change(name, word))
+        if imgui.selectable("a file ...", False)[0]:
+            desk.ask_file("environment" if name.endswith("environment") else "background")
+        imgui.end_combo()
+
+
+def files_panel(desk: Desk) -> None:
+    """Pictures and turntables of the view, the session, the medium written into a file; what is baked."""
+    imgui.separator_text("Picture of this view")
+    changed, value = imgui.checkbox("transparent background", desk.export["transparent"])
+    if changed:
+        desk.export["transparent"] = value
+    for label, kind in (("PNG ...", "png"), ("EXR ...", "exr")):
+        if imgui.button(label):
+            desk.ask_file(kind)
+        imgui.same_line()
+    if imgui.button("Turntable ..."):
+        desk.ask_file("turntable")
+    imgui.separator_text("Session")
+    if imgui.button("Open session ..."):
+        desk.ask_file("open session")
+    imgui.same_line()
+    if imgui.button("Save session ..."):
+        desk.ask_file("save session")
+    imgui.separator_text("Model")
+    if imgui.button("Save medium into .glb ..."):
+        desk.ask_file("save glb")
+    wrapped("A copy of the model's file with this medium in its materials.", FAINT)
+    import translucent as tl
+
+    if hasattr(tl, "bake_thickness"):
+        _bake(desk)
+
+
+def _bake(desk: Desk) -> None:
+    imgui.separator_text("Bake thickness")
+    modes, sizes, rays = ("cone", "normal", "transmittance", "inscribed"), (256, 512, 1024, 2048), (16, 64, 256)
+    if begin_rows("bake"):
+        for label, values in (("mode", modes), ("size", sizes), ("rays", rays)):
+            row(label)
+            if imgui.begin_combo(f"##bake{label}", str(desk.baking[label])):
+                for value in values:
+                    if imgui.selectable(str(value), value == desk.baking[label])[0]:
+                        desk.baking[label] = value
+                imgui.end_combo()
+        imgui.end_table()
+    task = desk.work.lanes["bake"].task
+    if task is not None:
+        imgui.progress_bar(task.share or 0.0)
+        if imgui.button("Cancel"):
+            task.cancel()
+    elif imgui.button("Bake"):
+        desk.work.start_bake(**desk.baking)
+    if (bake := desk.work.bake) is not None:
+        imgui.same_line()
+        if imgui.button("Save map ..."):
+            desk.ask_file("map")
+        changed, shown = imgui.checkbox("show on the model", desk.work.show_bake)
+        if changed:
+            desk.work.show_bake = shown
+        if begin_rows("baked"):
+            fact("thickest", bake.thickest_text(desk.get("display.unit")))
+            fact("covered", f"{bake.covered:.0%} of the texels")
+            imgui.end_table()

@@ -1,0 +1,249 @@
+"""The material panel: what fills the bodies, by the names of glTF, with the numbers of ``translucent extinction``."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from translucent.errors import InputError
+from translucent.formulas.color import parse_color, to_hex
+from translucent.materials import text_block
+from translucent.media.medium import Medium
+from translucent.media.presets import presets
+from translucent.preview import numbers
+from translucent.preview.actions import Change, ChoosePreset
+from translucent.preview.desk import (
+    FAINT,
+    WARNING,
+    Desk,
+    begin_rows,
+    check,
+    em,
+    fact,
+    row,
+    slider,
+    triple,
+    wrapped,
+)
+from translucent.preview.document import SHOWN_UNITS, Material
+from translucent.preview.scenes import medium_of
+from translucent.units import metres_per_unit
+
+#: Systems that the medium is copied for, with their names on buttons.
+COPIES = {"gltf": "glTF", "openpbr": "OpenPBR", "blender": "Blender", "unreal": "Unreal", "json": "JSON"}
+
+#: Of curves: red, green and blue that are told apart on a dark background.
+CURVES = ((0.95, 0.36, 0.33, 1.0), (0.38, 0.80, 0.42, 1.0), (0.36, 0.58, 1.0, 1.0))
+
+numbers_told = lru_cache(maxsize=4)(numbers.told)
+extinction_lines = lru_cache(maxsize=4)(numbers.extinction_lines)
+swatches = lru_cache(maxsize=4)(numbers.swatches)
+
+
+def material_panel(desk: Desk) -> None:
+    """The whole panel."""
+    material = desk.work.document.material
+    _source(desk, material)
+    imgui.separator_text("Volume")
+    if begin_rows("volume"):
+        _color(desk, material)
+        imgui.end_table()
+    _distance(desk, material)
+    if begin_rows("thickness"):
+        slider(desk, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True, tip=THICKNESS_TIP)
+        imgui.end_table()
+    _swatches(desk, material)
+    _curves(desk, material)
+    imgui.separator_text("Surface")
+    if begin_rows("surface"):
+        slider(desk, "ior", "material.ior", 1.0, 2.5, "%.3f", tip="Index of refraction; 1: light goes straight on.")
+        slider(desk, "roughness", "material.roughness", 0.0, 1.0)
+        slider(desk, "transmission", "material.transmission", 0.0, 1.0)
+        slider(desk, "dispersion", "material.dispersion", 0.0, 10.0, tip="20 / Abbe number.")
+        imgui.end_table()
+    imgui.separator_text("Scattering and emission")
+    triple(desk, "absorption, 1/m", "material.absorption", 0.5)
+    triple(desk, "scattering, 1/m", "material.scattering", 0.5)
+    triple(desk, "emission, radiance per m", "material.emission", 0.05)
+    if begin_rows("scattering"):
+        slider(desk, "anisotropy g", "material.anisotropy", -0.99, 0.99)
+        check(desk, "multiple", "material.multiple_scattering", tip="Light scattered more than once, approximately.")
+        imgui.end_table()
+    imgui.separator_text("Numbers")
+    _numbers(desk, material)
+    imgui.separator_text("Copy")
+    _copies(desk, material)
+
+
+THICKNESS_TIP = "thicknessFactor: written to files, and the sheet of thin layers. The picture uses the mesh's own."
+
+
+def _source(desk: Desk, material: Material) -> None:
+    if begin_rows("source"):
+        row("preset")
+        if imgui.begin_combo("##preset", material.preset or "none"):
+            for name, found in presets().items():
+                if imgui.selectable(f"{name}  ({found.kind})", name == material.preset)[0]:
+                    desk.work.do(ChoosePreset(name))
+                if imgui.is_item_hovered():
+                    imgui.set_tooltip("\n".join(x for x in (found.source, found.note, found.regime) if x))
+            imgui.end_combo()
+        words = {
+            "file": "the model's own",
+            "color": "color at a distance",
+            "preset": f"preset {material.preset}",
+            "coefficients": "coefficients",
+        }
+        fact("medium from", words[material.source])
+        imgui.end_table()
+    if material.source == "preset":
+        found = presets()[material.preset]
+        wrapped(f"{found.kind}: {found.source}", FAINT)
+        if found.warning:
+            wrapped(found.warning, WARNING)
+
+
+def _color(desk: Desk, material: Material) -> None:
+    row("attenuationColor", "Linear color that is left of white light after attenuationDistance.")
+    shown = list(numbers.to_display(material.color))
+    flags = imgui.ColorEditFlags_.display_hex | imgui.ColorEditFlags_.picker_hue_wheel
+    changed, encoded = imgui.color_edit3("##color", shown, flags)
+    if imgui.is_item_activated():
+        desk.drag += 1
+    if changed:
+        desk.change("material.color", numbers.from_display(np.asarray(list(encoded)[:3])))
+    fact("linear", numbers.triple_text(material.color))
+    row("as text", "A hex color, a CSS name, srgb(r,g,b) or linear(r,g,b); press Enter.")
+    text = desk.texts.get("color", "")
+    entered, text = imgui.input_text_with_hint(
+        "##colortext", to_hex(material.color), text, imgui.InputTextFlags_.enter_returns_true
+    )
+    desk.texts["color"] = text
+    if entered and text:
+        desk.texts["color"] = _typed_color(desk, text)
+
+
+def _typed_color(desk: Desk, text: str) -> str:
+    """What stays in the field: nothing, or what could not be read."""
+    try:
+        color = np.asarray(parse_color(text))
+    except InputError as error:
+        desk.work.refuse(error)
+        return text
+    desk.change("material.color", color.tolist(), step=True)
+    return ""
+
+
+def _distance(desk: Desk, material: Material) -> None:
+    unit = desk.get("display.unit")
+    scale = metres_per_unit(unit)
+    imgui.text("attenuationDistance")
+    imgui.set_next_item_width(-em(4.2))
+    flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+    changed, value = imgui.slider_float(
+        "##distance", material.distance / scale, 1e-5 / scale, 1e2 / scale, "%.5g", flags
+    )
+    if imgui.is_item_activated():
+        desk.drag += 1
+    if changed and value > 0:
+        # Five digits are what is shown, so that what is copied is what is seen.
+        desk.change("material.distance", float(f"{value:.5g}") * scale)
+    imgui.same_line()
+    imgui.set_next_item_width(-1.0)
+    if imgui.begin_combo("##unit", unit, imgui.ComboFlags_.height_small):
+        for word in SHOWN_UNITS:
+            if imgui.selectable(word, word == unit)[0]:
+                desk.work.do(Change("display.unit", word))
+        imgui.end_combo()
+
+
+def _swatches(desk: Desk, material: Material) -> None:
+    imgui.text_colored(FAINT, "white light after")
+    found, unit = swatches(material), desk.get("display.unit")
+    width = imgui.get_content_region_avail().x
+    each = max((width - em(0.25) * (len(found) - 1)) / len(found), em(1.0))
+    for i, (metres, text) in enumerate(found):
+        if i:
+            imgui.same_line(0.0, em(0.25))
+        red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+        flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop
+        imgui.color_button(f"##swatch{i}", imgui.ImVec4(red, green, blue, 1.0), flags, imgui.ImVec2(each, em(1.6)))
+        if imgui.is_item_hovered():
+            imgui.set_tooltip(f"{numbers.length_text(metres, unit)}\n{text}")
+
+
+def _curves(desk: Desk, material: Material) -> None:
+    measured, unit = desk.work.measured, desk.get("display.unit")
+    scale = metres_per_unit(unit)
+    most = float(measured.seen.edges[-1]) if measured is not None else 3.0 * material.distance
+    distances, curves = numbers.transmittance_curves(material, most)
+    quiet = implot.AxisFlags_.no_menus | implot.AxisFlags_.no_highlight
+    plain = implot.Flags_.no_menus | implot.Flags_.no_inputs | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
+    if not implot.begin_plot("##curves", imgui.ImVec2(-1.0, em(9.0)), plain | implot.Flags_.no_legend):
+        return
+    implot.setup_axes(f"thickness, {unit}", "transmittance", quiet, quiet)
+    implot.setup_axes_limits(0.0, most / scale, 0.0, 1.05, implot.Cond_.always)
+    if measured is not None and measured.seen.pixels:
+        seen = measured.seen
+        centers = np.ascontiguousarray((seen.edges[:-1] + seen.edges[1:]) / 2 / scale)
+        spec = implot.Spec()
+        spec.fill_color = imgui.ImVec4(0.55, 0.58, 0.65, 0.35)
+        spec.line_color = imgui.ImVec4(0.55, 0.58, 0.65, 0.35)
+        implot.plot_bars(
+            "how much of the model is so thick", centers, seen.counts, float(centers[1] - centers[0]), spec
+        )
+    for channel, name in enumerate(("red", "green", "blue")):
+        spec = implot.Spec()
+        spec.line_color, spec.line_weight = imgui.ImVec4(*CURVES[channel]), 2.0
+        implot.plot_line(name, distances / scale, np.ascontiguousarray(curves[:, channel]), spec)
+    implot.end_plot()
+    if measured is not None and measured.seen.thickness.size:
+        seen = measured.seen
+        text = _average_hex(measured, medium_of(material))
+        median = numbers.length_text(float(np.median(seen.thickness)), unit)
+        wrapped(f"bars: thickness of the model, median {median}; on average it shows {text}", FAINT)
+
+
+_averages: dict[int, tuple[object, Medium, str]] = {}
+
+
+def _average_hex(measured: object, medium: Medium) -> str:
+    """The average color of the model; kept until either changes."""
+    known = _averages.get(0)
+    if known is None or known[0] is not measured or known[1] != medium:
+        seen = measured.seen  # type: ignore[attr-defined]
+        known = _averages[0] = measured, medium, seen.average_hex(medium)
+    return known[2]
+
+
+def _numbers(desk: Desk, material: Material) -> None:
+    if begin_rows("numbers"):
+        for label, text in extinction_lines(material):
+            fact(label, text)
+        imgui.end_table()
+    for line in numbers_told(material)["warnings"]:
+        wrapped(line, WARNING)
+
+
+def _copies(desk: Desk, material: Material) -> None:
+    width = imgui.get_content_region_avail().x
+    for target, label in COPIES.items():
+        size = imgui.calc_text_size(label).x + 2 * imgui.get_style().frame_padding.x
+        if target != next(iter(COPIES)):
+            imgui.same_line()
+            if imgui.get_cursor_pos_x() + size > width:
+                imgui.new_line()
+        if imgui.button(label):
+            desk.work.attempt(lambda t=target: _copy(material, t), f"copied as {label}")  # type: ignore[misc]
+
+
+def copied_text(material: Material, target: str) -> str:
+    """The block of text that a target gets: what ``translucent extinction --as`` prints."""
+    medium, distance = medium_of(material), float(numbers.told(material)["distance"])
+    return text_block(target, medium, medium.transmittance(distance), distance)
+
+
+def _copy(material: Material, target: str) -> None:
+    imgui.set_clipboard_text(copied_text(material, target))

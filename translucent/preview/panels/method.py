@@ -1,0 +1,97 @@
+"""The method panel: what runs and why, how long it takes, how wrong it is, and what is to be seen beside it."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from translucent.planning.methods import METHODS
+from translucent.planning.render_plan import RenderPlan
+from translucent.preview import numbers
+from translucent.preview.desk import ERROR, FAINT, WARNING, Desk, begin_rows, check, choice, fact, slider, wrapped
+from translucent.preview.document import AUTO
+from translucent.preview.stage import Timing
+
+NAMES = (AUTO, *METHODS)
+
+#: What to do about pixels that cannot be trusted, by a word in the plan's limits or the diagnosis.
+CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
+
+
+def method_panel(desk: Desk) -> None:
+    """The whole panel."""
+    display = desk.work.document.display
+    if begin_rows("method"):
+        choice(desk, "method", "display.method", NAMES, tip="auto: the cheapest one that is exact for the scene.")
+        choice(desk, "show", "display.mode", ("picture", "thickness", "transmittance", "validity"))
+        choice(desk, "right of split", "display.compare", ("off", "method", "reference", "error"))
+        if display.compare == "method":
+            choice(desk, "method there", "display.method_b", NAMES)
+        if display.compare != "off":
+            slider(desk, "split", "display.split", 0.0, 1.0, "%.2f")
+        check(desk, "reference inset", "display.inset", tip="The reference in a corner, while the view is still.")
+        check(desk, "smooth edges", "display.antialias", tip="More samples while the view is still.")
+        imgui.end_table()
+    for side, (plan, timing) in enumerate(zip(desk.stage.plans, desk.stage.timings, strict=True)):
+        if plan is not None:
+            imgui.separator_text("Plan" if side == 0 else "Plan right of the split")
+            _plan(plan, timing)
+    imgui.separator_text("Against the float64 reference")
+    _errors(desk)
+    imgui.separator_text("Validity")
+    _validity(desk)
+
+
+def _plan(plan: RenderPlan, timing: Timing) -> None:
+    if begin_rows("plan"):
+        exact = "exact" if plan.exact else "not exact everywhere"
+        fact("runs", f"{type(plan.method).__name__}: {exact}", None if plan.exact else WARNING)
+        part = "" if timing.share == 1.0 else f", for 1/{1 / timing.share:.3g} of the pixels"
+        fact("time", f"{1e3 * timing.wall:.1f} ms, GPU {1e3 * timing.gpu:.1f} ms{part}")
+        for step in plan.passes:
+            spent = (timing.passes or {}).get(step.name)
+            fact(step.name, f"{step.reason}" + (f" ({1e3 * spent:.1f} ms)" if spent is not None else ""))
+        imgui.end_table()
+    for limit in plan.limits:
+        wrapped(f"limit: {limit}", WARNING)
+    for effect in plan.unmodelled:
+        wrapped(f"not modelled: {effect}", WARNING)
+
+
+def _errors(desk: Desk) -> None:
+    measured, unit = desk.work.measured, desk.get("display.unit")
+    if not desk.get("display.inset"):
+        wrapped("Tick 'reference inset' to measure.", FAINT)
+        return
+    if measured is None or measured.scene is not desk.work.scene():
+        wrapped("measured as soon as the view is still", FAINT)
+    if measured is None:
+        return
+    if measured.doubt:
+        wrapped(measured.doubt, WARNING)
+    if measured.errors and begin_rows("errors"):
+        thickness, transmittance = measured.errors
+        fact("median", f"{numbers.length_text(thickness.median, unit)} of thickness")
+        fact("99 %", f"below {numbers.length_text(thickness.p99, unit)}")
+        fact("largest", numbers.length_text(thickness.max, unit))
+        fact("transmittance", f"median {transmittance.median:.2g}, largest {transmittance.max:.2g}")
+        fact("coverage", f"differs on {thickness.coverage_mismatch:.2%} of {thickness.pixels} pixels")
+        imgui.end_table()
+
+
+def _validity(desk: Desk) -> None:
+    measured, loaded = desk.work.measured, desk.work.loaded
+    if measured is not None:
+        invalid = measured.seen.invalid
+        text = f"{invalid} of {measured.truth.shape[0] * measured.truth.shape[1]} measured pixels are not valid"
+        wrapped(text, ERROR if invalid else FAINT)
+    if loaded is None:
+        return
+    for item in loaded.scene.objects:
+        found = item.mesh.diagnosis
+        if not found.solid:
+            wrapped(f"{item.mesh.name}: {found}", WARNING)
+            wrapped(CLOSE_HOLES, FAINT)
+        for repair in item.mesh.repairs:
+            wrapped(f"{item.mesh.name}: {repair}", FAINT)
+    for line in getattr(loaded.scene, "left_out", ()):
+        wrapped(f"left out: {line}", WARNING)

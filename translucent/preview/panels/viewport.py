@@ -1,0 +1,291 @@
+"""The viewport: the picture, what the mouse does in it, and what is drawn over it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from translucent.frames.aovs import false_colors, marks
+from translucent.preview import numbers
+from translucent.preview.actions import Pan, Turn, Zoom
+from translucent.preview.desk import Desk, Probed, em
+from translucent.preview.measuring import Crossing
+from translucent.units import metres_per_unit
+
+#: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
+DEGREES, WHEEL = 270.0, 1.15
+
+WHITE, BLACK, SHADE = 0xFFFFFFFF, 0xFF000000, 0xB0181818
+
+
+def viewport_panel(desk: Desk) -> None:
+    """The picture in the whole window, and all over it."""
+    corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+    scale = imgui.get_io().display_framebuffer_scale
+    pixels = max(int(room.x * scale.x), 8), max(int(room.y * scale.y), 8)
+    desk.more = desk.draw(pixels)
+    if imgui.is_window_docked():
+        # Behind all panels, of which this one is transparent: on a software rasteriser imgui takes long for pictures.
+        bottom = imgui.get_io().display_size.y - corner.y - room.y
+        desk.stage.place((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
+    else:
+        texture = desk.stage.viewport.texture
+        imgui.image(imgui.ImTextureRef(texture.glo), room, ImVec2(0, 1), ImVec2(1, 0))
+        imgui.set_cursor_screen_pos(corner)
+    buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
+    imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
+    _mouse(desk, corner, room)
+    _keys(desk)
+    over = imgui.get_window_draw_list()
+    over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
+    _split(desk, over, corner, room)
+    _scale(desk, over, corner, room)
+    _inset(desk, over, corner, room)
+    _probe(desk, over, corner, room)
+    _status(desk, over, corner, room)
+    over.pop_clip_rect()
+
+
+def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
+    io = imgui.get_io()
+    if imgui.is_item_activated():
+        desk.drag += 1
+        desk.pressed_at = io.mouse_pos.x, io.mouse_pos.y
+    if imgui.is_item_active() and (io.mouse_delta.x or io.mouse_delta.y):
+        right, down = io.mouse_delta.x, io.mouse_delta.y
+        turning = imgui.is_mouse_dragging(0, 0.0)
+        split = desk.get("display.split") if desk.get("display.compare") != "off" else None
+        started = desk.pressed_at[0] - corner.x
+        if split is not None and turning and (desk.dragging_split or abs(started - split * room.x) < em(0.7)):
+            desk.dragging_split = True
+            place = (io.mouse_pos.x - corner.x) / room.x
+            desk.change("display.split", min(max(place, 0.0), 1.0))
+        elif turning and imgui.is_key_down(imgui.Key.l):
+            desk.turn_light(180.0 * right / room.x, -180.0 * down / room.y)
+        elif turning and imgui.is_key_down(imgui.Key.e):
+            desk.change("look.rotation", math.remainder(desk.get("look.rotation") + DEGREES * right / room.x, 360.0))
+        elif turning and not io.key_shift:
+            desk.work.do(Turn(-DEGREES * right / room.x, DEGREES * down / room.x))
+        else:
+            desk.work.do(Pan(right / room.y, down / room.y))
+    if not imgui.is_mouse_down(0):
+        desk.dragging_split = False
+    if imgui.is_item_hovered() and io.mouse_wheel:
+        at = io.mouse_pos.x - corner.x - 0.5 * room.x, io.mouse_pos.y - corner.y - 0.5 * room.y
+        desk.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
+    moved = math.hypot(io.mouse_pos.x - desk.pressed_at[0], io.mouse_pos.y - desk.pressed_at[1])
+    if imgui.is_item_deactivated() and moved < em(0.3) and desk.probed is not None and desk.probed.crossing is not None:
+        desk.selected = desk.probed.crossing.body
+    desk.hovered = None
+    if imgui.is_item_hovered() and not imgui.is_any_mouse_down():
+        desk.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
+
+
+def _keys(desk: Desk) -> None:
+    io = imgui.get_io()
+    if io.want_text_input:
+        return
+    if imgui.is_key_pressed(imgui.Key.f):
+        desk.frame()
+    if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
+        (desk.work.redo if io.key_shift else desk.work.undo)()
+    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
+        desk.work.redo()
+    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o):
+        desk.ask_file("open")
+    elif imgui.is_key_pressed(imgui.Key.o) and desk.work.document.orbit is not None:
+        desk.change("orbit.orthographic", not desk.get("orbit.orthographic"), step=True)
+
+
+def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    display = desk.work.document.display
+    if display.compare == "off":
+        return
+    x = corner.x + display.split * room.x
+    over.add_line(ImVec2(x, corner.y), ImVec2(x, corner.y + room.y), WHITE, em(0.1))
+    over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45), WHITE)
+    plans = desk.stage.plans
+    left = type(plans[0].method).__name__ if plans[0] is not None else display.method
+    right = {"method": display.method_b, "reference": "float64 reference", "error": "thickness less the reference"}
+    name = right[display.compare]
+    if display.compare == "method" and plans[1] is not None:
+        name = type(plans[1].method).__name__
+    if display.compare in ("reference", "error"):
+        truth = desk.work.truth
+        if not desk.stage.has_truth():
+            name += ": being drawn ..."
+        elif truth is not None and truth.level > 1:
+            name += f", 1/{truth.level} so far"
+    top = corner.y + em(0.4)
+    width = imgui.calc_text_size(left).x
+    _label(over, ImVec2(max(x - width - em(0.8), corner.x + em(0.3)), top), left)
+    _label(over, ImVec2(min(x + em(0.8), corner.x + room.x - imgui.calc_text_size(name).x - em(0.5)), top), name)
+    if display.compare == "error" and desk.stage.has_truth():
+        worst = desk.stage.worst(desk.work) / metres_per_unit(display.unit)
+        lines = (
+            f"blue: {worst:.2g} {display.unit} thinner",
+            f"red: {worst:.2g} {display.unit} thicker",
+            "orange: not valid",
+        )
+        for i, line in enumerate(lines, 1):
+            rightmost = corner.x + room.x - imgui.calc_text_size(line).x - em(0.5)
+            _label(over, ImVec2(min(x + em(0.8), rightmost), top + em(1.6) * i), line)
+
+
+def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """The false colors with their lengths, or the meaning of those of validity."""
+    display = desk.work.document.display
+    if display.mode not in ("thickness", "validity"):
+        return
+    left, bottom = corner.x + em(1.0), corner.y + room.y - em(1.0)
+    if display.mode == "validity":
+        _label(over, ImVec2(left, bottom - em(1.4)), "blue: valid    orange: not valid    dimmed: no medium")
+        return
+    width, height = min(em(18.0), room.x - em(2.0)), em(0.8)
+    top = bottom - height - em(1.5)
+    over.add_rect_filled(ImVec2(left - em(0.6), top - em(2.0)), ImVec2(left + width + em(0.9), bottom + em(0.3)), SHADE)
+    over.add_text(ImVec2(left, top - em(1.6)), WHITE, f"thickness, {display.unit}")
+    colors, parts = false_colors(), 64
+    for i in range(parts):
+        red, green, blue = (int(v) for v in colors[round(i * 255 / (parts - 1))])
+        color = 0xFF000000 | blue << 16 | green << 8 | red
+        begin, end = left + width * i / parts, left + width * (i + 1) / parts
+        over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + height), color)
+    most = desk.stage.thickest(desk.work) / metres_per_unit(display.unit)
+    free = left - em(1.0)
+    for value in marks(most):
+        text = f"{value:.4g}"
+        half = 0.5 * imgui.calc_text_size(text).x
+        x = left + width * value / most
+        over.add_line(ImVec2(x, top + height), ImVec2(x, top + height + em(0.25)), WHITE)
+        if x - half > free:
+            over.add_text(ImVec2(x - half, top + height + em(0.2)), WHITE, text)
+            free = x + half + em(0.4)
+
+
+def _inset(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """The reference, as it was measured against, in the corner."""
+    measured = desk.work.measured
+    if not desk.get("display.inset") or measured is None or measured.scene is not desk.work.scene():
+        return
+    texture = desk.inset_texture(measured.truth)
+    width = min(em(14.0), 0.3 * room.x)
+    height = width * texture.height / texture.width
+    low = ImVec2(corner.x + room.x - width - em(0.6), corner.y + room.y - height - em(0.6))
+    high = ImVec2(low.x + width, low.y + height)
+    over.add_image(imgui.ImTextureRef(texture.glo), low, high)
+    over.add_rect(low, high, WHITE)
+    text = "reference, straight rays"
+    if measured.errors:
+        text += f"; error {numbers.length_text(measured.errors[0].median, desk.get('display.unit'))}"
+    _label(over, ImVec2(min(low.x, high.x - imgui.calc_text_size(text).x - em(0.6)), low.y - em(1.5)), text)
+
+
+def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    place = desk.hovered or desk.pinned
+    if place is None:
+        return
+    lines = probe_lines(desk, place)
+    if not lines:
+        return
+    x, y = corner.x + place[0] * room.x, corner.y + place[1] * room.y
+    width = max(imgui.calc_text_size(line).x for line in lines) + em(1.0)
+    height = imgui.get_text_line_height_with_spacing() * len(lines) + em(0.6)
+    left = x + em(1.2) if x + em(1.2) + width < corner.x + room.x else max(x - em(1.2) - width, corner.x)
+    top = min(max(y + em(0.6), corner.y), corner.y + room.y - height)
+    over.add_circle(ImVec2(x, y), em(0.3), WHITE)
+    over.add_rect_filled(ImVec2(left, top), ImVec2(left + width, top + height), 0xD8181818, em(0.2))
+    for i, line in enumerate(lines):
+        at = top + em(0.3) + i * imgui.get_text_line_height_with_spacing()
+        over.add_text(ImVec2(left + em(0.5), at), WHITE, line)
+
+
+def probe_lines(desk: Desk, place: tuple[float, float]) -> list[str]:
+    """What there is to say of a pixel: of the frame on show, and of the float64 reference when that is there."""
+    scene, viewport = desk.work.scene(), desk.stage.viewport
+    if scene is None:
+        return []
+    pixel = (
+        min(max(int(place[0] * viewport.size[0]), 0), viewport.size[0] - 1),
+        min(max(int(place[1] * viewport.size[1]), 0), viewport.size[1] - 1),
+    )
+    display = desk.work.document.display
+    right = display.compare == "method" and place[0] > display.split
+    probe = desk.stage.probe(*pixel, 1 if right else 0)
+    if desk.probed is None or desk.probed.pixel != pixel or desk.probed.scene is not scene:
+        desk.probed = Probed(pixel, scene)
+    if probe is None:
+        return []
+    known = desk.probed.crossing
+    if known is None and not desk.probed.asked:
+        _ask_crossing(desk, desk.probed)
+    if not probe.covered and probe.valid:
+        return ["no medium"]
+    with np.errstate(under="ignore"):
+        passed = np.exp(-np.asarray(probe.optical_depth))
+    lines = [
+        f"thickness {numbers.length_text(probe.thickness, display.unit)}",
+        f"sigma_t d {numbers.triple_text(probe.optical_depth)}",
+        f"T {numbers.triple_text(passed)}",
+        "valid" if probe.valid else f"not valid: {why_not(desk, right)}",
+    ]
+    if known is not None:
+        lines.insert(1, f"reference {numbers.length_text(known.thickness, display.unit)}, {known.layers} layers")
+        if known.body is not None:
+            lines.insert(0, scene.objects[known.body].mesh.name)
+    return lines
+
+
+def why_not(desk: Desk, right: bool) -> str:
+    """Why a pixel cannot be trusted."""
+    plan = desk.stage.plans[1 if right else 0]
+    return "; ".join(plan.limits) if plan is not None and plan.limits else "its surfaces do not balance"
+
+
+def _ask_crossing(desk: Desk, probed: Probed) -> None:
+    scene, size = desk.work.scene(), desk.stage.viewport.size
+    if scene is None or desk.work.lanes["ray"].task is not None:
+        return
+    probed.asked = True
+
+    def take(found: Crossing) -> None:
+        probed.crossing = found
+
+    desk.work.cross(scene, size, probed.pixel, take)
+
+
+def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """Why the picture is not what it should be, and what is under way."""
+    y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
+    lines = [text for text in (desk.stage.problem, desk.stage.shader_problem) if text]
+    slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
+    lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]
+    for text in lines:
+        for line in folded(text, room.x - em(2.0)):
+            _label(over, ImVec2(corner.x + em(0.6), y), line)
+            y += em(1.5)
+
+
+def folded(text: str, width: float) -> list[str]:
+    """A text in lines that are no wider than this."""
+    found: list[str] = []
+    for paragraph in text.splitlines():
+        line = ""
+        for word in paragraph.split():
+            longer = f"{line} {word}".strip()
+            if line and imgui.calc_text_size(longer).x > width:
+                found.append(line)
+                line = word
+            else:
+                line = longer
+        found.append(line)
+    return found[:8]
+
+
+def _label(over: imgui.ImDrawList, at: ImVec2, text: str) -> None:
+    size = imgui.calc_text_size(text)
+    low, high = ImVec2(at.x - em(0.25), at.y - em(0.1)), ImVec2(at.x + size.x + em(0.25), at.y + size.y + em(0.1))
+    over.add_rect_filled(low, high, SHADE, em(0.15))
+    over.add_text(at, WHITE, text)

@@ -1,0 +1,89 @@
+"""A picture of everything opaque that another renderer has drawn, in place of opaque objects and environment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.frozen import Frozen
+from translucent.scene.lights import MAX_RADIANCE
+
+
+@dataclass(frozen=True, eq=False)
+class Backdrop(Frozen):
+    """What is opaque in a frame: rays through the media end at its depth, and its radiance is seen there.
+
+    The camera is that of the scene, and each pixel belongs to the ray through its center. Row 0 is the top row.
+
+    Parameters
+    ----------
+    radiance : array_like (h, w, 3)
+        Linear RGB.
+    depth : array_like (h, w)
+        Metres along the camera's forward axis, above 0: not along the ray. ``inf`` where nothing stops the ray; the
+        radiance is seen there, too.
+    coverage : array_like (h, w) of bool, optional
+        Where the picture is; elsewhere the environment of the scene is seen. Default: everywhere.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, radiance is not in 0 to 1e18, or depth is not above 0.
+    """
+
+    radiance: npt.NDArray[np.floating[Any]]
+    depth: npt.NDArray[np.floating[Any]]
+    coverage: npt.NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        radiance, depth = _numbers("radiance", self.radiance, np.float32), _numbers("depth", self.depth, np.float64)
+        if depth.ndim != 2 or depth.size == 0:
+            raise InputError("backdrop", f"depth of shape {depth.shape}", "give shape (h, w)")
+        if radiance.shape != (*depth.shape, 3):
+            raise InputError(
+                "backdrop",
+                f"radiance of shape {radiance.shape} for depth of shape {depth.shape}",
+                "give (h, w, 3) for (h, w)",
+            )
+        if wrong := np.count_nonzero(~((radiance >= 0) & (radiance <= MAX_RADIANCE))):
+            raise InputError(
+                "backdrop", f"{wrong} numbers of its radiance are not in 0 to {MAX_RADIANCE:g}", "give linear RGB"
+            )
+        if wrong := np.count_nonzero(~(depth > 0)):
+            raise InputError(
+                "backdrop",
+                f"its depth is not above 0 in {wrong} pixels",
+                "give metres along the camera's forward axis, and inf where nothing is",
+            )
+        self._freeze("radiance", radiance)
+        self._freeze("depth", depth)
+        if self.coverage is not None:
+            coverage = np.array(self.coverage, order="C")
+            if coverage.shape != depth.shape or coverage.dtype != bool:
+                found = f"coverage of shape {coverage.shape} and type {coverage.dtype}"
+                raise InputError("backdrop", found, f"give shape {depth.shape} and type bool")
+            self._freeze("coverage", coverage)
+
+    def __repr__(self) -> str:
+        return f"Backdrop({self.size[0]}x{self.size[1]}, {np.count_nonzero(np.isfinite(self.depth))} pixels end rays)"
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        return self.depth.shape[1], self.depth.shape[0]
+
+    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
+        array.setflags(write=False)
+        object.__setattr__(self, field, array)
+
+
+def _numbers(field: str, value: npt.ArrayLike, dtype: Any) -> npt.NDArray[Any]:
+    try:
+        with np.errstate(over="ignore", under="ignore"):
+            return np.array(value, order="C").astype(dtype)
+    except (TypeError, ValueError):
+        raise InputError("backdrop", f"its {field} are not numbers", "give arrays of floats") from None

@@ -1,0 +1,277 @@
+"""What lights everything from far away, and what is seen behind it.
+
+`gradient_share`, `gradient_irradiance_share`, `checkerboard_share` and `equirectangular_uv` have twins in
+``shaders/lib/environment.glsl``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.formulas.color import ColorLike, parse_color
+from translucent.frozen import Frozen
+from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.lights import positive_triple
+
+Array = npt.NDArray[np.float64]
+EnvironmentKind = Literal["constant", "gradient", "checkerboard", "image"]
+
+#: Stops beyond which no exposure makes sense: the radiance of any image stays far below `lights.MAX_RADIANCE`.
+MAX_EXPOSURE = 32.0
+
+_WHAT = "environment radiance"
+
+
+@dataclass(frozen=True, eq=False)
+class Environment(Frozen):
+    """Radiance from far behind everything. Made by `constant`, `gradient`, `checkerboard`, `image` or `studio`.
+
+    It lights, it is reflected, and it is seen behind everything, unless `with_background` gives it something else to
+    be seen there.
+
+    Attributes
+    ----------
+    kind : {"constant", "gradient", "checkerboard", "image"}
+    first, second : (3,)
+        Linear radiance: bottom and top of a gradient, the two squares of a checkerboard; 0 for an image.
+    tiles : float
+        Squares of a checkerboard along the height of the picture.
+    map : EnvironmentMap, optional
+        The pixels of an image.
+    rotation : float
+        Of the image about +Y, in degrees, counterclockwise as seen from above.
+    exposure : float
+        Stops that the image is brighter than its pixels say.
+    background : Environment, optional
+        What is seen instead of the environment itself, along straight and along refracted rays.
+    """
+
+    kind: EnvironmentKind
+    first: Array
+    second: Array
+    tiles: float = 8.0
+    map: EnvironmentMap | None = None
+    rotation: float = 0.0
+    exposure: float = 0.0
+    background: Environment | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(EnvironmentKind):
+            raise InputError(
+                f"environment kind {self.kind!r}", "not known", f"use one of {', '.join(get_args(EnvironmentKind))}"
+            )
+        object.__setattr__(self, "first", positive_triple("environment radiance", self.first))
+        object.__setattr__(self, "second", positive_triple("environment radiance", self.second))
+        if not 0 < self.tiles <= 1e6:
+            raise InputError(f"checkerboard of {self.tiles} tiles", "not in 0 to 1e6", "give for example 8")
+        if (self.kind == "image") != (self.map is not None):
+            raise InputError(f"{self.kind} environment", "an image goes with its pixels", "use tl.Environment.image")
+        if not np.isfinite(self.rotation):
+            raise InputError(f"rotation {self.rotation} of an environment", "not finite", "give degrees")
+        if not abs(self.exposure) <= MAX_EXPOSURE:
+            raise InputError(
+                f"exposure {self.exposure} of an environment",
+                f"not within {MAX_EXPOSURE:g} stops",
+                "give for example 1",
+            )
+
+    def __repr__(self) -> str:
+        behind = f", before {self.background!r}" if self.background else ""
+        size = f" {self.map.size[0]}x{self.map.size[1]}" if self.map else ""
+        return f"Environment({self.kind}{size}{behind})"
+
+    @classmethod
+    def constant(cls, radiance: ColorLike) -> Environment:
+        """The same radiance from everywhere."""
+        return cls("constant", parse_radiance(_WHAT, radiance), parse_radiance(_WHAT, radiance))
+
+    @classmethod
+    def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
+        """From `bottom` for rays straight down (-Y) to `top` for rays straight up (+Y), linear in the sine between."""
+        return cls("gradient", parse_radiance(_WHAT, bottom), parse_radiance(_WHAT, top))
+
+    @classmethod
+    def checkerboard(
+        cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
+    ) -> Environment:
+        """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
+        return cls("checkerboard", parse_radiance(_WHAT, first), parse_radiance(_WHAT, second), tiles)
+
+    @classmethod
+    def image(
+        cls, source: str | Path | npt.ArrayLike | EnvironmentMap, rotation: float = 0.0, exposure: float = 0.0
+    ) -> Environment:
+        """A picture of all directions in equirectangular projection.
+
+        Row 0 is straight up (+Y), the center of the picture is straight ahead (-Z), and +X is to the right of it.
+
+        Parameters
+        ----------
+        source : str, Path, array_like (h, w, 3) or EnvironmentMap
+            A ``.hdr``, ``.exr``, ``.png`` or ``.jpg`` file, or linear radiance. Twice as wide as high.
+        rotation : float
+            About +Y, in degrees, counterclockwise as seen from above.
+        exposure : float
+            Stops brighter.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or holds no picture.
+        """
+        if isinstance(source, str | Path):
+            from translucent.scene.environment_files import read_environment_map
+
+            source = read_environment_map(source)
+        if not isinstance(source, EnvironmentMap):
+            source = EnvironmentMap(cast("npt.NDArray[np.floating[Any]]", source))
+        return cls("image", np.zeros(3), np.zeros(3), map=source, rotation=rotation, exposure=exposure)
+
+    @classmethod
+    def studio(cls, rotation: float = 0.0, exposure: float = 0.0) -> Environment:
+        """A photographer's studio made by a formula: soft boxes, dark cards and a warm floor, which flatter glass."""
+        from translucent.scene.studio import studio_map
+
+        return cls.image(studio_map(), rotation, exposure)
+
+    def with_background(self, background: Environment) -> Environment:
+        """This environment as light and in reflections, and another one to be seen behind everything."""
+        if not isinstance(background, Environment):
+            raise InputError(
+                f"background {background!r}", f"of type {type(background).__name__}", "give a tl.Environment"
+            )
+        return dataclasses.replace(self, background=background.seen)
+
+    @property
+    def seen(self) -> Environment:
+        """The environment that is seen: the background if there is one, else itself."""
+        return self.background or self
+
+    @property
+    def scale(self) -> float:
+        """Factor of the exposure."""
+        return float(2.0**self.exposure)
+
+    @property
+    def turn(self) -> float:
+        """The rotation in turns, as `equirectangular_uv` takes it."""
+        return self.rotation / 360.0
+
+    @property
+    def mean(self) -> Array:
+        """(3,): mean radiance over all directions that it lights from."""
+        return 0.5 * (self.first + self.second) if self.map is None else self.scale * self.map.mean
+
+    @cached_property
+    def light_map(self) -> EnvironmentMap:
+        """What it lights with as a picture, before rotation and exposure; a checkerboard lights like its mean."""
+        if self.map is not None:
+            return self.map
+        if self.kind == "gradient":
+            return _gradient_map(tuple(self.first.tolist()), tuple(self.second.tolist()))
+        return _uniform_map(tuple(self.mean.tolist()))
+
+    def radiance(self, directions: npt.ArrayLike, backdrop: npt.ArrayLike) -> Array:
+        """Radiance seen along rays, (..., 3): that of the background, if there is one.
+
+        Parameters
+        ----------
+        directions : array_like (..., 3)
+            Unit vectors.
+        backdrop : array_like (..., 2)
+            Position in the picture, right and down from the top left corner, in heights of the picture.
+        """
+        seen = self.seen
+        if seen.kind != "checkerboard":
+            return seen.lighting(directions)
+        return seen.first + (seen.second - seen.first) * checkerboard_share(backdrop, seen.tiles)[..., None]
+
+    def lighting(self, directions: npt.ArrayLike) -> Array:
+        """Radiance that arrives from unit vectors (..., 3) as light, (..., 3), whatever is seen there.
+
+        A backdrop fixed to the picture lights like the mean of its squares.
+        """
+        if self.map is not None:
+            return self.scale * self.map.at(equirectangular_uv(directions, self.turn))
+        if self.kind == "gradient":
+            share = gradient_share(directions)
+        else:
+            share = np.full(np.asarray(directions).shape[:-1], 0.5)
+        return self.first + (self.second - self.first) * share[..., None]
+
+    def irradiance_on(self, normals: npt.ArrayLike) -> Array:
+        """Irradiance on surfaces with unit `normals` (..., 3) that nothing shadows, (..., 3).
+
+        A backdrop fixed to the picture lights like the mean of its squares. Of an image it is looked up in
+        `environment_filter.Filtered.irradiance`.
+        """
+        if self.map is not None:
+            from translucent.scene.environment_filter import irradiance_map
+
+            return self.scale * irradiance_map(self.map).at(equirectangular_uv(normals, self.turn))
+        if self.kind == "gradient":
+            share = gradient_irradiance_share(normals)
+        else:
+            share = np.full(np.asarray(normals).shape[:-1], 0.5)
+        with np.errstate(under="ignore"):
+            return np.asarray(np.pi * (self.first + (self.second - self.first) * share[..., None]))
+
+
+#: Rows of the picture of a gradient: between two of them, a sine differs from a straight line by 2e-5.
+GRADIENT_MAP_HEIGHT = 256
+
+
+# Environments that light alike share one picture, so that it is blurred, and uploaded, once.
+
+
+@lru_cache(maxsize=8)
+def _gradient_map(bottom: tuple[float, ...], top: tuple[float, ...]) -> EnvironmentMap:
+    return EnvironmentMap.from_formula(Environment.gradient(bottom, top).lighting, GRADIENT_MAP_HEIGHT)
+
+
+@lru_cache(maxsize=8)
+def _uniform_map(radiance: tuple[float, ...]) -> EnvironmentMap:
+    return EnvironmentMap(np.broadcast_to(np.array(radiance), (2, 4, 3)))
+
+
+def gradient_share(direction: npt.ArrayLike) -> Array:
+    """Share of a gradient's top in direction (..., 3): (1 + y) / 2."""
+    return np.asarray(0.5 + 0.5 * np.asarray(direction, dtype=np.float64)[..., 1])
+
+
+def gradient_irradiance_share(normal: npt.ArrayLike) -> Array:
+    """Share of a gradient's top in what a surface with unit normal (..., 3) receives.
+
+    The cosine-weighted mean of `gradient_share` over the hemisphere: the mean of y there is 2/3 of the normal's y.
+    """
+    return np.asarray(0.5 + np.asarray(normal, dtype=np.float64)[..., 1] / 3.0)
+
+
+def checkerboard_share(backdrop: npt.ArrayLike, tiles: npt.ArrayLike) -> Array:
+    """1 in the second squares of a checkerboard at backdrop (..., 2), else 0; the top left square is a first one."""
+    cell = np.floor(np.asarray(backdrop, dtype=np.float64) * np.asarray(tiles, dtype=np.float64)[..., None])
+    return np.asarray(np.mod(cell[..., 0] + cell[..., 1], 2.0))
+
+
+def equirectangular_uv(direction: npt.ArrayLike, turn: npt.ArrayLike) -> Array:
+    """Place of a direction (..., 3) in an equirectangular picture, (..., 2): right and down, 0 to 1; u wraps around.
+
+    Straight up (+Y) is v = 0, and -Z is u = 1/2. A picture that is turned about +Y by a positive share of a full
+    turn, counterclockwise as seen from above, has its center there instead.
+    """
+    x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
+    u = 0.5 + np.arctan2(x, 0.0 - z) / (2.0 * np.pi) + np.asarray(turn, dtype=np.float64)
+    return np.stack([u, np.arctan2(np.hypot(x, z), y) / np.pi], axis=-1)
+
+
+def parse_radiance(what: str, color: ColorLike) -> Array:
+    """(3,): linear radiance from a color as text, or one or three numbers >= 0; errors name it `what`."""
+    return positive_triple(what, parse_color(color) if isinstance(color, str) else color)

@@ -1,0 +1,172 @@
+"""Pictures of all directions in equirectangular projection: their pixels, lookups and reductions."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+
+from translucent.errors import InputError, TranslucentWarning
+from translucent.frozen import Frozen
+from translucent.scene.lights import MAX_RADIANCE
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentMap(Frozen):
+    """Linear radiance from all directions.
+
+    Row 0 is straight up (+Y), the center of the picture is -Z, and +X is to the right of it. Pixels are samples at
+    their centers; between them lookups are bilinear, around the sides without a seam, and constant beyond the first
+    and the last row.
+
+    Parameters
+    ----------
+    pixels : array_like (h, w, 3)
+        Linear radiance, kept as float32. Numbers that are not finite or below 0 become 0, and those above 1e18 that,
+        with a `TranslucentWarning` that counts them; another one tells of a shape that is not 2:1.
+
+    Raises
+    ------
+    InputError
+        If the shape is another, there is no pixel, or none that can be used.
+    """
+
+    pixels: npt.NDArray[np.floating[Any]]
+
+    def __post_init__(self) -> None:
+        try:
+            given = np.asarray(self.pixels)
+            if given.dtype.kind not in "biuf":
+                given = given.astype(np.float64)
+        except (TypeError, ValueError):
+            raise InputError("environment image", "its pixels are not numbers", "give an array of floats") from None
+        if given.ndim != 3 or given.shape[2] != 3 or given.size == 0:
+            raise InputError("environment image", f"shape {given.shape}", "give linear radiance of shape (h, w, 3)")
+        usable, doubts = _usable(given)
+        if usable.shape[1] != 2 * usable.shape[0]:
+            size = f"{usable.shape[1]}x{usable.shape[0]} pixels"
+            doubts.append(f"{size}: a picture of all directions is twice as wide as high, so this one is stretched")
+        for doubt in doubts:
+            # The caller of tl.Environment.image, past this function, the constructor and `image`.
+            warnings.warn(f"environment image: {doubt}", TranslucentWarning, stacklevel=4)
+        usable.setflags(write=False)
+        object.__setattr__(self, "pixels", usable)
+
+    def __repr__(self) -> str:
+        return f"EnvironmentMap({self.size[0]}x{self.size[1]})"
+
+    @classmethod
+    def from_formula(cls, radiance: Callable[[Array], npt.ArrayLike], height: int) -> EnvironmentMap:
+        """The picture of a function from unit vectors (n, 2n, 3) to radiance (n, 2n, 3), n rows high."""
+        return cls(np.asarray(radiance(texel_directions(height, 2 * height))).astype(np.float32))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+    @cached_property
+    def mean(self) -> Array:
+        """(3,): mean over all directions; each pixel counts as much as its solid angle."""
+        height, width = self.pixels.shape[:2]
+        rows = self.pixels.mean(axis=1, dtype=np.float64)
+        return np.asarray(row_solid_angles(height, width) @ rows * (width / (4.0 * np.pi)))
+
+    def at(self, uv: npt.ArrayLike) -> Array:
+        """(..., 3) float64: bilinear lookups at places (..., 2), as `environment.equirectangular_uv` has them."""
+        height, width = self.pixels.shape[:2]
+        u, v = np.moveaxis(np.asarray(uv, dtype=np.float64), -1, 0)
+        column, across = _split(u * width - 0.5)
+        row, down = _split(np.clip(v * height - 0.5, 0.0, height - 1.0))
+        left, right = column % width, (column + 1) % width
+        lower = np.minimum(row + 1, height - 1)
+        with np.errstate(under="ignore"):
+            top = _mix(self.pixels[row, left], self.pixels[row, right], across)
+            bottom = _mix(self.pixels[lower, left], self.pixels[lower, right], across)
+            return _mix(top, bottom, down)
+
+    def reduced(self, height: int, width: int) -> Array:
+        """(height, width, 3) float64: means over the solid angle of larger pixels; smaller ones are left as they are.
+
+        The integral over all directions stays what it is.
+        """
+        own_height, own_width = self.pixels.shape[:2]
+        rows = _overlaps(-np.cos(np.linspace(0, np.pi, own_height + 1)), -np.cos(np.linspace(0, np.pi, height + 1)))
+        columns = _overlaps(np.linspace(0, 1, own_width + 1), np.linspace(0, 1, width + 1))
+        with np.errstate(under="ignore"):
+            # Most of these shares are 0, and in a large picture rows are by far the most work.
+            lower = (csr_array(rows) @ self.pixels.reshape(own_height, -1)).reshape(height, own_width, 3)
+            return np.asarray(np.einsum("xj,yjc->yxc", columns, lower, optimize=True))
+
+
+def row_blocks(height: int, width: int) -> Iterator[slice]:
+    """Rows of a picture that are worked on at a time: about a million pixels."""
+    step = max(1, (1 << 20) // max(width, 1))
+    return (slice(row, row + step) for row in range(0, height, step))
+
+
+def row_solid_angles(height: int, width: int) -> Array:
+    """(height,): exact solid angle in sr of a pixel in each row of an equirectangular picture."""
+    edges = np.linspace(0.0, np.pi, height + 1)
+    # cos a - cos b as a product: near the poles the difference would cancel.
+    return 4.0 * np.pi / width * np.sin(0.5 * (edges[1:] + edges[:-1])) * np.sin(0.5 * np.diff(edges))
+
+
+def texel_directions(height: int, width: int) -> Array:
+    """(height, width, 3): unit vectors through the centers of the pixels of an equirectangular picture."""
+    theta = np.pi * (np.arange(height) + 0.5)[:, None] / height
+    phi = 2.0 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
+    return np.stack(
+        np.broadcast_arrays(np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)), axis=-1
+    )
+
+
+def _overlaps(fine: Array, coarse: Array) -> Array:
+    """(coarse cells, fine cells): the share of each coarse cell that a fine one covers; rows sum to 1."""
+    low = np.maximum(coarse[:-1, None], fine[None, :-1])
+    high = np.minimum(coarse[1:, None], fine[None, 1:])
+    return np.asarray(np.maximum(high - low, 0.0) / np.diff(coarse)[:, None])
+
+
+def _split(place: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    whole = np.floor(place)
+    return whole.astype(np.intp), (place - whole)[..., None]
+
+
+def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], share: Array) -> Array:
+    return np.asarray(first * (1.0 - share) + second * share)
+
+
+def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]]:
+    """The pixels with all that is no radiance replaced, and what was replaced, in words.
+
+    In blocks of rows: a large picture is in memory once, and not once for each step.
+    """
+    pixels, any_right, counts = np.empty(given.shape, dtype=np.float32), False, np.zeros(3, dtype=np.int64)
+    for rows in row_blocks(*given.shape[:2]):
+        values = given[rows].astype(np.float64)
+        unknown = ~np.isfinite(values)
+        negative, high = (values < 0) & ~unknown, (values > MAX_RADIANCE) & ~unknown
+        wrong = unknown | negative
+        any_right |= not wrong.all()
+        counts += [np.count_nonzero(where.any(axis=2)) for where in (unknown, negative, high)]
+        with np.errstate(under="ignore"):
+            pixels[rows] = np.minimum(np.where(wrong, 0.0, values), MAX_RADIANCE)
+    if not any_right:
+        raise InputError("environment image", "no pixel holds a finite radiance of 0 or above", "check how it was made")
+    count = given.shape[0] * given.shape[1]
+    words = (("not finite", "0"), ("below 0", "0"), (f"above {MAX_RADIANCE:g}", "that"))
+    doubts = [
+        f"{found} of {count} pixels are {what}, taken as {become}"
+        for found, (what, become) in zip(counts.tolist(), words, strict=True)
+        if found
+    ]
+    return pixels, doubts

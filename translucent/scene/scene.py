@@ -1,0 +1,322 @@
+"""Scenes: bodies, a camera, lights and what is behind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.formulas.color import ColorLike, parse_color
+from translucent.frozen import Frozen
+from translucent.geometry.mesh import MAX_COORDINATE, Mesh
+from translucent.media.density import Density
+from translucent.media.medium import MAX_EMISSION, Medium
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment, parse_radiance
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.surface import Surface
+
+Array = npt.NDArray[np.float64]
+Overlap = Literal["add", "union", "priority"]
+Light = PointLight | DirectionalLight
+
+#: What opaque objects reflect unless told otherwise: a light grey, as of clay.
+OPAQUE_COLOR = (0.6, 0.6, 0.6)
+
+#: Names that a message lists.
+MOST_NAMES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Object(Frozen):
+    """A mesh in the scene, filled with a medium.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Bounds the body; its coordinates must be finite.
+    medium : Medium or None
+        What fills it; None makes the object opaque.
+    transform : array_like (4, 4), optional
+        Object to world, affine, for column vectors; may mirror and scale each axis, not flatten. Default: none.
+    priority : int
+        With ``overlap="priority"`` the higher one displaces the lower.
+    sheet_thickness : float, optional
+        Declares the mesh a thin sheet of this thickness in metres, not the border of a solid.
+    color : str or array_like (3,)
+        What an opaque object without a surface diffusely reflects, 0 to 1: a color as text, or linear RGB.
+    density : DensityGrid, LinearDensity or ExponentialDensity, optional
+        Scales absorption, scattering and emission of the medium from place to place, over the bounds of the mesh in
+        object space. Default: homogeneous.
+    surface : Surface, optional
+        What the border does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
+        opaque object reflects diffusely.
+    """
+
+    mesh: Mesh
+    medium: Medium | None = None
+    transform: npt.ArrayLike | None = None
+    priority: int = 0
+    sheet_thickness: float | None = None
+    color: ColorLike = OPAQUE_COLOR
+    density: Density | None = None
+    surface: Surface | None = None
+
+    def __post_init__(self) -> None:
+        _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
+        if self.medium is not None:
+            _require_type("medium of an object", self.medium, Medium, "use tl.Medium")
+        self.mesh.require_finite()
+        matrix = np.eye(4) if self.transform is None else np.array(self.transform, dtype=np.float64)
+        where = f"transform of {self.mesh.name!r}"
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+            raise InputError(where, "not a finite 4x4 matrix", "give a 4x4 matrix for column vectors")
+        if not np.array_equal(matrix[3], (0, 0, 0, 1)):
+            raise InputError(
+                where, f"last row {tuple(matrix[3].tolist())}", "give an affine matrix with last row 0 0 0 1"
+            )
+        if np.linalg.matrix_rank(matrix[:3, :3]) < 3:
+            raise InputError(where, "it flattens the mesh (a scale of 0)", "give every axis a scale other than 0")
+        matrix.setflags(write=False)
+        object.__setattr__(self, "transform", matrix)
+        if (largest := float(np.abs(self.bounds).max())) > MAX_COORDINATE:
+            raise InputError(where, f"it puts the mesh {largest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
+        if self.sheet_thickness is not None and not 0 < self.sheet_thickness <= MAX_COORDINATE:
+            raise InputError(
+                f"sheet_thickness {self.sheet_thickness} of {self.mesh.name!r}",
+                "not above 0",
+                "give metres, for example 1e-3",
+            )
+        object.__setattr__(self, "color", _reflectance(self.color, self.mesh.name))
+        if self.density is not None:
+            _require_type("density of an object", self.density, get_args(Density), "use for example tl.DensityGrid")
+            if self.medium is None or self.sheet_thickness is not None:
+                what = "opaque" if self.medium is None else "a sheet, which has no inside"
+                raise InputError(f"density of {self.mesh.name!r}", f"it is {what}", "give it a medium to fill, or none")
+        if self.surface is not None:
+            self._check_surface(self.surface)
+
+    def _check_surface(self, surface: Surface) -> None:
+        _require_type("surface of an object", surface, Surface, "use tl.Surface")
+        if self.mesh.uv is None and any(surface.textures):
+            raise InputError(
+                f"surface of {self.mesh.name!r}",
+                "it has textures, and the mesh no texture coordinates",
+                "unwrap it",
+            )
+        if surface.opacity is not None and (self.medium is None or self.sheet_thickness is None):
+            what = "opaque" if self.medium is None else "a solid"
+            do = "give it a clear medium and a sheet_thickness, or no opacity"
+            raise InputError(f"opacity of {self.mesh.name!r}", f"it is {what}, and only thin sheets cover", do)
+
+    def __repr__(self) -> str:
+        return f"Object({self.mesh!r}, {self.medium!r})"
+
+    @property
+    def base_color(self) -> Array:
+        """(3,): what an opaque object reflects: the color of its surface, if it has one."""
+        return np.asarray(self.color if self.surface is None else self.surface.color)
+
+    @property
+    def has_interface(self) -> bool:
+        """Whether light changes where it crosses the border of the medium: is bent, mirrored, tinted or spread."""
+        return (
+            self.medium is not None
+            and not self.covers
+            and (self.medium.ior != 1.0 or (self.surface is not None and not self._plain))
+        )
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether it is a thin sheet in which alpha may make holes."""
+        return (
+            self.sheet_thickness is not None
+            and self.surface is not None
+            and (self.covers or self.surface.alpha_cutoff > 0)
+            and (self.surface.color_texture is not None or self.mesh.colors is not None)
+        )
+
+    @property
+    def covers(self) -> bool:
+        """Whether it is a layer that covers a share of what is behind it; see `Surface.opacity`."""
+        return self.surface is not None and self.surface.opacity is not None
+
+    @property
+    def _plain(self) -> bool:
+        """Whether neither its surface nor the colors of its vertices change what passes."""
+        assert self.surface is not None
+        return self.surface.plain and self.mesh.colors is None
+
+    @property
+    def matrix(self) -> Array:
+        """(4, 4): object to world."""
+        return np.asarray(self.transform)
+
+    @cached_property
+    def mirrored(self) -> bool:
+        """Whether the transform turns the winding around."""
+        return bool(np.linalg.det(self.matrix[:3, :3]) < 0)
+
+    @cached_property
+    def faces_inwards(self) -> bool:
+        """Whether the faces, as drawn, look into the body: mirrored, or inverted, but not both."""
+        return self.mirrored != self.mesh.diagnosis.inverted
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3): smallest and largest world coordinates."""
+        low, high = self.mesh.bounds
+        corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+        world = corners @ self.matrix[:3, :3].T + self.matrix[:3, 3]
+        return np.stack([world.min(axis=0), world.max(axis=0)])
+
+    def winding_number(self, point: npt.ArrayLike) -> float:
+        """How often the body contains a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
+        local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
+        if (local < self.mesh.bounds[0]).any() or (local > self.mesh.bounds[1]).any():
+            return 0.0
+        number = self.mesh.winding_number(local)
+        return -number if self.mesh.diagnosis.inverted else number
+
+
+@dataclass(frozen=True, eq=False)
+class Scene(Frozen):
+    """Everything that a picture needs.
+
+    Parameters
+    ----------
+    objects : sequence of Object
+        At least one.
+    camera : Camera
+    lights : sequence of PointLight or DirectionalLight
+    environment : Environment
+        Default: white from everywhere.
+    overlap : {"add", "union", "priority"}
+        What fills a place that several bodies claim. ``add``: the mixture of all, and thickness counts each of them.
+        ``union``: each medium once, however many bodies bring it. ``priority``: the medium of the highest priority.
+        With the last two, thickness counts a place once.
+    ambient : str or array_like (3,)
+        Radiance that reaches every place inside the media alike from all around, as if nothing were in its way: a color
+        as text, or linear RGB. Media scatter it into the view rays, sigma_s times ambient for each metre, whatever
+        their phase function. It stands for light that has been scattered often, or comes from the environment, which
+        by itself lights opaque objects only. Default: none.
+    """
+
+    objects: Sequence[Object]
+    camera: Camera
+    lights: Sequence[Light] = ()
+    environment: Environment = field(default_factory=lambda: Environment.constant((1.0, 1.0, 1.0)))
+    overlap: Overlap = "add"
+    ambient: ColorLike = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for field_name, kinds in (("objects", Object), ("lights", (PointLight, DirectionalLight))):
+            given = getattr(self, field_name)
+            items = tuple(given) if isinstance(given, Iterable) else (given,)
+            for item in items:
+                _require_type(f"{field_name} of a scene", item, kinds, "give a list of them")
+            object.__setattr__(self, field_name, items)
+        _require_type("camera of a scene", self.camera, Camera, "use tl.Camera.look_at")
+        _require_type("environment of a scene", self.environment, Environment, "use tl.Environment.constant")
+        if not self.objects:
+            raise InputError("scene", "it has no objects", "add a tl.Object")
+        if self.overlap not in get_args(Overlap):
+            raise InputError(
+                f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
+            )
+        object.__setattr__(self, "ambient", parse_radiance("ambient radiance", self.ambient))
+        for body in self.bodies:
+            if not (self.source(body) <= MAX_EMISSION).all():
+                raise InputError(
+                    f"ambient radiance in {body.mesh.name!r}",
+                    f"it scatters more than {MAX_EMISSION:g} of it for each metre",
+                    "check the unit of the scattering",
+                )
+
+    def __repr__(self) -> str:
+        return f"Scene of {len(self.objects)} objects, {len(self.lights)} lights, {self.environment.kind} environment"
+
+    @cached_property
+    def bodies(self) -> tuple[Object, ...]:
+        """Objects that are filled with a medium."""
+        return tuple(body for body in self.objects if body.medium is not None)
+
+    @cached_property
+    def opaque(self) -> tuple[Object, ...]:
+        """Objects that nothing is seen through."""
+        return tuple(item for item in self.objects if item.medium is None)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3): smallest and largest world coordinates of all objects."""
+        boxes = np.stack([body.bounds for body in self.objects])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def source(self, body: Object) -> Array:
+        """(3,): radiance per metre that a body's medium adds to all rays: q + sigma_s A, with the ambient radiance A.
+
+        Phase functions integrate to 1, so none of them matters.
+        """
+        if body.medium is None:
+            return np.zeros(3)
+        with np.errstate(over="ignore", under="ignore"):
+            scattered = np.asarray(body.medium.scattering) * np.asarray(self.ambient)
+            return np.asarray(body.medium.emission + scattered, dtype=np.float64)
+
+    @cached_property
+    def varies(self) -> bool:
+        """Whether the density of any body varies in space."""
+        return any(body.density is not None for body in self.bodies)
+
+    @cached_property
+    def scatters_ambient(self) -> bool:
+        """Whether any medium scatters ambient radiance."""
+        media = [body.medium for body in self.bodies if body.medium is not None]
+        return any(bool((np.asarray(medium.scattering) * np.asarray(self.ambient) > 0).any()) for medium in media)
+
+    @cached_property
+    def with_ambient_emitted(self) -> Scene:
+        """The scene in which media emit what they scatter of the ambient radiance; this one if that is none."""
+        if not self.scatters_ambient:
+            return self
+        objects = [
+            body if body.medium is None else replace(body, medium=replace(body.medium, emission=self.source(body)))
+            for body in self.objects
+        ]
+        return replace(self, objects=objects, ambient=(0.0, 0.0, 0.0))
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the diagonal of the bounds in metres."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def object_names(items: Iterable[Object]) -> str:
+    """What messages call objects: the names of their meshes, each once, and of many the first ones."""
+    names = list(dict.fromkeys(repr(item.mesh.name) for item in items))
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES + 1 else ""
+    return ", ".join(names[:MOST_NAMES] if more else names) + more
+
+
+def _reflectance(color: ColorLike, name: str) -> Array:
+    where = f"color of {name!r}"
+    try:
+        values = np.array(parse_color(color) if isinstance(color, str) else color, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        values = np.zeros(0)
+    if values.shape != (3,) or not ((values >= 0) & (values <= 1)).all():
+        raise InputError(f"{where} {color!r}", "not three numbers in 0 to 1", "give for example (0.6, 0.6, 0.6)")
+    values.setflags(write=False)
+    return values
+
+
+def _require_type(what: str, value: object, kinds: type | tuple[type, ...], do: str) -> None:
+    if not isinstance(value, kinds):
+        raise InputError(f"{what} {value!r}", f"of type {type(value).__name__}", do)

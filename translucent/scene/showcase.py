@@ -1,0 +1,151 @@
+"""Sensible defaults: a mesh, framed, in a medium that suits its size, before a bright backdrop."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.geometry.grouping import used_vertices
+from translucent.geometry.mesh import Mesh
+from translucent.media.medium import Medium
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.surface import Surface
+from translucent.suggestions import close_names, did_you_mean
+
+#: Linear color that the default medium keeps of white light after `DEFAULT_REACH` of the mesh's diagonal.
+DEFAULT_COLOR = (0.18, 0.62, 0.35)
+DEFAULT_REACH = 0.15
+
+#: The default environment: white above and light grey below.
+LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
+
+#: What `named_environment` calls environments that are neither a color nor a picture.
+ENVIRONMENT_NAMES = ("light-table", "studio", "checkerboard")
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
+
+
+def showcase(
+    mesh: Mesh,
+    medium: Medium | None = None,
+    size: tuple[int, int] = (1280, 720),
+    camera: Camera | None = None,
+    environment: Environment | None = None,
+    lights: Sequence[Light] = (),
+) -> Scene:
+    """A scene that shows one mesh well.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    medium : Medium, optional
+        Default: jade green after 15 % of the mesh's diagonal, whatever its size.
+    size : (width, height)
+        Size of the picture in pixels, which the framing depends on.
+    camera : Camera, optional
+        Default: from the front right and above, the whole mesh in view.
+    environment : Environment, optional
+        Default: a light table, white above and light grey below. Lights show best before a dark one.
+    lights : sequence of PointLight or DirectionalLight
+        What shines into the medium, if it scatters.
+    """
+    shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
+    return Scene([shown], camera or framing([shown], size), lights, environment or LIGHT_TABLE)
+
+
+def named_environment(name: str, rotation: float = 0.0) -> Environment:
+    """light-table, studio, checkerboard, a color, or a file with a picture of all directions.
+
+    Parameters
+    ----------
+    name : str
+    rotation : float
+        Of the studio or the picture, in degrees.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    from translucent.scene.environment_files import READERS
+
+    if name == "studio":
+        return Environment.studio(rotation)
+    if Path(name).suffix.lower() in READERS:
+        return Environment.image(name, rotation)
+    if name == "light-table":
+        return LIGHT_TABLE
+    if name in ("checkerboard", "checker"):
+        return Environment.checkerboard(tiles=12)
+    try:
+        return Environment.constant(name)
+    except InputError:
+        if not (close := close_names(name.partition(",")[0].strip().lower(), ENVIRONMENT_NAMES)):
+            raise
+        found = f"neither one of {', '.join(ENVIRONMENT_NAMES)} nor a color or a picture"
+        raise InputError(f"environment {name!r}", found, did_you_mean(close)) from None
+
+
+def framing(
+    objects: Sequence[Object], size: tuple[int, int], fov_y: float = 30.0, up: npt.ArrayLike = (0.0, 1.0, 0.0)
+) -> Camera:
+    """The camera of `Camera.framing` that sees these objects, all of each."""
+    corners = [
+        item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+        for item in objects
+    ]
+    return Camera.framing(np.concatenate(corners), size, fov_y=fov_y, up=up)
+
+
+def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
+    """The scene with borders as a picture needs them.
+
+    Media that scatter give back, and let through, what they scatter many times: without that milk would be black. A
+    roughness replaces that of all surfaces of media.
+    """
+
+    def finish(item: Object) -> Object:
+        if item.medium is None or item.covers or not (item.medium.scatters or roughness is not None):
+            return item
+        surface = item.surface or Surface()
+        surface = dataclasses.replace(
+            surface,
+            multiple_scattering=item.medium.scatters or surface.multiple_scattering,
+            roughness=surface.roughness if roughness is None else roughness,
+        )
+        return dataclasses.replace(item, surface=surface)
+
+    return dataclasses.replace(scene, objects=[finish(item) for item in scene.objects])
+
+
+def filled(scene: AnyScene, medium: Medium) -> AnyScene:
+    """The scene with this medium in all its translucent objects, or in all objects if none is translucent.
+
+    Thin sheets become bodies: they had no inside that a medium could fill.
+    """
+    chosen = set(map(id, fillable(scene)))
+
+    def fill(item: Object) -> Object:
+        surface = item.surface
+        if surface is not None and surface.opacity is not None:
+            surface = dataclasses.replace(surface, opacity=None)
+        return dataclasses.replace(item, medium=medium, sheet_thickness=None, surface=surface)
+
+    return dataclasses.replace(scene, objects=[fill(item) if id(item) in chosen else item for item in scene.objects])
+
+
+def fillable(scene: Scene) -> tuple[Object, ...]:
+    """The objects that a medium fills for which no object is named: those that light enters, or else all.
+
+    Layers that cover a share of what is behind them are among them only where there is nothing else.
+    """
+    bodies = tuple(body for body in scene.bodies if not body.covers)
+    return bodies or tuple(item for item in scene.objects if not item.covers) or tuple(scene.objects)

@@ -1,0 +1,112 @@
+"""A photographer's studio as an environment, made by a formula."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.scene.environment_map import EnvironmentMap
+
+Array = npt.NDArray[np.float64]
+
+#: Rows of the picture. The edges of the soft boxes are about two pixels wide.
+STUDIO_HEIGHT = 512
+
+
+class Panel(NamedTuple):
+    """A rectangle that hangs around the subject and faces it.
+
+    Attributes
+    ----------
+    azimuth, elevation : float
+        Where its center is, in degrees: from -Z towards +X, and up.
+    width, height : float
+        Angles in degrees under which its middle lines are seen.
+    radiance : (r, g, b)
+        In its middle.
+    falloff : float
+        How much darker it is at its corners, as a share.
+    softness : float
+        Width of its edges, as a share of its half width and half height.
+    """
+
+    azimuth: float
+    elevation: float
+    width: float
+    height: float
+    radiance: tuple[float, float, float]
+    falloff: float = 0.0
+    softness: float = 0.03
+
+
+#: In the order in which they hang, the farthest first. A camera usually looks along -Z, so +Z is behind it.
+PANELS = (
+    Panel(0, 10, 126, 70, (0.98, 0.98, 1.0), falloff=0.4, softness=0.6),  # the backdrop, lit from below
+    Panel(138, 40, 44, 36, (9.5, 9.15, 8.55), falloff=0.35),  # key light, a large soft box to the right of the camera
+    Panel(-122, 22, 11, 72, (5.5, 5.8, 6.3), falloff=0.15, softness=0.08),  # rim light, a strip to the left
+    Panel(97, 18, 6, 66, (4.0, 4.15, 4.4), falloff=0.15, softness=0.08),  # a narrower one on the right
+    Panel(-158, 50, 26, 18, (2.6, 2.7, 2.85), falloff=0.25),  # fill light, above and behind the camera
+    Panel(-66, 4, 13, 84, (0.012, 0.012, 0.014), softness=0.1),  # dark cards: black edges that draw the shape of glass
+    Panel(66, 4, 13, 84, (0.012, 0.012, 0.014), softness=0.1),
+)
+
+#: Radiance of the room: straight down near the subject, the floor far away, the wall at the horizon, and the ceiling.
+FLOOR_NEAR, FLOOR_FAR = (0.31, 0.25, 0.20), (0.60, 0.55, 0.49)
+WALL, CEILING = (0.50, 0.51, 0.53), (0.13, 0.135, 0.15)
+
+
+@lru_cache(maxsize=1)
+def studio_map() -> EnvironmentMap:
+    """The studio as a picture of all directions; made once."""
+    return EnvironmentMap.from_formula(studio_radiance, STUDIO_HEIGHT)
+
+
+def studio_radiance(directions: npt.ArrayLike) -> Array:
+    """Radiance (..., 3) from unit vectors (..., 3): a room, and the panels that hang in it."""
+    towards = np.asarray(directions, dtype=np.float64)
+    radiance = _room(towards[..., 1])
+    for panel in PANELS:
+        share, brightness = _panel(towards, panel)
+        radiance += share * (np.asarray(panel.radiance) * brightness - radiance)
+    return radiance
+
+
+def _room(height: Array) -> Array:
+    """Floor, wall and ceiling by the sine of the elevation; where floor and wall meet the corner is rounded."""
+    above = np.clip(height, 0.0, 1.0)[..., None]
+    below = np.clip(-height, 0.0, 1.0)[..., None]
+    wall = _mixed(np.asarray(WALL), np.asarray(CEILING), _smooth(above / 0.9))
+    floor = _mixed(np.asarray(FLOOR_FAR), np.asarray(FLOOR_NEAR), _smooth(below / 0.85))
+    return _mixed(floor, wall, _smooth((height[..., None] + 0.05) / 0.1))
+
+
+def _panel(towards: Array, panel: Panel) -> tuple[Array, Array]:
+    """How much of a panel is seen in each direction, (..., 1), and its brightness there."""
+    azimuth, elevation = np.radians(panel.azimuth), np.radians(panel.elevation)
+    center = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)])
+    right = np.array([np.cos(azimuth), 0.0, np.sin(azimuth)])
+    ahead = towards @ center
+    depth = np.maximum(ahead, 1e-6)  # what is behind the subject is on no panel in front of it
+    x = towards @ right / depth / np.tan(np.radians(0.5 * panel.width))
+    y = towards @ np.cross(right, center) / depth / np.tan(np.radians(0.5 * panel.height))
+    inside = np.where(ahead > 0, _edge(x, panel.softness) * _edge(y, panel.softness), 0.0)
+    brightness = 1.0 - panel.falloff * np.clip(0.5 * (x * x + y * y), 0.0, 1.0)
+    return inside[..., None], brightness[..., None]
+
+
+def _edge(place: Array, softness: float) -> Array:
+    """1 in the middle, 0 beyond the edges at -1 and 1, and smooth between."""
+    return _smooth((1.0 - np.abs(place)) / softness)
+
+
+def _smooth(share: Array) -> Array:
+    """The cubic from 0 at 0 to 1 at 1 that is flat at both ends."""
+    t = np.clip(share, 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def _mixed(first: Array, second: Array, share: Array) -> Array:
+    return first + (second - first) * share

@@ -1,0 +1,176 @@
+"""What the border of a body, or an opaque object, does to light: how rough it is, how it tints, what enters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.formulas.color import ColorLike, parse_color
+from translucent.frozen import Frozen
+from translucent.media.medium import MAX_IOR
+from translucent.scene.lights import MAX_RADIANCE
+from translucent.scene.texture import Texture
+
+Array = npt.NDArray[np.float64]
+
+#: Largest dispersion, 20 / Abbe number: beyond it the index of red would fall below 1 for any glass.
+MAX_DISPERSION = 10.0
+
+_RANGES = (
+    ("roughness", 0.0, 1.0),
+    ("transmission", 0.0, 1.0),
+    ("diffuse_transmission", 0.0, 1.0),
+    ("dispersion", 0.0, MAX_DISPERSION),
+    ("metallic", 0.0, 1.0),
+    ("ior", 1.0, MAX_IOR),
+    ("alpha_cutoff", 0.0, 1.0),
+    ("opacity", 0.0, 1.0),
+)
+
+#: Where a layer covers less than this share, there is none.
+LEAST_COVER = 1e-4
+
+#: Fields that hold a texture.
+TEXTURE_FIELDS = (
+    "color_texture",
+    "roughness_texture",
+    "transmission_texture",
+    "normal_texture",
+    "emissive_texture",
+    "occlusion_texture",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(Frozen):
+    """The border between a medium and the air around it; or what an opaque object shows instead of a plain grey.
+
+    What does not pass the border by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
+    paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission and
+    _dispersion).
+
+    An opaque object is a metal, or a coat with `ior` over paint, or between the two (glTF 2.0, Appendix B). The index
+    of refraction of a body is its medium's, and what is said to be of opaque objects has no effect on it.
+
+    Parameters
+    ----------
+    roughness : float
+        0 (polished) to 1; the width of the GGX microfacet distribution is its square.
+    color : str or array_like (3,)
+        Tints what passes the surface, once for each body, and is the albedo of paint: 0 to 1, a color as text or
+        linear RGB.
+    transmission : float
+        Share of the light that enters by refraction, 0 to 1; the rest meets paint.
+    diffuse_transmission : float
+        Share of the light on paint that passes to the other side, 0 to 1.
+    diffuse_transmission_color : str or array_like (3,)
+        Tints that light.
+    dispersion : float
+        20 / Abbe number, 0 to 10; 0: all wavelengths bend alike.
+    multiple_scattering : bool
+        Add the light that a scattering medium gives back, and lets through, after more than one event: the layer of
+        Kubelka and Munk (1931) as thick as the body along the view ray. An approximation, exact for a wide flat slab
+        in diffuse light.
+    color_texture, roughness_texture, transmission_texture, normal_texture : Texture, optional
+        Multiply the values above, over the texture coordinates of the mesh: RGB, G (and B of `metallic`), R; a normal
+        map is in tangent space, with green upwards.
+    occlusion_texture : Texture, optional
+        R multiplies the light of the environment, and not that of lights.
+    metallic : float
+        Of an opaque object, 0 to 1: share of it that is metal, whose mirror images have the color.
+    ior : float
+        Of the coat of an opaque object, >= 1. With 1 it is Lambert's: nothing is mirrored but by metal.
+    emissive : str or array_like (3,)
+        Radiance of the surface in the dark, linear RGB or a color as text; of a body, where a ray first enters it.
+    emissive_texture : Texture, optional
+        Multiplies it.
+    alpha_cutoff : float
+        0 to 1: where the opacity of `color_texture`, times that of the vertices, is less, an opaque object or a thin
+        sheet has a hole. A solid has none: what is inside would be open.
+    opacity : float, optional
+        Makes of a thin sheet a layer that covers this share of what is behind it, 0 to 1, whatever the angle, times the
+        opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would, painted
+        over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its borders bend nothing.
+    double_sided : bool
+        Whether an opaque object is seen from the inside, too.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range.
+    """
+
+    roughness: float = 0.0
+    color: ColorLike = (1.0, 1.0, 1.0)
+    transmission: float = 1.0
+    diffuse_transmission: float = 0.0
+    diffuse_transmission_color: ColorLike = (1.0, 1.0, 1.0)
+    dispersion: float = 0.0
+    multiple_scattering: bool = False
+    color_texture: Texture | None = None
+    roughness_texture: Texture | None = None
+    transmission_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    metallic: float = 0.0
+    ior: float = 1.5
+    emissive: ColorLike = (0.0, 0.0, 0.0)
+    emissive_texture: Texture | None = None
+    alpha_cutoff: float = 0.0
+    double_sided: bool = True
+    occlusion_texture: Texture | None = None
+    opacity: float | None = None
+
+    def __post_init__(self) -> None:
+        for field, least, most in _RANGES:
+            if (value := getattr(self, field)) is None and field == "opacity":
+                continue
+            if not isinstance(value, int | float | np.floating) or not least <= value <= most:
+                raise InputError(
+                    f"surface {field} {value!r}", f"not in {least:g} to {most:g}", "give a number in that range"
+                )
+            object.__setattr__(self, field, float(value))
+        for field in ("color", "diffuse_transmission_color"):
+            object.__setattr__(self, field, _color(field, getattr(self, field), 1.0))
+        object.__setattr__(self, "emissive", _color("emissive", self.emissive, MAX_RADIANCE))
+        for field in TEXTURE_FIELDS:
+            if not isinstance(value := getattr(self, field), Texture | None):
+                raise InputError(f"surface {field}", f"of type {type(value).__name__}", "use tl.Texture")
+
+    @property
+    def plain(self) -> bool:
+        """Whether light passes the surface unchanged where the indices of refraction on both sides are equal."""
+        return (
+            self.transmission == 1.0
+            and self.transmission_texture is None
+            and self.color_texture is None
+            and bool((np.asarray(self.color) == 1.0).all())
+            and not self.multiple_scattering
+            and not self.glows
+        )
+
+    @property
+    def glows(self) -> bool:
+        """Whether it sends out light of its own."""
+        return bool((np.asarray(self.emissive) > 0).any())
+
+    @property
+    def textures(self) -> tuple[Texture | None, ...]:
+        """Color, roughness, transmission, normal, emissive and occlusion texture."""
+        return tuple(getattr(self, field) for field in TEXTURE_FIELDS)
+
+
+def _color(field: str, color: ColorLike, most: float) -> Array:
+    try:
+        values = np.array(parse_color(color) if isinstance(color, str) else color, dtype=np.float64)
+    except InputError:
+        raise
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.shape != (3,) or not ((values >= 0) & (values <= most)).all():
+        found = f"not three numbers in 0 to {most:g}"
+        raise InputError(f"surface {field} {color!r}", found, "give for example (1, 0.9, 0.8)")
+    values.setflags(write=False)
+    return values

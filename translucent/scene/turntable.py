@@ -1,0 +1,95 @@
+"""A scene from all around, as on a turntable."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.errors import InputError
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+#: Heights that a model is cut into, and points around each, to know what room it takes as it turns.
+CUTS, POINTS_AROUND = 32, 48
+
+
+def turntable(scene: Scene, count: int) -> Iterator[Scene]:
+    """The scene from `count` sides: its camera goes once around the center of the objects, about +Y.
+
+    Seen from above it goes counterclockwise. Environment and background go with it, so that the model seems to turn
+    before them; lights stay with the model.
+
+    Raises
+    ------
+    InputError
+        If the count is not a whole number above 1.
+    """
+    if not isinstance(count, int) or count < 2:
+        raise InputError(f"turntable of {count!r} pictures", "not a whole number above 1", "give for example 36")
+    center = scene.bounds.mean(axis=0)
+    for i in range(count):
+        angle = 360.0 * i / count
+        pose = _about(center, angle) @ scene.camera.pose
+        camera = dataclasses.replace(scene.camera, pose=pose)
+        yield dataclasses.replace(scene, camera=camera, environment=_turned(scene.environment, angle))
+
+
+def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
+    """The scene with its camera as far away as it must be to see all objects from every side of a `turntable`.
+
+    An orthographic camera stays where it is.
+    """
+    camera = scene.camera
+    if camera.fov_y is None:
+        return scene
+    points = swept_points(scene)
+    return dataclasses.replace(
+        scene, camera=Camera.framing(points, size, direction=camera.forward, fov_y=camera.fov_y, up=camera.up)
+    )
+
+
+def swept_points(scene: Scene) -> Array:
+    """(n, 3): points around all that the objects reach as they turn about +Y through the center of their bounds."""
+    center = scene.bounds.mean(axis=0)
+    offsets = np.concatenate(
+        [
+            item.mesh.vertices[np.unique(item.mesh.faces)] @ item.matrix[:3, :3].T + (item.matrix[:3, 3] - center)
+            for item in scene.objects
+        ]
+    )
+    radius, height = np.hypot(offsets[:, 0], offsets[:, 2]), offsets[:, 1]
+    low, high = height.min(), height.max()
+    cut = np.minimum((CUTS * (height - low) / ((high - low) or 1.0)).astype(np.intp), CUTS - 1)
+    widest = np.zeros(CUTS)
+    np.maximum.at(widest, cut, radius)
+    angles = 2.0 * np.pi * np.arange(POINTS_AROUND) / POINTS_AROUND
+    # A ring of points around a circle has to be wider than that, for its sides to enclose it.
+    around = np.stack([np.cos(angles), np.zeros(POINTS_AROUND), np.sin(angles)], axis=1) / np.cos(np.pi / POINTS_AROUND)
+    edges = np.linspace(low, high, CUTS + 1)
+    rings = [
+        radius * around + np.array([0.0, level, 0.0])
+        for i, radius in enumerate(widest)
+        if radius > 0
+        for level in (edges[i], edges[i + 1])
+    ]
+    return np.asarray(np.concatenate(rings or [offsets]) + center)
+
+
+def _about(center: Array, angle: float) -> Array:
+    """(4, 4): a turn about +Y through a point, counterclockwise as seen from above, in degrees."""
+    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]]
+    matrix[:3, 3] = center - matrix[:3, :3] @ center
+    return matrix
+
+
+def _turned(environment: Environment, angle: float) -> Environment:
+    background = environment.background and _turned(environment.background, angle)
+    return dataclasses.replace(environment, rotation=environment.rotation + angle, background=background)
