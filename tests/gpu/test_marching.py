@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
-from translucent.planning.methods import Quadrature
+from translucent.planning.methods.ray_marched import Quadrature
 
 SIZE = (32, 24)
 DUSK = tl.Environment.constant((0.2, 0.3, 0.1))

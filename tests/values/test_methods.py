@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.planning.methods import MAX_K, MAX_LAYERS, METHODS, method_from_name
+from translucent.planning.methods import METHODS, method_from_name
+from translucent.planning.methods.depth_peeling import MAX_LAYERS
+from translucent.planning.methods.k_buffer import MAX_K
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))

@@ -10,17 +10,17 @@ from typing import Literal, get_args
 from translucent.bench.row import Kind
 from translucent.errors import InputError
 from translucent.planning.methods import (
-    MAX_LAYERS,
     BackFaceDepth,
     DepthPeeling,
     FragmentLists,
     KBuffer,
     Method,
-    Quadrature,
     RayMarched,
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.methods.depth_peeling import MAX_LAYERS
+from translucent.planning.methods.ray_marched import Quadrature
 from translucent.planning.render_plan import Borders
 from translucent.scene.scene import Scene
 

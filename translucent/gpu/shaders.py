@@ -26,7 +26,7 @@ from translucent.formulas.tone import (
     NEUTRAL_START,
 )
 from translucent.gpu.layout import BLOCKS
-from translucent.planning.methods import LEAST_SEEN, Quadrature
+from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
 
 #: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
 PEEL_BATCH = 8

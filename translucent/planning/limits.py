@@ -10,17 +10,15 @@ from translucent.errors import InputError
 from translucent.media.density import DensityGrid
 from translucent.planning.layers import layer_effects
 from translucent.planning.methods import (
-    LEAST_SEEN,
-    MAX_STEPS,
     BackFaceDepth,
     DepthPeeling,
     FragmentLists,
     Method,
-    OrderedMethod,
     RayMarched,
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.methods.ray_marched import LEAST_SEEN, MAX_STEPS
 from translucent.planning.render_plan import Capabilities, PassSpec, RenderPlan
 from translucent.scene.scene import Object, Scene, object_names
 
@@ -69,7 +67,7 @@ def closed_sheet_limits(scene: Scene, method: ThinLayer) -> list[str]:
     return [f"{object_names(solid)} closed, but drawn as sheets: what is inside is left out"] if solid else []
 
 
-def layer_limits(scene: Scene, method: OrderedMethod) -> list[str]:
+def layer_limits(scene: Scene, method: Method) -> list[str]:
     """What is left out where a ray can cross more surfaces than the method keeps."""
     if isinstance(method, FragmentLists | RayMarched):
         return []

@@ -23,17 +23,16 @@ from translucent.planning.limits import (
     with_unlit_marked,
 )
 from translucent.planning.methods import (
-    MAX_LIGHT_POINTS,
     BackFaceDepth,
     DepthPeeling,
     FragmentLists,
     KBuffer,
     Method,
-    OrderedMethod,
     RayMarched,
     SignedDepth,
     ThinLayer,
 )
+from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.order import media_differ, why_order_matters
 from translucent.planning.render_plan import Borders, Capabilities, PassSpec, RenderPlan
 from translucent.planning.slots import MAX_SLOTS, medium_slots, require_clear_priorities
@@ -117,7 +116,7 @@ def _plan_drawn(scene: Scene, method: Method | None, capabilities: Capabilities,
     if scene.varies:
         method = marching_method(scene, method, capabilities)
         return _plan_ordered(scene, method, capabilities, "the density varies from place to place")
-    if isinstance(method, OrderedMethod):
+    if method is not None and method.ordered:
         return _plan_ordered(scene, method, capabilities, "asked for")
     if (why := why_order_matters(scene, method, borders)) is not None:
         return _plan_for_order(scene, method, capabilities, why)
@@ -217,15 +216,15 @@ def _plan_for_order(scene: Scene, method: Method | None, capabilities: Capabilit
     return _plan_ordered(scene, cheapest, capabilities, why)
 
 
-def _cheapest_ordered(scene: Scene, capabilities: Capabilities) -> OrderedMethod:
+def _cheapest_ordered(scene: Scene, capabilities: Capabilities) -> Method:
     """Of the methods that find all intervals, the one that is expected to be fastest."""
     # Of two that cost the same the lists come first: peeling waits for a count before it goes on.
-    candidates: list[OrderedMethod] = [FragmentLists()] if capabilities.shader_storage else []
+    candidates: list[Method] = [FragmentLists()] if capabilities.shader_storage else []
     candidates.append(DepthPeeling())
     return min(candidates, key=lambda method: _ordered_pass(scene, method, "").cost)
 
 
-def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
+def _ordered_pass(scene: Scene, method: Method, why: str) -> PassSpec:
     """The pass that finds all intervals; peeling draws as often as it is expected to have to."""
     solids = _solids(scene)
     if isinstance(method, FragmentLists):
@@ -249,7 +248,7 @@ def _ordered_pass(scene: Scene, method: OrderedMethod, why: str) -> PassSpec:
     return PassSpec("depth_peeling", reason, solids, draws, cost=draws * COSTS["depth_peeling"])
 
 
-def _plan_ordered(scene: Scene, method: OrderedMethod, capabilities: Capabilities, why: str) -> RenderPlan:
+def _plan_ordered(scene: Scene, method: Method, capabilities: Capabilities, why: str) -> RenderPlan:
     sheets = _sheets(scene)
     name = type(method).__name__
     if not _solids(scene):
@@ -370,7 +369,7 @@ def _finished(scene: Scene, method: Method, passes: list[PassSpec], limits: list
     borders = border_passes(scene, method, COSTS["interfaces"], COSTS["surfaces"])
     media = [body.medium for body in scene.bodies if body.medium is not None]
     emits = any(medium.emits for medium in media)
-    if emits and isinstance(method, OrderedMethod):
+    if emits and method is not None and method.ordered:
         reason = "Beer-Lambert: what is behind, through exp(-optical depth), and what the intervals emit"
     elif emits:
         reason = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from translucent.planning.methods import Method, OrderedMethod, ThinLayer
+from translucent.planning.methods import Method, ThinLayer
 
 #: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
 Borders: TypeAlias = Literal["both", "front"]
@@ -107,7 +107,7 @@ class RenderPlan:
     @property
     def ordered(self) -> bool:
         """Whether the method finds the intervals of each ray in their order."""
-        return isinstance(self.method, OrderedMethod)
+        return self.method.ordered
 
     @property
     def geometry_passes(self) -> int:

@@ -19,7 +19,8 @@ from translucent.frames.metrics import interior
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.media.medium import Medium
-from translucent.planning.methods import MAX_LAYERS, DepthPeeling, FragmentLists, KBuffer, SignedDepth
+from translucent.planning.methods import DepthPeeling, FragmentLists, KBuffer, SignedDepth
+from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Overlap, Scene
 from translucent.scene.showcase import framing, showcase

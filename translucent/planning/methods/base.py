@@ -1,0 +1,74 @@
+"""What a method of finding thickness is: a frozen configuration, and traits by which planner and passes choose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from translucent.errors import InputError
+
+#: More points in an interval change nothing that float32 could show.
+MAX_LIGHT_POINTS = 16
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to find the thickness of bodies along each view ray; see its subclasses.
+
+    Attributes
+    ----------
+    name : str
+        On the command line.
+    ordered : bool
+        Finds the intervals of each ray in their order.
+    makes_sheets : bool
+        Takes every face for a sheet, without an inside.
+    tells_media_apart : bool
+        Bodies may be filled with different media.
+    convex_only : bool
+        Pixels that enter a body more than once are marked invalid.
+    needs_storage : bool
+        Its shaders write to buffers: OpenGL 4.3.
+    samples_lights : bool
+        Follows lights into media that scatter.
+    finds_exits : bool
+        Tells where each ray first leaves all bodies.
+    marches : bool
+        Steps through the intervals, so that what fills them may vary.
+    """
+
+    name: ClassVar[str] = ""
+    ordered: ClassVar[bool] = False
+    makes_sheets: ClassVar[bool] = False
+    tells_media_apart: ClassVar[bool] = True
+    convex_only: ClassVar[bool] = False
+    needs_storage: ClassVar[bool] = False
+    samples_lights: ClassVar[bool] = False
+    finds_exits: ClassVar[bool] = False
+    marches: ClassVar[bool] = False
+
+    @property
+    def layer_limit(self) -> int | None:
+        """Surfaces that a ray may cross; None where there is no limit. Pixels with more are marked invalid."""
+        return None
+
+    @property
+    def light_points(self) -> int:
+        """Points at which each interval looks at each light, where a medium scatters light."""
+        return 1
+
+    @property
+    def usual_thickness(self) -> float | None:
+        """Metres through every face that declares none, where the method makes sheets."""
+        return None
+
+    @property
+    def counts_from_camera(self) -> bool:
+        """Whether distances count from the camera, and lose digits with distance."""
+        return False
+
+
+def check_count(what: str, value: object, most: int) -> None:
+    """Raise `InputError` unless a value is a whole number from 1 to `most`."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= most:
+        raise InputError(f"{what} {value!r}", f"not a whole number in 1 to {most}", "give for example 8")
