@@ -48,7 +48,7 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     copies = np.concatenate([faces + k * len(unit) for k in range(3)])
     found = list(_chunks(points, copies, lines, np.repeat(np.arange(3), len(faces))))
     if not found:
-        return False
+        return False  # no face is as large as a cell
     line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return _winds_below_zero(line, height, sign)
 
@@ -96,6 +96,8 @@ def _crossings(triangles: Array, heights: Array, cell: Integers, line: Integers)
 
 def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:
     """Whether a balanced line winds negatively for longer than rounding explains."""
+    if len(line) == 0:
+        return False
     order = np.lexsort((height, line))
     line, height, sign = line[order], height[order], sign[order]
     winding = np.cumsum(sign)

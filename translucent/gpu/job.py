@@ -47,6 +47,9 @@ _COVERAGE_FLOOR = 2e-7
 #: so on, as far as float32 counts exactly. Beyond, they share the last weight.
 _OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
 
+#: With weights up to this, a count's fraction still resolves how far the rasterizer may misplace a face.
+_SHARING_WEIGHT = 256.0
+
 #: Share of the diagonal that a path may be below 0 by rounding; it then counts as 0. Steep faces have the largest
 #: errors, of some 1e-5.
 _ROUNDING = 1e-5
@@ -246,7 +249,7 @@ class FrameJob:
                 _UNEXPECTED if body.medium is not None and body.mesh.diagnosis.inside_out else 0.0,
                 # Where a body is broken, negative paths are more likely to be real than swapped at a silhouette.
                 subpixel if body.mesh.diagnosis.sound else 0.0,
-                max(weights) == 1.0,
+                max(weights) <= _SHARING_WEIGHT,
                 slot_of.get(i, 0),
                 i,
             )
@@ -289,7 +292,7 @@ def _count_weights(scene: Scene) -> list[float]:
     weights = []
     used = 0
     for body in scene.objects:
-        is_open = body.medium is not None and not body.mesh.diagnosis.solid
+        is_open = body.medium is not None and body.sheet_thickness is None and not body.mesh.diagnosis.solid
         weights.append(_OPEN_WEIGHTS[min(used, len(_OPEN_WEIGHTS) - 1)] if is_open else 1.0)
         used += is_open
     return weights
