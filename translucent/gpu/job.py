@@ -240,15 +240,16 @@ class FrameJob:
         anchored = not (isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored)
         slot_of = {i: number for number, slot in enumerate(self.slots) for i in slot.objects}
         weights = _count_weights(self.scene)
-        subpixel = 0.5 ** int(self.gl.info["GL_SUBPIXEL_BITS"])
+        # Where a body is broken, paths below 0 are more likely to be real than swapped at a silhouette.
+        sound = all(body.mesh.diagnosis.sound for body in self.scene.bodies if body.sheet_thickness is None)
+        subpixel = 0.5 ** int(self.gl.info["GL_SUBPIXEL_BITS"]) if sound else 0.0
         return [
             BodyRole(
                 anchored,
                 self._sheet_thickness(body),
                 weights[i],
                 _UNEXPECTED if body.medium is not None and body.mesh.diagnosis.inside_out else 0.0,
-                # Where a body is broken, negative paths are more likely to be real than swapped at a silhouette.
-                subpixel if body.mesh.diagnosis.sound else 0.0,
+                subpixel,
                 max(weights) <= _SHARING_WEIGHT,
                 slot_of.get(i, 0),
                 i,
