@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from translucent import reference
 from translucent.bake.bake import bake_thickness
+from translucent.bake.baked import BakeReport
 from translucent.bake.batch import BatchReport, bake_many
 from translucent.bake.reading import load_thickness_map
 from translucent.bake.settings import BakeSettings
-from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
+from translucent.bake.thickness_map import ThicknessMap, VertexThickness
 from translucent.bake.vertices import bake_vertex_thickness
 from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
 from translucent.frames.appearance import Appearance, appearance_of, average_color, medium_for_average_color
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare, interior
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
 from translucent.gltf.load import load_scene
 from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium
@@ -39,6 +40,7 @@ from translucent.media.density import DensityGrid, ExponentialDensity, LinearDen
 from translucent.media.fitting import Fit, fit_medium, fit_wedge
 from translucent.media.medium import Medium
 from translucent.media.presets import Preset, preset, presets
+from translucent.mesh_files import load_mesh
 from translucent.planning.methods import (
     BackFaceDepth,
     DepthPeeling,
