@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 import tomllib
 from graphlib import TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -67,6 +70,31 @@ def test_a_public_name_exists_and_is_documented(public: str) -> None:
 
 def test_the_public_names_are_sorted_and_unique() -> None:
     assert sorted(set(tl.__all__)) == tl.__all__
+
+
+def test_checkers_know_the_public_names() -> None:
+    """What is imported for them alone is what there is, from the same modules."""
+    tree = ast.parse((PACKAGE / "__init__.py").read_text())
+    (known,) = [node.body for node in tree.body if isinstance(node, ast.If)]
+    told = {node.names[0].name: node.module for node in known if isinstance(node, ast.ImportFrom)}
+    assert sorted(told) == sorted({*tl.__all__, "bench"})
+    for public, module in told.items():
+        assert getattr(tl, public) is getattr(import_module(module), public)
+
+
+def test_a_scene_needs_neither_scipy_nor_trimesh_nor_opengl() -> None:
+    code = """
+import sys
+import translucent as tl
+assert "numpy" not in sys.modules  # every public name is imported when it is first asked for
+mesh = tl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+camera = tl.Camera.look_at((0, 0, 9), (0, 0, 0))
+tl.Scene([tl.Object(mesh, tl.Medium.from_color("#7b1e3a", 0.01))], camera, [tl.PointLight((0, 0, 9), 1.0)])
+found = {"scipy", "trimesh", "moderngl", "pyrender"} & set(sys.modules)
+assert not found, found
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -18,7 +18,7 @@ from translucent.files.reading import json_value, linked_file, read_bytes
 Json = dict[str, Any]
 
 #: Of GLB: how it begins, the kinds of its chunks, its header and that of a chunk.
-MAGIC, VERSION = b"glTF", 2
+MAGIC, GLB_VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 
@@ -141,7 +141,7 @@ def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
     if len(data) < HEADER.size + CHUNK.size:
         raise cut
     _, version, length = HEADER.unpack_from(data)
-    if version != VERSION:
+    if version != GLB_VERSION:
         raise InputError(asked, f"GLB version {version}", "export it as glTF 2.0")
     if length > len(data):
         raise cut

@@ -15,7 +15,7 @@ from urllib.parse import quote, unquote
 
 from translucent.errors import InputError, TranslucentWarning
 from translucent.files.paths import require_place, write_atomically
-from translucent.gltf.file import BINARY_CHUNK, CHUNK, HEADER, JSON_CHUNK, MAGIC, VERSION, GltfFile, Json
+from translucent.gltf.file import BINARY_CHUNK, CHUNK, GLB_VERSION, HEADER, JSON_CHUNK, MAGIC, GltfFile, Json
 from translucent.gltf.pack import embed_images, gather, is_link
 
 _LONGEST = 2**32 - 1  # bytes: the header states the length with 32 bits
@@ -94,7 +94,7 @@ def _packed(file: GltfFile, tree: Json) -> bytes:
     length = HEADER.size + CHUNK.size + len(text) + len(chunks)
     if length > _LONGEST:
         raise InputError(f"output .glb of {str(file.path)!r}", "more than 4 GiB, which no .glb holds", "write a .gltf")
-    return HEADER.pack(MAGIC, VERSION, length) + CHUNK.pack(len(text), JSON_CHUNK) + text + chunks
+    return HEADER.pack(MAGIC, GLB_VERSION, length) + CHUNK.pack(len(text), JSON_CHUNK) + text + chunks
 
 
 def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes]:
