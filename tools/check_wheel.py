@@ -58,6 +58,8 @@ def check(wheel: Path, folder: Path) -> None:
     for path in (package, mesh):
         if not path.resolve().is_relative_to(folder.resolve()):
             raise SetupError("files of the installed wheel", f"{path} is not among them", "see translucent/assets.py")
+    if not (package.parent / "py.typed").is_file():
+        raise SetupError("types of the installed wheel", "py.typed is not in it", "see pyproject.toml")
     run(binaries / "translucent", "render", mesh, "-o", "out.png", cwd=work)
     colors = int(run(binaries / "python", "-c", COUNT_COLORS, "out.png", cwd=work))
     if colors < 2:

@@ -8,143 +8,133 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from translucent import reference
-from translucent.bake.bake import bake_thickness
-from translucent.bake.batch import BatchReport, bake_many
-from translucent.bake.reading import load_thickness_map
-from translucent.bake.settings import BakeSettings
-from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
-from translucent.bake.vertices import bake_vertex_thickness
-from translucent.errors import InputError, RenderError, TranslucentError, TranslucentWarning
-from translucent.frames.appearance import Appearance, appearance_of, average_color, medium_for_average_color
-from translucent.frames.frame import Frame
-from translucent.frames.metrics import Errors, compare, interior
-from translucent.geometry.mesh import Mesh, load_mesh
-from translucent.gltf.load import load_scene
-from translucent.gltf.materials import read_materials
-from translucent.gltf.write import write_medium
-from translucent.materials import load_medium, text_block
-from translucent.media.albedo import scattering_medium
-from translucent.media.conversion import (
-    DistanceMatch,
-    clamp_colors,
-    color_at_distance,
-    condition_number,
-    distance_for_color,
-    extinction_from_colors,
-)
-from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
-from translucent.media.fitting import Fit, fit_medium, fit_wedge
-from translucent.media.medium import Medium
-from translucent.media.presets import Preset, preset, presets
-from translucent.planning.methods import (
-    BackFaceDepth,
-    DepthPeeling,
-    FragmentLists,
-    KBuffer,
-    RayMarched,
-    SignedDepth,
-    ThinLayer,
-)
-from translucent.planning.plan import plan
-from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.scene.backdrop import Backdrop
-from translucent.scene.camera import Camera
-from translucent.scene.environment import Environment
-from translucent.scene.lights import DirectionalLight, PointLight
-from translucent.scene.scene import Object, Scene
-from translucent.scene.showcase import showcase
-from translucent.scene.surface import Surface
-from translucent.scene.texture import Texture
+if TYPE_CHECKING:  # for checkers and editors: the same names as in the table below
+    from translucent import bench as bench
+    from translucent import reference as reference
+    from translucent.bake.bake import bake_thickness as bake_thickness
+    from translucent.bake.baked import BakeReport as BakeReport
+    from translucent.bake.batch import BatchReport as BatchReport
+    from translucent.bake.batch import bake_many as bake_many
+    from translucent.bake.reading import load_thickness_map as load_thickness_map
+    from translucent.bake.settings import BakeSettings as BakeSettings
+    from translucent.bake.thickness_map import ThicknessMap as ThicknessMap
+    from translucent.bake.thickness_map import VertexThickness as VertexThickness
+    from translucent.bake.vertices import bake_vertex_thickness as bake_vertex_thickness
+    from translucent.errors import InputError as InputError
+    from translucent.errors import RenderError as RenderError
+    from translucent.errors import TranslucentError as TranslucentError
+    from translucent.errors import TranslucentWarning as TranslucentWarning
+    from translucent.frames.appearance import Appearance as Appearance
+    from translucent.frames.appearance import appearance_of as appearance_of
+    from translucent.frames.appearance import average_color as average_color
+    from translucent.frames.appearance import medium_for_average_color as medium_for_average_color
+    from translucent.frames.frame import Frame as Frame
+    from translucent.frames.metrics import Errors as Errors
+    from translucent.frames.metrics import compare as compare
+    from translucent.frames.metrics import interior as interior
+    from translucent.geometry.mesh import Mesh as Mesh
+    from translucent.gltf.load import load_scene as load_scene
+    from translucent.gltf.materials import read_materials as read_materials
+    from translucent.gltf.write import write_medium as write_medium
+    from translucent.materials import load_medium as load_medium
+    from translucent.materials import text_block as text_block
+    from translucent.media.albedo import scattering_medium as scattering_medium
+    from translucent.media.conversion import DistanceMatch as DistanceMatch
+    from translucent.media.conversion import clamp_colors as clamp_colors
+    from translucent.media.conversion import color_at_distance as color_at_distance
+    from translucent.media.conversion import condition_number as condition_number
+    from translucent.media.conversion import distance_for_color as distance_for_color
+    from translucent.media.conversion import extinction_from_colors as extinction_from_colors
+    from translucent.media.density import DensityGrid as DensityGrid
+    from translucent.media.density import ExponentialDensity as ExponentialDensity
+    from translucent.media.density import LinearDensity as LinearDensity
+    from translucent.media.fitting import Fit as Fit
+    from translucent.media.fitting import fit_medium as fit_medium
+    from translucent.media.fitting import fit_wedge as fit_wedge
+    from translucent.media.medium import Medium as Medium
+    from translucent.media.presets import Preset as Preset
+    from translucent.media.presets import preset as preset
+    from translucent.media.presets import presets as presets
+    from translucent.mesh_files import load_mesh as load_mesh
+    from translucent.planning.methods import BackFaceDepth as BackFaceDepth
+    from translucent.planning.methods import DepthPeeling as DepthPeeling
+    from translucent.planning.methods import FragmentLists as FragmentLists
+    from translucent.planning.methods import KBuffer as KBuffer
+    from translucent.planning.methods import RayMarched as RayMarched
+    from translucent.planning.methods import SignedDepth as SignedDepth
+    from translucent.planning.methods import ThinLayer as ThinLayer
+    from translucent.planning.plan import plan as plan
+    from translucent.planning.render_plan import Capabilities as Capabilities
+    from translucent.planning.render_plan import RenderPlan as RenderPlan
+    from translucent.renderer import Renderer as Renderer
+    from translucent.scene.backdrop import Backdrop as Backdrop
+    from translucent.scene.camera import Camera as Camera
+    from translucent.scene.environment import Environment as Environment
+    from translucent.scene.lights import DirectionalLight as DirectionalLight
+    from translucent.scene.lights import PointLight as PointLight
+    from translucent.scene.scene import Object as Object
+    from translucent.scene.scene import Scene as Scene
+    from translucent.scene.showcase import showcase as showcase
+    from translucent.scene.surface import Surface as Surface
+    from translucent.scene.texture import Texture as Texture
 
-if TYPE_CHECKING:
-    from translucent.renderer import Renderer
+#: Where each public name is. It is imported when it is first asked for: SciPy and OpenGL take their time.
+_NAMES = {
+    "bake.bake": "bake_thickness",
+    "bake.baked": "BakeReport",
+    "bake.batch": "BatchReport bake_many",
+    "bake.reading": "load_thickness_map",
+    "bake.settings": "BakeSettings",
+    "bake.thickness_map": "ThicknessMap VertexThickness",
+    "bake.vertices": "bake_vertex_thickness",
+    "errors": "InputError RenderError TranslucentError TranslucentWarning",
+    "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",
+    "frames.frame": "Frame",
+    "frames.metrics": "Errors compare interior",
+    "geometry.mesh": "Mesh",
+    "gltf.load": "load_scene",
+    "gltf.materials": "read_materials",
+    "gltf.write": "write_medium",
+    "materials": "load_medium text_block",
+    "media.albedo": "scattering_medium",
+    "media.conversion": "DistanceMatch clamp_colors color_at_distance condition_number "
+    "distance_for_color extinction_from_colors",
+    "media.density": "DensityGrid ExponentialDensity LinearDensity",
+    "media.fitting": "Fit fit_medium fit_wedge",
+    "media.medium": "Medium",
+    "media.presets": "Preset preset presets",
+    "mesh_files": "load_mesh",
+    "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer RayMarched SignedDepth ThinLayer",
+    "planning.plan": "plan",
+    "planning.render_plan": "Capabilities RenderPlan",
+    "renderer": "Renderer",
+    "scene.backdrop": "Backdrop",
+    "scene.camera": "Camera",
+    "scene.environment": "Environment",
+    "scene.lights": "DirectionalLight PointLight",
+    "scene.scene": "Object Scene",
+    "scene.showcase": "showcase",
+    "scene.surface": "Surface",
+    "scene.texture": "Texture",
+}
+_MODULE_OF = {name: f"translucent.{module}" for module, names in _NAMES.items() for name in names.split()}
 
-__all__ = [
-    "Appearance",
-    "BackFaceDepth",
-    "Backdrop",
-    "BakeReport",
-    "BakeSettings",
-    "BatchReport",
-    "Camera",
-    "Capabilities",
-    "DensityGrid",
-    "DepthPeeling",
-    "DirectionalLight",
-    "DistanceMatch",
-    "Environment",
-    "Errors",
-    "ExponentialDensity",
-    "Fit",
-    "FragmentLists",
-    "Frame",
-    "InputError",
-    "KBuffer",
-    "LinearDensity",
-    "Medium",
-    "Mesh",
-    "Object",
-    "PointLight",
-    "Preset",
-    "RayMarched",
-    "RenderError",
-    "RenderPlan",
-    "Renderer",
-    "Scene",
-    "SignedDepth",
-    "Surface",
-    "Texture",
-    "ThicknessMap",
-    "ThinLayer",
-    "TranslucentError",
-    "TranslucentWarning",
-    "VertexThickness",
-    "appearance_of",
-    "average_color",
-    "bake_many",
-    "bake_thickness",
-    "bake_vertex_thickness",
-    "clamp_colors",
-    "color_at_distance",
-    "compare",
-    "condition_number",
-    "distance_for_color",
-    "extinction_from_colors",
-    "fit_medium",
-    "fit_wedge",
-    "interior",
-    "load_medium",
-    "load_mesh",
-    "load_scene",
-    "load_thickness_map",
-    "medium_for_average_color",
-    "plan",
-    "preset",
-    "presets",
-    "read_materials",
-    "reference",
-    "scattering_medium",
-    "showcase",
-    "text_block",
-    "write_medium",
-]
+__all__ = sorted((*_MODULE_OF, "reference"))
 
 
 def __getattr__(name: str) -> Any:
+    if name in ("bench", "reference"):
+        return import_module(f"translucent.{name}")
     if name == "__version__":
-        from translucent.version import VERSION
+        return import_module("translucent.version").VERSION
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_MODULE_OF[name]), name)
+    return value
 
-        return VERSION
-    # The values need no OpenGL, so importing them does not load it.
-    if name == "Renderer":
-        from translucent.renderer import Renderer
 
-        return Renderer
-    if name == "bench":
-        from importlib import import_module
-
-        return import_module("translucent.bench")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

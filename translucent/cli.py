@@ -58,7 +58,7 @@ def _quoting(error: click.ClickException) -> str:
     """What may have become of the color after an option at the end of the line."""
     if not (isinstance(error, click.BadOptionUsage) and error.option_name in TAKE_COLORS):
         return ""
-    from translucent.formulas.color import QUOTE_HINT
+    from translucent.media.colors import QUOTE_HINT
 
     return f"; {QUOTE_HINT}"
 

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
+import tomllib
+from graphlib import TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -11,43 +16,39 @@ import translucent as tl
 
 PACKAGE = Path(tl.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
-APPS = {PACKAGE / name for name in ("cli.py", "doctor.py", "renderer.py", "__main__.py")}
-VALUES = sorted(set(PACKAGE.glob("*.py")) - APPS)
-for folder in ("reference", "materials", "gltf", "cpu"):
-    VALUES += sorted((PACKAGE / folder).glob("*.py"))
-GPU = {"moderngl", "glcontext", "OpenGL"}
+CONTRACTS = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
 
 
 def name(path: Path) -> str:
     return str(path.relative_to(PACKAGE))
 
 
-def imports(tree: ast.AST) -> set[str]:
-    """Dotted names of all that a module imports, wherever it does."""
+def imported(path: Path) -> set[str]:
+    """Dotted names of all modules of the package that a file imports, wherever it does; of names in them, theirs."""
     found = set()
-    for node in ast.walk(tree):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found |= {f"{node.module}.{alias.name}" for alias in node.names} | {str(node.module)}
-    return found
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {whole if whole in MODULES else whole.rpartition(".")[0] for whole in found} & set(MODULES)
 
 
-def is_gpu(module: str) -> bool:
-    return module.split(".")[0] in GPU or module.startswith("translucent.gpu")
+MODULES = {".".join(("translucent", *path.relative_to(PACKAGE).with_suffix("").parts)): path for path in FILES}
+MODULES = {module.removesuffix(".__init__"): path for module, path in MODULES.items()}
 
 
-def test_the_package_is_there() -> None:
-    assert {"optics.py", "mesh.py", "plan.py"} <= {name(path) for path in VALUES}
-    assert any(
-        is_gpu(module) for path in (PACKAGE / "gpu").rglob("*.py") for module in imports(ast.parse(path.read_text()))
-    )
+def test_at_most_twenty_rooms_are_at_the_top() -> None:
+    """Each of which the rings know: import-linter sees to it that nothing else is there."""
+    folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
+    assert folders <= {one.strip() for layer in CONTRACTS[0]["layers"] for one in layer.split("|")}
+    assert len(folders) <= 20
 
 
-@pytest.mark.parametrize("path", VALUES, ids=name)
-def test_the_values_import_no_gpu(path: Path) -> None:
-    found = {module for module in imports(ast.parse(path.read_text(encoding="utf-8"))) if is_gpu(module)}
-    assert not found
+def test_no_module_imports_itself_through_others() -> None:
+    """Imports for types and those within functions counted; the front door apart, which everybody may come through."""
+    graph = {module: imported(path) - {"translucent"} for module, path in MODULES.items()}
+    tuple(TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
 
 
 @pytest.mark.parametrize("path", FILES, ids=name)
@@ -69,6 +70,31 @@ def test_a_public_name_exists_and_is_documented(public: str) -> None:
 
 def test_the_public_names_are_sorted_and_unique() -> None:
     assert sorted(set(tl.__all__)) == tl.__all__
+
+
+def test_checkers_know_the_public_names() -> None:
+    """What is imported for them alone is what there is, from the same modules."""
+    tree = ast.parse((PACKAGE / "__init__.py").read_text())
+    (known,) = [node.body for node in tree.body if isinstance(node, ast.If)]
+    told = {node.names[0].name: node.module for node in known if isinstance(node, ast.ImportFrom)}
+    assert sorted(told) == sorted({*tl.__all__, "bench"})
+    for public, module in told.items():
+        assert getattr(tl, public) is getattr(import_module(module), public)
+
+
+def test_a_scene_needs_neither_scipy_nor_trimesh_nor_opengl() -> None:
+    code = """
+import sys
+import translucent as tl
+assert "numpy" not in sys.modules  # every public name is imported when it is first asked for
+mesh = tl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+camera = tl.Camera.look_at((0, 0, 9), (0, 0, 0))
+tl.Scene([tl.Object(mesh, tl.Medium.from_color("#7b1e3a", 0.01))], camera, [tl.PointLight((0, 0, 9), 1.0)])
+found = {"scipy", "trimesh", "moderngl", "pyrender"} & set(sys.modules)
+assert not found, found
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -22,8 +22,9 @@ import trimesh
 
 import translucent as tl
 from translucent.bake import jobs as jobs_module
+from translucent.bake.bake_file import bake_file
 from translucent.bake.batch import bake_many, run_job
-from translucent.bake.jobs import bake_file, content_hash
+from translucent.bake.jobs import content_hash
 from translucent.bake.local_pool import in_processes
 from translucent.bake.record import read_record, sidecar_of
 

@@ -23,9 +23,10 @@ from translucent.bake.gltf.maps import write_maps
 from translucent.bake.gltf.targets import find_targets
 from translucent.bake.writing import save_map, save_vertices
 from translucent.gltf.accessors import Accessors
-from translucent.gltf.file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.materials import read_materials
 from translucent.gltf.scene_media import thickness_at, thickness_map
+from translucent.gltf.write_file import write_gltf
 
 MapMaker = Callable[..., Any]
 Json = dict[str, Any]

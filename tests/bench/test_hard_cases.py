@@ -11,7 +11,8 @@ import translucent as tl
 from translucent.bench.hard import geometry as hard_geometry
 from translucent.bench.hard import values as hard_values
 from translucent.bench.hard import views as hard_views
-from translucent.bench.hard.cases import Checks, Hard, measure_hard_cases
+from translucent.bench.hard.cases import Checks, Hard
+from translucent.bench.hard.measure import measure_hard_cases
 
 ALL = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
 

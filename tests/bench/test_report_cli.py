@@ -16,8 +16,8 @@ from translucent.assets import mesh_path
 from translucent.bench.models import effect_of, model_cases
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
-from translucent.geometry.mesh import load_mesh
 from translucent.media.medium import Medium
+from translucent.mesh_files import load_mesh
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.showcase import showcase
 

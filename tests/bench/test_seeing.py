@@ -9,7 +9,7 @@ import pytest
 
 from translucent.bench.row import ColorDifference, Row
 from translucent.bench.seeing import JUST_NOTICEABLE, color_difference, lab, seen_words
-from translucent.formulas.color import parse_color
+from translucent.media.colors import parse_color
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ MODULES: dict[str, ModuleType] = {
 
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
-    "color": {"parse_color", "to_hex"},
+    "color": {"to_hex"},
     "camera": {"check_size"},
     "tone": {"tone_curve"},
     "environment": {"parse_radiance"},

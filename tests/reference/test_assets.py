@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
+from translucent.mesh_files import load_mesh
 from translucent.reference import render
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Overlap, Scene

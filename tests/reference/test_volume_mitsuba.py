@@ -13,8 +13,9 @@ import numpy.typing as npt
 import pytest
 import trimesh
 
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
+from translucent.mesh_files import load_mesh
 from translucent.reference import path_trace, render
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment

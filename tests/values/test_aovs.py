@@ -18,8 +18,6 @@ from translucent.frames.aovs import (
     aov_pictures,
     false_colors,
     marks,
-    thickness_picture,
-    validity_picture,
 )
 from translucent.frames.frame import Frame
 
@@ -60,7 +58,7 @@ def test_marks_are_round_numbers(most: float, exact: list[float]) -> None:
 
 def test_thickness_runs_from_the_darkest_to_the_lightest_color() -> None:
     made = frame()
-    pixels = thickness_picture(made)
+    pixels = aov_pictures(made.arrays)["thickness"]
     assert pixels.shape[0] > 40
     assert pixels.shape[1:] == (60, 3)
     assert pixels[20, 0].tolist() == list(EMPTY)
@@ -72,7 +70,7 @@ def test_thickness_runs_from_the_darkest_to_the_lightest_color() -> None:
 @pytest.mark.parametrize("scale", [1e-30, 1e-7, 1e-3, 1.0, 1e5, 1e17])
 @pytest.mark.parametrize("size", [(1, 1), (3, 8), (9, 700)])
 def test_any_size_and_scale_has_a_picture(scale: float, size: tuple[int, int]) -> None:
-    pictures = aov_pictures(frame(scale, *size))
+    pictures = aov_pictures(frame(scale, *size).arrays)
     assert all(picture.dtype == np.uint8 and picture.shape[1:] == (size[1], 3) for picture in pictures.values())
 
 
@@ -81,11 +79,11 @@ def test_a_frame_without_a_medium_says_so() -> None:
     nothing = dataclasses.replace(
         made, thickness=np.zeros((40, 60)), coverage=np.zeros((40, 60), bool), valid=np.ones((40, 60), bool)
     )
-    assert (thickness_picture(nothing)[:40] == EMPTY).all()
+    assert (aov_pictures(nothing.arrays)["thickness"][:40] == EMPTY).all()
 
 
 def test_validity_has_a_color_for_each_case() -> None:
-    pixels = validity_picture(frame())
+    pixels = aov_pictures(frame().arrays)["validity"]
     assert [pixels[2, 2].tolist(), pixels[20, 0].tolist(), pixels[20, 30].tolist()] == [
         list(WRONG),
         list(EMPTY),
@@ -99,7 +97,7 @@ def test_they_are_saved_into_a_folder(tmp_path: Path) -> None:
     assert [file.name for file in files] == ["thickness.png", "transmittance.png", "validity.png"]
     for file in files:
         with Image.open(file) as picture:
-            np.testing.assert_array_equal(np.asarray(picture), aov_pictures(made)[file.stem])
+            np.testing.assert_array_equal(np.asarray(picture), aov_pictures(made.arrays)[file.stem])
     assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {file.name for file in files}
     (tmp_path / "taken").write_text("")
     with pytest.raises(tl.InputError, match=r"folder .*taken'; '.*taken' is no folder; choose another one$"):

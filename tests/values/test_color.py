@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from translucent.errors import InputError
 from translucent.formulas import color
+from translucent.media.colors import parse_color
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -87,7 +88,7 @@ RED = (1.0, 0.0, 0.0)
     ids=str,
 )
 def test_a_color_can_be_written_so(written: object, linear: tuple[float, ...]) -> None:
-    assert color.parse_color(written) == pytest.approx(linear, rel=1e-15)
+    assert parse_color(written) == pytest.approx(linear, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -114,12 +115,12 @@ def test_a_color_can_be_written_so(written: object, linear: tuple[float, ...]) -
 )
 def test_what_is_no_color_is_refused(written: object, message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message) if written is not None else "color None"):
-        color.parse_color(written)
+        parse_color(written)
 
 
 @pytest.mark.parametrize("text", ["#000000", "#7b1e3a", "#010203", "#ffffff"])
 def test_hex_round_trip(text: str) -> None:
-    assert color.to_hex(color.parse_color(text)) == text
+    assert color.to_hex(parse_color(text)) == text
 
 
 @pytest.mark.parametrize(("linear", "text"), [((-1, 0, 2), "#0000ff"), ((1e-9, 1, 1e300), "#00ffff")])

@@ -13,8 +13,9 @@ import pytest
 from PIL import Image
 
 import translucent as tl
-from translucent.formulas.color import parse_color, srgb_to_linear, to_hex
+from translucent.formulas.color import srgb_to_linear, to_hex
 from translucent.media import conversion
+from translucent.media.colors import parse_color
 from translucent.media.conversion import (
     clamp_colors,
     color_at_distance,

@@ -7,8 +7,9 @@ import pytest
 
 import translucent as tl
 from translucent.scene.environment import equirectangular_uv
-from translucent.scene.environment_filter import LEVEL_SIZE, LEVELS, FilteredEnvironment, filtered, irradiance_map
+from translucent.scene.environment_filter import LEVEL_SIZE, LEVELS, FilteredEnvironment, filtered
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
+from translucent.scene.lobes import irradiance_map
 
 EPS32 = float(np.finfo(np.float32).eps)
 

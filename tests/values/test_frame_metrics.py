@@ -15,8 +15,9 @@ from PIL import Image
 
 import translucent as tl
 from translucent.files.paths import write_atomically
-from translucent.frames.frame import ARRAYS, Frame, check_output
+from translucent.frames.frame import ARRAYS, Frame
 from translucent.frames.metrics import interior
+from translucent.frames.writing import check_output
 from translucent.planning.render_plan import PassSpec, RenderPlan
 
 PLAN = RenderPlan(tl.SignedDepth(), (PassSpec("signed_depth", "a test", (0,), 1),))
@@ -160,7 +161,7 @@ def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
 
 def test_exr_without_its_package_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "OpenEXR", None)
-    with pytest.raises(tl.RenderError, match="pip install openexr"):
+    with pytest.raises(tl.RenderError, match=r"pip install 'translucent-shading\[exr\]'"):
         check_output(tmp_path / "a.exr")
 
 

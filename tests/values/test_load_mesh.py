@@ -28,9 +28,10 @@ from tests.values.handmade import (
     joined,
     moebius,
 )
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
 from translucent.geometry.repair import WELD_TOLERANCE, weld
 from translucent.geometry.solids import Sphere, Torus
+from translucent.mesh_files import load_mesh
 
 # Welding
 

@@ -12,11 +12,12 @@ import pytest
 
 import translucent as tl
 from tests.values.gltf_json import JADE
-from translucent.gltf.file import GltfFile, read_gltf, write_gltf
+from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.materials import materials_of, read_materials
 from translucent.gltf.scene_media import material_uses
 from translucent.gltf.write import write_medium
-from translucent.materials.color_distance import BLACKEST
+from translucent.gltf.write_file import write_gltf
+from translucent.media.color_distance import BLACKEST
 
 # Writing
 

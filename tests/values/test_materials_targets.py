@@ -16,12 +16,12 @@ from tests.values.media import CLEAR, COLOR, GLOW, JADE, MILK, close
 from translucent.gltf.file import GltfFile
 from translucent.gltf.materials import materials_of
 from translucent.materials import TARGETS, load_medium, text_block
-from translucent.materials.color_distance import BLACKEST, color_at, extinction_at
 from translucent.materials.json_text import read_json, write_json
 from translucent.materials.openpbr import read_openpbr, write_openpbr
 from translucent.materials.standard_surface import read_standard_surface, write_standard_surface
 from translucent.materials.unity import from_unity
 from translucent.materials.unreal import LONGEST_CM, from_mean_free_path_cm, mean_free_path_cm
+from translucent.media.color_distance import BLACKEST, color_at, extinction_at
 
 # Color at a distance
 

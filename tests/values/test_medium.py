@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import translucent as tl
-from translucent.formulas.color import parse_color
+from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
 
 NAN, INF = math.nan, math.inf

@@ -13,8 +13,8 @@ import pytest
 
 import translucent as tl
 from tests.values.handmade import CLEAN, facts
-from translucent.geometry.mesh import load_mesh
 from translucent.geometry.repair import WELD_TOLERANCE
+from translucent.mesh_files import load_mesh
 
 
 def _manifest(assets: Path, folder: str) -> dict[str, dict[str, str]]:

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
+from translucent.mesh_files import load_mesh
 
 Array = npt.NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from translucent.files.images import write_png
 
 import translucent as tl
 from translucent.files.paths import require_file, require_folder, require_place, write_atomically, write_text_atomically
-from translucent.frames.frame import write_png
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.bake.baked import BakeReport
 from translucent.bake.canvas import Canvas, Checkpoint, bake_key
 from translucent.bake.high_low import Projection
 from translucent.bake.measure import Measure
@@ -18,7 +19,7 @@ from translucent.bake.settings import BakeSettings
 from translucent.bake.strips import Strips
 from translucent.bake.surface import Surface
 from translucent.bake.texels import Atlas
-from translucent.bake.thickness_map import BakeReport, ThicknessMap
+from translucent.bake.thickness_map import ThicknessMap
 from translucent.bake.unwrap import Unwrapped, in_tile, unwrap
 from translucent.bake.work import Progress, bake_strips
 from translucent.cpu.threads import processors

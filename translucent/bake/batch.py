@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from translucent.bake.jobs import Job, bake_file, check_job, content_hash, is_done
+from translucent.bake.bake_file import bake_file
+from translucent.bake.jobs import Job, check_job, content_hash, is_done
 from translucent.bake.local_pool import in_processes
 from translucent.bake.record import Record, files_of, parts_of, read_record
 from translucent.cpu.threads import processors

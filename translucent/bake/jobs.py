@@ -46,14 +46,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from translucent.bake.record import Record, file_hash, files_of, read_record
+from translucent.bake.bake import bake_thickness
+from translucent.bake.record import file_hash, files_of, read_record
+from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import ThicknessMap, VertexThickness
-from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output, save_map, save_vertices
+from translucent.bake.vertices import bake_vertex_thickness
+from translucent.bake.writing import MAP_SUFFIXES, VERTEX_SUFFIXES, check_map_output
 from translucent.errors import InputError
 from translucent.files.reading import read_bytes
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
+from translucent.gltf.file import read_gltf
 from translucent.gltf.load import SUFFIXES
 from translucent.media.medium import Medium
+from translucent.mesh_files import load_mesh
 from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
@@ -102,8 +107,6 @@ def check_job(job: Job) -> None:
 
 def _settings(job: Job, diagonal: float) -> Job:
     """The arguments of a bake, checked; shares are of the diagonal in metres."""
-    from translucent.bake.settings import BakeSettings
-
     given = dict(job.get("settings", {}))
     for key in _LENGTHS:
         if isinstance(given.get(key), str):
@@ -161,8 +164,6 @@ def _parts(path: Path, allow_outside: bool) -> list[bytes]:
     """A file and, of a .gltf, what it links to."""
     data = [read_bytes(path, f"mesh {str(path)!r}")]
     if path.suffix.lower() in SUFFIXES:
-        from translucent.gltf.file import read_gltf
-
         file = read_gltf(path, allow_outside)
         holders = [*file.items("buffers"), *file.items("images")]
         data += [file.resource(one) for one in holders if isinstance(one.get("uri"), str)]
@@ -188,49 +189,6 @@ def _is_whole(path: Path, sha256: object) -> bool:
 Results = dict[tuple[int, int], Any]
 
 
-def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Results]:
-    """Bake what a job asks for and write it.
-
-    Parameters
-    ----------
-    job : dict
-        See the module.
-    progress : callable, optional
-
-    Returns
-    -------
-    record : dict
-        As it was written beside the output.
-    results : dict
-        A `ThicknessMap` or `VertexThickness` per mesh and primitive of a glTF file; else one, for (0, 0).
-        Maps that are files of their own are in the space of the scene, those in a glTF file in that of their meshes.
-
-    Raises
-    ------
-    InputError
-        If the job or its model is wrong.
-    RenderError
-        If a file cannot be written, or a package is missing.
-    """
-    check_job(job)
-    output = Path(job["output"])
-    about = {"hash": content_hash(job), "model": job["model"], "model_unit": job.get("unit", "m")}
-    if has_parts(job):
-        from translucent.bake.gltf.bake import bake_gltf
-
-        return bake_gltf(job, about, progress)
-    mesh = load_mesh(job["model"], unit=job.get("unit", "m"), allow_outside=bool(job.get("outside")))
-    if job.get("unwrap"):
-        mesh = dataclasses.replace(mesh, uv=None)
-    result = bake_one(job, mesh, progress=progress)
-    if isinstance(result, VertexThickness):
-        record = save_vertices(result, output, about=about)
-    else:
-        normalize, invert = bool(job.get("normalize")), bool(job.get("invert"))
-        record = save_map(result, output, normalize=normalize, invert=invert, about=about)
-    return record, {(0, 0): result}
-
-
 def bake_one(
     job: Job,
     mesh: Mesh,
@@ -253,9 +211,6 @@ def bake_one(
     around : Mesh, optional
         The body of whose surface the mesh is a part.
     """
-    from translucent.bake.bake import bake_thickness
-    from translucent.bake.vertices import bake_vertex_thickness
-
     given = _settings(job, mesh.diagonal)
     if given.get("mode") == "transmittance":
         given.setdefault("medium", medium)

@@ -12,11 +12,11 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
+from translucent.bake.baked import BakedMap
 from translucent.bake.gltf.bodies import Place, primitive_name
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.gltf.targets import Target
 from translucent.bake.record import Record, shared, write_common_record
-from translucent.bake.thickness_map import ThicknessMap
 from translucent.bake.writing import save_map, write_uv_file
 from translucent.files.paths import remove_partial
 from translucent.gltf.file import GltfFile
@@ -28,7 +28,7 @@ _LONGEST, _SAFE = 60, "._-"
 def save_maps(
     builder: GlbBuilder,
     output: Path,
-    results: Mapping[Place, ThicknessMap],
+    results: Mapping[Place, BakedMap],
     targets: Mapping[Place, Target],
     *,
     normalize: bool = False,

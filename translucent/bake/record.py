@@ -7,17 +7,15 @@ import json
 import platform
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from translucent.bake.baked import BakedMap, BakedVertices
+from translucent.bake.encoding import Encoding
 from translucent.files.paths import write_text_atomically
 from translucent.files.reading import json_value, read_text
 from translucent.version import VERSION
-
-if TYPE_CHECKING:
-    from translucent.bake.encoding import Encoding
-    from translucent.bake.thickness_map import ThicknessMap, VertexThickness
 
 Record = dict[str, Any]
 
@@ -52,7 +50,7 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def describe(result: ThicknessMap | VertexThickness, encoding: Encoding) -> Record:
+def describe(result: BakedMap | BakedVertices, encoding: Encoding) -> Record:
     """What a bake is: definition, unit, range, encoding, settings, report and mesh."""
     values, settings = np.asarray(result.values), result.settings
     coverage = getattr(result, "coverage", None)

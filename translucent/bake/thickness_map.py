@@ -1,80 +1,16 @@
-"""What a bake gives: a map or a value per vertex, how sure it is, and what was found on the way."""
+"""What a bake gives, with the way to its files: a map, or a value per vertex."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from translucent.bake.settings import BakeSettings
-from translucent.geometry.mesh import Mesh
-
-Floats = npt.NDArray[np.float32]
-Mask = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class BakeReport:
-    """What a bake did and found.
-
-    Attributes
-    ----------
-    rays : int
-        Traced, those included that went on behind a first surface.
-    seconds : float
-        From call to result.
-    mrays_per_second : float
-    samples : int
-        Points of the surface from which rays started.
-    texels : int
-        With a value of their own, before padding; 0 for vertices.
-    overlapping_texels : int
-        Whose center is inside several triangles in UV; the first triangle has it.
-    faces_without_texel : int
-        Triangles so small in UV that other triangles have all texels which they touch.
-    degenerate_faces : int
-        Triangles without area; they are left out.
-    udim_tiles : tuple of int
-        Tiles that the UVs lie in, 1001 being 0 <= u, v <= 1.
-    uv_from : str
-        "mesh", "xatlas", or "" for vertices.
-    escaped : float
-        Share of the rays that left the mesh without an exit.
-    missed : float
-        Share of the samples from which no surface of the high mesh was found.
-    mean_standard_error, max_standard_error : float
-        Over texels or vertices with a value, in its unit.
-    above_tolerance : int
-        Samples whose standard error is still above the tolerance after the last ray they may have.
-    warnings : tuple of str
-    """
-
-    rays: int
-    seconds: float
-    mrays_per_second: float
-    samples: int
-    texels: int
-    overlapping_texels: int
-    faces_without_texel: int
-    degenerate_faces: int
-    udim_tiles: tuple[int, ...]
-    uv_from: str
-    escaped: float
-    missed: float
-    mean_standard_error: float
-    max_standard_error: float
-    above_tolerance: int
-    warnings: tuple[str, ...] = ()
-
-    def summary(self) -> dict[str, object]:
-        """The report in values that JSON can hold."""
-        return {**asdict(self), "udim_tiles": list(self.udim_tiles), "warnings": list(self.warnings)}
+from translucent.bake.baked import BakedMap, BakedVertices
+from translucent.bake.writing import save_map, save_vertices
 
 
 @dataclass(frozen=True, eq=False)
-class ThicknessMap:
+class ThicknessMap(BakedMap):
     """A baked map, from `translucent.bake_thickness`.
 
     Attributes
@@ -94,14 +30,6 @@ class ThicknessMap:
     report : BakeReport
     """
 
-    values: Floats
-    coverage: Mask
-    standard_error: Floats
-    escaped: float
-    mesh: Mesh
-    settings: BakeSettings
-    report: BakeReport
-
     def save(self, path: str | Path) -> None:
         """Write the map as .exr, .png, .npy or, into a copy of the model, .glb.
 
@@ -112,13 +40,11 @@ class ThicknessMap:
         RenderError
             If the file cannot be written.
         """
-        from translucent.bake.writing import save_map
-
         save_map(self, Path(path))
 
 
 @dataclass(frozen=True, eq=False)
-class VertexThickness:
+class VertexThickness(BakedVertices):
     """Thickness per vertex, from `translucent.bake_vertex_thickness`.
 
     Attributes
@@ -132,12 +58,6 @@ class VertexThickness:
     report : BakeReport
     """
 
-    values: Floats
-    standard_error: Floats
-    mesh: Mesh
-    settings: BakeSettings
-    report: BakeReport
-
     def save(self, path: str | Path) -> None:
         """Write the values as .ply or .glb attribute, or as .npy.
 
@@ -148,6 +68,4 @@ class VertexThickness:
         RenderError
             If the file cannot be written.
         """
-        from translucent.bake.writing import save_vertices
-
         save_vertices(self, Path(path))

@@ -21,7 +21,8 @@ from translucent.bake.surface import Points, Surface
 from translucent.bake.texels import Atlas
 from translucent.bake.unwrap import Unwrapped, unwrap
 from translucent.cpu.threads import in_threads, processors
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
+from translucent.mesh_files import load_mesh
 
 #: Rays that Embree alone traces in a round: enough for some seconds, and little memory.
 SAMPLE = 1 << 23

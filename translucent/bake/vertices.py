@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.bake.bake import check_threads, escape_warnings
+from translucent.bake.baked import BakeReport
 from translucent.bake.measure import Measure, Measured
 from translucent.bake.normals import corner_angles
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Surface
-from translucent.bake.thickness_map import BakeReport, VertexThickness
+from translucent.bake.thickness_map import VertexThickness
 from translucent.bake.work import Progress, in_order
 from translucent.errors import TranslucentWarning
 from translucent.geometry.grouping import position_ids

@@ -25,19 +25,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from translucent.bake.baked import BakedMap, BakedVertices
 from translucent.bake.encoding import Encoding
+from translucent.bake.gltf.export import mesh_file
+from translucent.bake.gltf.maps import write_maps
+from translucent.bake.gltf.vertices import write_vertices
 from translucent.bake.record import DEFINITIONS, Record, describe, fingerprint, plain, unit_of, write_record
 from translucent.errors import InputError, RenderError
 from translucent.extras import require_package
+from translucent.files.images import write_exr, write_npy, write_npz, write_png
 from translucent.files.paths import remove_partial, require_place, write_atomically
-
-if TYPE_CHECKING:
-    from translucent.bake.thickness_map import ThicknessMap, VertexThickness
-    from translucent.gltf.file import GltfFile
+from translucent.gltf.file import GltfFile
+from translucent.gltf.write_file import write_gltf
 
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
@@ -53,12 +56,12 @@ PNG_PREFIX = "translucent:"
 
 @dataclass(frozen=True)
 class _Task:
-    result: ThicknessMap
+    result: BakedMap
     encoding: Encoding
 
 
 def save_map(
-    result: ThicknessMap,
+    result: BakedMap,
     path: str | Path,
     *,
     normalize: bool = False,
@@ -69,7 +72,7 @@ def save_map(
 
     Parameters
     ----------
-    result : ThicknessMap
+    result : BakedMap
     path : path
         One of the module's table, not ``.ply``.
     normalize : bool
@@ -95,16 +98,11 @@ def save_map(
     suffix = check_map_output(path, normalize=normalize, invert=invert)
     unit = unit_of(result.settings.mode)
     if suffix == ".glb":
-        from translucent.bake.gltf.export import mesh_file
-        from translucent.bake.gltf.maps import write_maps
-
         return write_maps(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
     levels = PNG_LEVELS if suffix == ".png" else 0
     encoding = Encoding.of(result.values, levels, normalize=normalize, invert=invert, unit=unit)
     about = dict(about or {})
     if result.report.uv_from == "xatlas":
-        from translucent.bake.gltf.export import mesh_file
-
         about["uv_file"] = write_uv_file(mesh_file(result.mesh), path)
     write_atomically(path, partial(_WRITERS[suffix], _Task(result, encoding)))
     return write_record(path, {**about, **describe(result, encoding)})
@@ -112,8 +110,6 @@ def save_map(
 
 def write_uv_file(model: GltfFile, path: Path) -> Record:
     """Write a model with new UVs beside the map at `path` that belongs to them; its name and hash."""
-    from translucent.gltf.file import write_gltf
-
     place = path.with_name(f"{path.name}{UV_SUFFIX}")
     remove_partial(place)
     write_gltf(model, place)
@@ -138,25 +134,14 @@ def check_map_output(
 
 
 def _write_exr(task: _Task, path: Path) -> None:
-    import OpenEXR
-
     result, encoding = task.result, task.encoding
     channels = {
         "Y": encoding.encode(result.values),
-        "standard_error.Y": np.ascontiguousarray(result.standard_error, dtype=np.float32),
-        "coverage.Y": result.coverage.astype(np.float32),
+        "standard_error.Y": result.standard_error,
+        "coverage.Y": result.coverage,
     }
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        "comments": f"{DEFINITIONS[result.settings.mode]}; value = offset + scale * Y in {encoding.unit}",
-        **_stated(task),
-    }
-    try:
-        with OpenEXR.File(header, channels) as file:
-            file.write(str(path))
-    except RuntimeError as error:  # what OpenEXR makes of a full disk
-        raise OSError(str(error).replace(str(path), "the file").rstrip(".")) from error
+    told = f"{DEFINITIONS[result.settings.mode]}; value = offset + scale * Y in {encoding.unit}"
+    write_exr(path, channels, {"comments": told, **_stated(task)})
 
 
 def _stated(task: _Task) -> dict[str, Any]:
@@ -174,33 +159,25 @@ def _stated(task: _Task) -> dict[str, Any]:
 
 
 def _write_npy(task: _Task, path: Path) -> None:
-    with path.open("wb") as stream:
-        np.save(stream, task.encoding.encode(task.result.values), allow_pickle=False)
+    write_npy(path, task.encoding.encode(task.result.values))
 
 
 def _write_npz(task: _Task, path: Path) -> None:
     result, encoding = task.result, task.encoding
-    arrays = {"standard_error": result.standard_error, "coverage": result.coverage}
-    with path.open("wb") as stream:
-        np.savez_compressed(
-            stream,
-            allow_pickle=False,
-            values=encoding.encode(result.values),
-            scale=np.float64(encoding.scale),
-            offset=np.float64(encoding.offset),
-            **arrays,
-        )
+    arrays = {
+        "values": encoding.encode(result.values),
+        "scale": np.array(encoding.scale),
+        "offset": np.array(encoding.offset),
+        "standard_error": result.standard_error,
+        "coverage": result.coverage,
+    }
+    write_npz(path, arrays)
 
 
 def _write_png(task: _Task, path: Path) -> None:
-    from PIL import Image
-    from PIL.PngImagePlugin import PngInfo
-
-    text = PngInfo()
-    text.add_text("Description", DEFINITIONS[task.result.settings.mode])
-    for key, value in _stated(task).items():
-        text.add_text(PNG_PREFIX + key, str(value))
-    Image.fromarray(task.encoding.encode(task.result.values)).save(path, format="PNG", pnginfo=text)
+    stated = {PNG_PREFIX + key: str(value) for key, value in _stated(task).items()}
+    text = {"Description": DEFINITIONS[task.result.settings.mode], **stated}
+    write_png(path, task.encoding.encode(task.result.values), text)
 
 
 _WRITERS: dict[str, Callable[[_Task, Path], None]] = {
@@ -211,12 +188,12 @@ _WRITERS: dict[str, Callable[[_Task, Path], None]] = {
 }
 
 
-def save_vertices(result: VertexThickness, path: str | Path, *, about: Record | None = None) -> Record:
+def save_vertices(result: BakedVertices, path: str | Path, *, about: Record | None = None) -> Record:
     """Write thickness per vertex, and its record beside it.
 
     Parameters
     ----------
-    result : VertexThickness
+    result : BakedVertices
     path : path
         ``.ply``: the mesh with a property ``thickness``; ``.glb``: with an attribute ``_THICKNESS``; both float32.
         ``.npy``: (n,) float32.
@@ -231,16 +208,12 @@ def save_vertices(result: VertexThickness, path: str | Path, *, about: Record | 
     path = Path(path)
     suffix = check_map_output(path, VERTEX_SUFFIXES)
     if suffix == ".glb":
-        from translucent.bake.gltf.export import mesh_file
-        from translucent.bake.gltf.vertices import write_vertices
-
         return write_vertices(mesh_file(result.mesh), path, {(0, 0): result}, about=about)
     values = np.ascontiguousarray(result.values, dtype=np.float32)
 
     def fill(temporary: Path) -> None:
         if suffix == ".npy":
-            with temporary.open("wb") as stream:
-                np.save(stream, values, allow_pickle=False)
+            write_npy(temporary, values)
         else:
             temporary.write_bytes(_ply(result, values))
 
@@ -249,7 +222,7 @@ def save_vertices(result: VertexThickness, path: str | Path, *, about: Record | 
     return write_record(path, {**(about or {}), **describe(result, encoding)})
 
 
-def _ply(result: VertexThickness, values: Any) -> bytes:
+def _ply(result: BakedVertices, values: Any) -> bytes:
     import trimesh
 
     mesh = trimesh.Trimesh(result.mesh.vertices, result.mesh.faces, process=False)

@@ -12,10 +12,11 @@ import numpy as np
 from translucent.assets import mesh_path
 from translucent.bench.contenders import Effect
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, subdivided
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.media.density import DensityGrid
 from translucent.media.medium import Medium
+from translucent.mesh_files import load_mesh
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight

@@ -11,7 +11,7 @@ from translucent.bench.cases import CASES, Case, Size
 from translucent.bench.claims import check_claims
 from translucent.bench.contenders import check_names, contenders
 from translucent.bench.drawing import Studio
-from translucent.bench.hard.cases import measure_hard_cases
+from translucent.bench.hard.measure import measure_hard_cases
 from translucent.bench.machine import provenance
 from translucent.bench.measure import CaseRun
 from translucent.bench.record import Report

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.assets import mesh_path
-from translucent.geometry.mesh import Mesh, load_mesh
+from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, Torus
+from translucent.mesh_files import load_mesh
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]

@@ -76,8 +76,8 @@ def bake(
 
 
 def _bake_one(job: Job, check: bool, as_json: bool) -> None:
+    from translucent.bake.bake_file import bake_file
     from translucent.bake.batch import told_of
-    from translucent.bake.jobs import bake_file
 
     if check and job.get("vertices"):
         raise InputError("--check", "it looks at maps", "leave --vertices out")

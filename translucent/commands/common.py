@@ -169,7 +169,7 @@ def read_medium(
 
 def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     """The color without channels that are too dark, and a line for the user where there were any."""
-    from translucent.formulas.color import parse_color
+    from translucent.media.colors import parse_color
     from translucent.media.conversion import CLAMP, clamp_colors
 
     triple, changed = clamp_colors(parse_color(color))

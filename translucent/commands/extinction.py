@@ -75,7 +75,7 @@ def extinction(
     With --on MODEL and no DISTANCE, the medium in which that model shows COLOR on average, over the pixels that it
     covers before white light; with a DISTANCE, --preset or --from, the average color that this medium shows on it.
     """
-    from translucent.formulas.color import QUOTE_HINT
+    from translucent.media.colors import QUOTE_HINT
     from translucent.units import metres_per_unit
 
     metres_per_unit(unit_out)
@@ -139,9 +139,9 @@ def _convert(
     """What there is to say of a medium: a given one, one for a color at a distance, or one for a color on a model."""
     import numpy as np
 
-    from translucent.formulas.color import parse_color
     from translucent.frames.appearance import medium_for_average_color, thickness_samples
-    from translucent.materials.color_distance import color_at
+    from translucent.media.color_distance import color_at
+    from translucent.media.colors import parse_color
     from translucent.media.conversion import summary
     from translucent.media.medium import Medium
     from translucent.units import parse_length

@@ -97,7 +97,7 @@ def is_own(model: str) -> bool:
 
 def read_mesh(model: str, unit: str, allow_outside: bool = False) -> Mesh:
     """The mesh of a file, or of the toolkit's own by name."""
-    from translucent.geometry.mesh import load_mesh
+    from translucent.mesh_files import load_mesh
 
     return load_mesh(mesh_file(model, unit), unit=unit, allow_outside=allow_outside)
 

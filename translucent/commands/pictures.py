@@ -33,7 +33,8 @@ class Pictures(NamedTuple):
         """Raise before any work is done where they could not be written."""
         from translucent.files.paths import require_folder
         from translucent.frames.animation import check_animation
-        from translucent.frames.frame import check_exposure, check_output
+        from translucent.frames.frame import check_exposure
+        from translucent.frames.writing import check_output
 
         check_exposure(self.exposure)
         if self.aov is not None:

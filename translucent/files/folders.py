@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from translucent.frames.frame import make_folder
+from translucent.errors import RenderError
+from translucent.files.paths import require_folder
 
 
 @contextmanager
@@ -29,3 +30,22 @@ def made_folder(folder: Path) -> Iterator[None]:
             for made in missing:
                 made.rmdir()
         raise
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises
+    ------
+    InputError
+        If its name, or that of a folder above, is one of a file.
+    RenderError
+        If it cannot be made.
+    """
+    require_folder(folder, f"folder {str(folder)!r}")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RenderError(
+            f"folder {str(folder)!r}", f"it cannot be made ({error.strerror})", "check the path"
+        ) from error

@@ -15,7 +15,7 @@ from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.files.paths import require_folder, require_place, write_atomically
 from translucent.frames.film import write_film
-from translucent.frames.frame import make_folder, write_png
+from translucent.frames.writing import write_pictures
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -75,9 +75,7 @@ def write_animation(path: str | Path, frames: Iterable[Pixels], fps: float = DEF
     check_animation(path, fps)
     pictures = _alike(frames)
     if path.is_dir() or not path.suffix:
-        make_folder(path)
-        for i, picture in enumerate(pictures):
-            write_atomically(path / f"{i:04}.png", partial(write_png, pixels=picture))
+        write_pictures(path, ((f"{i:04}", picture) for i, picture in enumerate(pictures)))
         return
     write_atomically(path, partial(WRITERS[path.suffix.lower()], pictures=pictures, fps=fps))
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +13,9 @@ from PIL import Image, ImageDraw, ImageFont
 from translucent.errors import InputError
 from translucent.formulas.color import linear_to_srgb
 
-if TYPE_CHECKING:
-    from translucent.frames.frame import Frame
-
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Arrays = Mapping[str, npt.NDArray[Any]]
 Pixels = npt.NDArray[np.uint8]
 
 #: sRGB colors of text and of what lies around it, of pixels without a medium, and of those that cannot be trusted.
@@ -30,28 +30,30 @@ STEPS = (1.0, 2.0, 5.0, 10.0)
 MARKS = 6
 
 
-def aov_pictures(frame: Frame, truth: Frame | None = None) -> dict[str, Pixels]:
-    """Pictures (h, w, 3) by name; those with a legend are somewhat higher than the frame.
+def aov_pictures(arrays: Arrays, truth: Arrays | None = None) -> dict[str, Pixels]:
+    """Pictures (h, w, 3) by name of the arrays of a frame; those with a legend are somewhat higher than it.
 
     Raises
     ------
     InputError
         If the truth has another size.
     """
-    transmittance = np.clip(np.asarray(frame.transmittance, dtype=np.float64), 0.0, 1.0)
+    transmittance = np.clip(np.asarray(arrays["transmittance"], dtype=np.float64), 0.0, 1.0)
+    thickness, coverage, valid = arrays["thickness"], arrays["coverage"], arrays["valid"]
     pictures = {
-        "thickness": thickness_picture(frame),
+        "thickness": lengths_picture(thickness, coverage, valid),
         "transmittance": np.rint(linear_to_srgb(transmittance) * 255.0).astype(np.uint8),
-        "validity": validity_picture(frame),
+        "validity": validity_picture(coverage, valid),
     }
-    if frame.normals is not None:
-        pictures["normals"] = normals_picture(frame.normals)
+    if "normals" in arrays:
+        pictures["normals"] = normals_picture(arrays["normals"])
     if truth is not None:
-        if truth.size != frame.size:
-            found = f"it has {truth.size[0]}x{truth.size[1]} pixels, and the frame {frame.size[0]}x{frame.size[1]}"
+        (height, width), (rows, columns) = thickness.shape, truth["thickness"].shape
+        if (height, width) != (rows, columns):
+            found = f"it has {columns}x{rows} pixels, and the frame {width}x{height}"
             raise InputError("truth of a frame", found, "render both in one size")
-        off = np.abs(frame.thickness.astype(np.float64) - truth.thickness)
-        pictures["error"] = lengths_picture(off, frame.coverage | truth.coverage, frame.valid)
+        off = np.abs(thickness.astype(np.float64) - truth["thickness"])
+        pictures["error"] = lengths_picture(off, coverage | truth["coverage"], valid)
     return pictures
 
 
@@ -62,12 +64,7 @@ def normals_picture(normals: npt.NDArray[Any]) -> Pixels:
     return pixels
 
 
-def thickness_picture(frame: Frame) -> Pixels:
-    """Thickness in false colors from 0 to the largest, with a scale in a metric unit below it."""
-    return lengths_picture(frame.thickness, frame.coverage, frame.valid)
-
-
-def lengths_picture(lengths: npt.NDArray[Any], coverage: npt.NDArray[np.bool_], valid: npt.NDArray[np.bool_]) -> Pixels:
+def lengths_picture(lengths: npt.NDArray[Any], coverage: Mask, valid: Mask) -> Pixels:
     """Metres in false colors from 0 to the largest, with a scale in a metric unit below."""
     seen = coverage & valid & np.isfinite(lengths)
     most = float(lengths[seen].max(initial=0.0))
@@ -82,14 +79,14 @@ def lengths_picture(lengths: npt.NDArray[Any], coverage: npt.NDArray[np.bool_], 
     return np.concatenate([pixels, _scale(pixels.shape[1], most / factor, unit)], axis=0)
 
 
-def validity_picture(frame: Frame) -> Pixels:
+def validity_picture(coverage: Mask, valid: Mask) -> Pixels:
     """Which pixels crossed a medium, and which cannot be trusted, with their numbers below."""
     classes = (
-        (EMPTY, "no medium", ~frame.coverage & frame.valid),
-        (SEEN, "valid", frame.coverage & frame.valid),
-        (WRONG, "not valid", ~frame.valid),
+        (EMPTY, "no medium", ~coverage & valid),
+        (SEEN, "valid", coverage & valid),
+        (WRONG, "not valid", ~valid),
     )
-    pixels = np.zeros((*frame.valid.shape, 3), dtype=np.uint8)
+    pixels = np.zeros((*valid.shape, 3), dtype=np.uint8)
     for color, _, where in classes:
         pixels[where] = color
     return _with_legend(

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas import optics
-from translucent.formulas.color import parse_color, to_hex
+from translucent.formulas.color import to_hex
 from translucent.frames.frame import Frame
+from translucent.media.colors import parse_color
 from translucent.media.conversion import CHANNELS, CLAMP
 from translucent.media.medium import Medium
 from translucent.media.swatches import html_swatches

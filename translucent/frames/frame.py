@@ -1,21 +1,22 @@
-"""The one result type of every renderer, and how it is written to disk."""
+"""The one result type of every renderer."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.errors import InputError, RenderError
-from translucent.extras import require_package
-from translucent.files.paths import require_folder, require_place, write_atomically
+from translucent.errors import InputError
+from translucent.files.images import write_png
 from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
+from translucent.frames.writing import write_frame, write_pictures
 from translucent.planning.render_plan import RenderPlan
 
 #: The arrays of a frame, under the names that .npz files use.
@@ -26,9 +27,6 @@ LAYER_ARRAYS = ("layers", "truncated")
 
 #: What frames without a background have, and those of bodies with borders.
 MATTE_ARRAYS = ("alpha", "normals")
-
-#: Of files that hold a frame.
-SUFFIXES = (".png", ".exr", ".npz")
 
 #: Stops beyond which radiance would leave what float64 can hold, or be black for sure.
 MAX_EXPOSURE = 100.0
@@ -89,6 +87,12 @@ class Frame:
     def size(self) -> tuple[int, int]:
         """(width, height) in pixels."""
         return self.thickness.shape[1], self.thickness.shape[0]
+
+    @property
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The arrays that the frame has, by name."""
+        every = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS, *MATTE_ARRAYS)}
+        return {name: array for name, array in every.items() if array is not None}
 
     def summary(self) -> dict[str, Any]:
         """What happened, in numbers that JSON can hold; thickness in metres over the valid, covered pixels."""
@@ -152,12 +156,7 @@ class Frame:
         RenderError
             If the file cannot be written, or ``.exr`` is asked for without the OpenEXR package.
         """
-        path = Path(path)
-        check_output(path)
-        if path.suffix.lower() == ".png":
-            write_atomically(path, partial(write_png, pixels=self.to_srgb8(exposure, tone)))
-        else:
-            write_atomically(path, self._write_exr if path.suffix.lower() == ".exr" else self._write_npz)
+        write_frame(Path(path), self.arrays, partial(self.to_srgb8, exposure, tone))
 
     def save_aovs(self, folder: str | Path, truth: Frame | None = None) -> list[Path]:
         """Write the quantities as pictures to look at, into a folder that is made if need be.
@@ -178,63 +177,16 @@ class Frame:
         RenderError
             If they cannot be written.
         """
-        from translucent.frames.aovs import aov_pictures
+        from translucent.frames.aovs import aov_pictures  # it loads Pillow
 
-        folder = Path(folder)
-        make_folder(folder)
-        files = []
-        for name, pixels in aov_pictures(self, truth).items():
-            files.append(folder / f"{name}.png")
-            write_atomically(files[-1], partial(write_png, pixels=pixels))
-        return files
-
-    def _write_npz(self, path: Path) -> None:
-        with path.open("wb") as stream:
-            arrays = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS, *MATTE_ARRAYS)}
-            arrays = {name: array for name, array in arrays.items() if array is not None}
-            np.savez_compressed(stream, allow_pickle=False, **arrays)
-
-    def _write_exr(self, path: Path) -> None:
-        import OpenEXR
-
-        channels = {"RGB": np.ascontiguousarray(self.radiance, dtype=np.float32)}
-        if self.normals is not None:
-            for i, channel in enumerate("XYZ"):
-                channels[f"normals.{channel}"] = np.ascontiguousarray(self.normals[..., i], dtype=np.float32)
-        if self.alpha is not None:
-            del channels["RGB"]
-            channels["RGBA"] = np.concatenate([self.radiance, self.alpha[..., None]], axis=-1).astype(np.float32)
-        for name, layer in (("transmittance", self.transmittance), ("optical_depth", self.optical_depth)):
-            for i, channel in enumerate("RGB"):
-                channels[f"{name}.{channel}"] = np.ascontiguousarray(layer[..., i], dtype=np.float32)
-        channels["thickness.Z"] = np.ascontiguousarray(self.thickness, dtype=np.float32)
-        for name in ("coverage", "valid"):
-            channels[f"{name}.A"] = getattr(self, name).astype(np.float32)
-        header = {
-            "compression": OpenEXR.ZIP_COMPRESSION,
-            "type": OpenEXR.scanlineimage,
-            "comments": "linear Rec.709; thickness in metres",
-        }
-        try:
-            with OpenEXR.File(header, channels) as file:
-                file.write(str(path))
-        except RuntimeError as error:  # what a full disk is to OpenEXR
-            raise OSError(str(error)) from error
+        pictures = aov_pictures(self.arrays, None if truth is None else truth.arrays)
+        return write_pictures(Path(folder), pictures.items())
 
     def _repr_png_(self) -> bytes:
         """The picture, for notebooks."""
-        import io
-
         stream = io.BytesIO()
         write_png(stream, self.to_srgb8())
         return stream.getvalue()
-
-
-def write_png(file: Path | BinaryIO, pixels: npt.NDArray[np.uint8]) -> None:
-    """Write 8-bit pixels (h, w, 3), (h, w, 4) with alpha, or (h, w) as they are."""
-    from PIL import Image
-
-    Image.fromarray(pixels).save(file, format="PNG")
 
 
 def check_exposure(stops: float) -> float:
@@ -248,31 +200,3 @@ def check_exposure(stops: float) -> float:
     if not abs(stops) <= MAX_EXPOSURE:
         raise InputError(f"exposure {stops}", f"not within {MAX_EXPOSURE:g} stops", "give for example 1.5")
     return stops
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, and those above it, unless it is there.
-
-    Raises
-    ------
-    InputError
-        If its name, or that of a folder above, is one of a file.
-    RenderError
-        If it cannot be made.
-    """
-    require_folder(folder, f"folder {str(folder)!r}")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RenderError(
-            f"folder {str(folder)!r}", f"it cannot be made ({error.strerror})", "check the path"
-        ) from error
-
-
-def check_output(path: Path) -> None:
-    """Raise before any work is done where a frame could not be written to `path`."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
-    require_place(path, f"output {str(path)!r}")
-    if path.suffix.lower() == ".exr":
-        require_package("OpenEXR", f"output {str(path)!r}")

@@ -1,25 +1,21 @@
-"""Triangle meshes: a frozen value, its geometry in float64, and the way in from a file."""
+"""Triangle meshes: a frozen value, and its geometry in float64."""
 
 from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError, TranslucentWarning
-from translucent.files.paths import require_file
 from translucent.frozen import Frozen
 from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.grouping import equal_rows, used_vertices
-from translucent.geometry.mesh_files import Triangles, mesh_formats, read_triangles
 from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
 from translucent.geometry.winding import winding_number
-from translucent.units import metres_per_unit
 
 Array = npt.NDArray[np.float64]
 
@@ -211,65 +207,6 @@ class Mesh(Frozen):
         if self.diagonal < MIN_DIAGONAL:
             return "all its vertices are at one point", "export the mesh again"
         return None
-
-
-def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False) -> Mesh:
-    """Read a triangle mesh from a file, weld it and wind it consistently.
-
-    Parameters
-    ----------
-    path : path
-        What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
-    unit : str
-        Unit of the file's coordinates. glTF is in metres by definition; another unit rescales it.
-    allow_outside : bool
-        Whether the buffers of a .gltf file may lie outside its folder: only for files that you trust.
-
-    Returns
-    -------
-    Mesh
-        In metres. Vertices within 1e-6 of the diagonal are one (with equal uv: seams stay); faces are wound alike per
-        part, and closed parts outwards. `repairs` says what was done; a changed winding is also a `TranslucentWarning`.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, unreadable, has no faces, or has coordinates that are not finite.
-    """
-    path = Path(path)
-    scale = metres_per_unit(unit)
-    vertices, faces, uv = _read(path, allow_outside)
-    raw = Mesh(vertices * scale, faces, uv, name=path.name)
-    raw.require_finite()
-    return mended(raw)
-
-
-#: Files of programs that can all write a .glb.
-_SCENES_OF_PROGRAMS = (
-    ".blend",
-    ".fbx",
-    ".max",
-    ".ma",
-    ".mb",
-    ".c4d",
-    ".skp",
-    ".usd",
-    ".usda",
-    ".usdc",
-    ".usdz",
-    ".abc",
-)
-
-
-def _read(path: Path, allow_outside: bool) -> Triangles:
-    asked = f"mesh {str(path)!r}"
-    require_file(path, asked)
-    if path.suffix[1:].lower() not in mesh_formats():
-        do = (
-            "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
-        )
-        raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", do)
-    return read_triangles(path, asked, allow_outside)
 
 
 def mended(raw: Mesh) -> Mesh:

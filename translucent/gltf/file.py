@@ -1,4 +1,4 @@
-"""The two containers of glTF 2.0, .gltf (JSON) and .glb (JSON and binary chunks), read and written without loss.
+"""The two containers of glTF 2.0, .gltf (JSON) and .glb (JSON and binary chunks), read without loss.
 
 Only the JSON is looked into; the chunks behind it are kept byte for byte. Source: glTF 2.0, section 4.4 (GLB).
 """
@@ -7,29 +7,20 @@ from __future__ import annotations
 
 import base64
 import binascii
-import copy
-import json
-import os
 import struct
-import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
 
-from translucent.errors import InputError, TranslucentWarning, UnreadableError
-from translucent.files.paths import require_place, write_atomically
+from translucent.errors import InputError, UnreadableError
 from translucent.files.reading import json_value, linked_file, read_bytes
-from translucent.gltf.pack import embed_images, gather, is_link
 
 Json = dict[str, Any]
 
-
-_MAGIC, _VERSION = b"glTF", 2
-_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-_HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
-_LONGEST = 2**32 - 1  # bytes: the header states the length with 32 bits
-_DATA_URI = "data:application/octet-stream;base64,"
+#: Of GLB: how it begins, the kinds of its chunks, its header and that of a chunk.
+MAGIC, GLB_VERSION = b"glTF", 2
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 
 
 @dataclass(frozen=True)
@@ -94,9 +85,9 @@ class GltfFile:
     def _content(self, holder: Json) -> bytes:
         if isinstance(uri := holder.get("uri"), str):
             return self._linked(uri)
-        if len(self.chunks) < _CHUNK.size or _CHUNK.unpack_from(self.chunks)[1] != _BINARY_CHUNK:
+        if len(self.chunks) < CHUNK.size or CHUNK.unpack_from(self.chunks)[1] != BINARY_CHUNK:
             raise InputError(f"glTF {str(self.path)!r}", "it has no binary chunk", "copy or export the file again")
-        return self.chunks[_CHUNK.size : _CHUNK.size + _CHUNK.unpack_from(self.chunks)[0]]
+        return self.chunks[CHUNK.size : CHUNK.size + CHUNK.unpack_from(self.chunks)[0]]
 
     def _linked(self, uri: str) -> bytes:
         asked = f"glTF {str(self.path)!r}"
@@ -130,11 +121,11 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
     path = Path(path)
     asked = f"glTF {str(path)!r}"
     data = read_bytes(path, asked)
-    if path.suffix.lower() not in (".glb", ".gltf") and data[:4] != _MAGIC:
+    if path.suffix.lower() not in (".glb", ".gltf") and data[:4] != MAGIC:
         raise InputError(asked, f"suffix {path.suffix!r}", "give a .glb or .gltf file")
     if not data:
         raise InputError(asked, "it is empty", "copy or export the file again")
-    text, chunks = _split(asked, data) if data[:4] == _MAGIC else (data, b"")
+    text, chunks = _split(asked, data) if data[:4] == MAGIC else (data, b"")
     try:
         tree = json_value(text.decode("utf-8-sig"))
     except ValueError as error:
@@ -147,115 +138,22 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
 def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
     """The JSON of a .glb, and all that follows it."""
     cut = InputError(asked, f"cut short at {len(data)} bytes", "copy or export the file again")
-    if len(data) < _HEADER.size + _CHUNK.size:
+    if len(data) < HEADER.size + CHUNK.size:
         raise cut
-    _, version, length = _HEADER.unpack_from(data)
-    if version != _VERSION:
+    _, version, length = HEADER.unpack_from(data)
+    if version != GLB_VERSION:
         raise InputError(asked, f"GLB version {version}", "export it as glTF 2.0")
     if length > len(data):
         raise cut
-    start, parts = _HEADER.size, []
+    start, parts = HEADER.size, []
     while start < length:
-        if start + _CHUNK.size > length:
+        if start + CHUNK.size > length:
             raise cut
-        size, kind = _CHUNK.unpack_from(data, start)
-        if start + _CHUNK.size + size > length:
+        size, kind = CHUNK.unpack_from(data, start)
+        if start + CHUNK.size + size > length:
             raise cut
-        parts.append((kind, start, start + _CHUNK.size + size))
+        parts.append((kind, start, start + CHUNK.size + size))
         start = parts[-1][2]
-    if not parts or parts[0][0] != _JSON_CHUNK:
+    if not parts or parts[0][0] != JSON_CHUNK:
         raise InputError(asked, "its first chunk is not JSON", "copy or export the file again")
-    return data[parts[0][1] + _CHUNK.size : parts[0][2]], data[parts[0][2] : length]
-
-
-def write_gltf(file: GltfFile, path: str | Path) -> None:
-    """Write a file as .glb or .gltf, by its suffix; the file is complete or not there.
-
-    A .glb turned into .gltf holds its binary chunk as a data URI; a .gltf turned into .glb has its buffers in one, and
-    every .glb holds its images, see `translucent.gltf.pack`. What links there are in a .gltf is made relative
-    to the new folder.
-
-    Raises
-    ------
-    InputError
-        If the suffix is another one, or a .gltf has buffers that cannot be read.
-    RenderError
-        If the file cannot be written.
-
-    Warns
-    -----
-    TranslucentWarning
-        If an image cannot be read, and so stays a link in a .glb.
-    """
-    path = Path(path)
-    check_gltf_output(path)
-    tree = _relocated(file, path)
-    if path.suffix.lower() == ".gltf":
-        content = (json.dumps(_unpacked(file, tree), indent=2, ensure_ascii=False) + "\n").encode()
-    else:
-        content = _packed(file, tree)
-    write_atomically(path, lambda temporary: _fill(temporary, content))
-
-
-def _fill(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
-
-
-def check_gltf_output(path: Path) -> None:
-    """Raise `InputError` if `path` is no name for a glTF file in an existing folder."""
-    if path.suffix.lower() not in (".glb", ".gltf"):
-        raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .glb or .gltf")
-    require_place(path, f"output {str(path)!r}")
-
-
-def _relocated(file: GltfFile, path: Path) -> Json:
-    """The JSON with links that hold in the folder of `path`."""
-    old, new = file.path.parent.resolve(), path.parent.resolve()
-    if old == new:
-        return file.tree
-    tree = copy.deepcopy(file.tree)
-    moved = GltfFile(file.path, tree)
-    for holder in [*moved.items("buffers"), *moved.items("images")]:
-        if is_link(holder):
-            holder["uri"] = quote(Path(os.path.relpath(old / unquote(holder["uri"]), new)).as_posix())
-    return tree
-
-
-def _unpacked(file: GltfFile, tree: Json) -> Json:
-    if not file.chunks or not file.items("buffers") or "uri" in file.items("buffers")[0]:
-        return tree
-    first = {**tree["buffers"][0], "uri": _DATA_URI + base64.b64encode(file.resource({})).decode()}
-    return {**tree, "buffers": [first, *tree["buffers"][1:]]}
-
-
-def _packed(file: GltfFile, tree: Json) -> bytes:
-    chunks = file.chunks
-    if not chunks:
-        tree, binary = gather(file, tree)
-        chunks = _binary_chunk(binary)
-    if any(map(is_link, file.items("images"))):
-        tree, chunks = _with_images(file, copy.deepcopy(tree), chunks)
-    text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
-    text += b" " * (-len(text) % 4)
-    length = _HEADER.size + _CHUNK.size + len(text) + len(chunks)
-    if length > _LONGEST:
-        raise InputError(f"output .glb of {str(file.path)!r}", "more than 4 GiB, which no .glb holds", "write a .gltf")
-    return _HEADER.pack(_MAGIC, _VERSION, length) + _CHUNK.pack(len(text), _JSON_CHUNK) + text + chunks
-
-
-def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes]:
-    """JSON and chunks with the images in the binary one."""
-    size, kind = _CHUNK.unpack_from(chunks) if len(chunks) >= _CHUNK.size else (0, None)
-    end = _CHUNK.size + size if kind == _BINARY_CHUNK else 0
-    binary = bytearray(chunks[_CHUNK.size : end])
-    if not binary and tree.get("buffers"):
-        told = f"glTF {str(file.path)!r}: its first buffer is a link, so its images stay links, too"
-        warnings.warn(told, TranslucentWarning, stacklevel=4)
-        return tree, chunks
-    embed_images(file, tree, binary)
-    return tree, _binary_chunk(bytes(binary)) + chunks[end:]
-
-
-def _binary_chunk(binary: bytes) -> bytes:
-    binary += b"\0" * (-len(binary) % 4)
-    return _CHUNK.pack(len(binary), _BINARY_CHUNK) + binary if binary else b""
+    return data[parts[0][1] + CHUNK.size : parts[0][2]], data[parts[0][2] : length]

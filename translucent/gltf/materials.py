@@ -37,9 +37,9 @@ from typing import Any, Literal
 from translucent.errors import InputError
 from translucent.gltf.file import GltfFile, Json, read_gltf
 from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform
-from translucent.materials.color_distance import BLACKEST, extinction_at
+from translucent.media.color_distance import BLACKEST, extinction_at
+from translucent.media.conversion import html_strip
 from translucent.media.medium import Medium
-from translucent.media.swatches import html_strip
 
 TRANSMISSION = "KHR_materials_transmission"
 VOLUME = "KHR_materials_volume"

@@ -11,12 +11,9 @@ from __future__ import annotations
 
 import copy
 import warnings
-from typing import TYPE_CHECKING
 
 from translucent.errors import InputError, TranslucentWarning
-
-if TYPE_CHECKING:
-    from translucent.gltf.file import GltfFile, Json
+from translucent.gltf.file import GltfFile, Json
 
 _ALIGNMENT = 4  # bytes: the size of the largest component of an accessor
 

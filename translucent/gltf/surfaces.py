@@ -51,7 +51,7 @@ from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.images import Textures
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.materials import DEFAULT_IOR, TRANSMISSION, GltfMaterial, materials_of
-from translucent.materials.color_distance import extinction_at
+from translucent.media.color_distance import extinction_at
 from translucent.media.medium import Medium
 from translucent.scene.scene import OPAQUE_COLOR
 from translucent.scene.surface import MAX_DISPERSION, Surface

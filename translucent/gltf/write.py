@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError, TranslucentWarning
-from translucent.gltf.file import GltfFile, Json, check_gltf_output, read_gltf, write_gltf
+from translucent.gltf.file import GltfFile, Json, read_gltf
 from translucent.gltf.materials import DEFAULT_IOR, EXCLUDED, IOR, TRANSMISSION, VOLUME, materials_of
 from translucent.gltf.scene_media import primitives
-from translucent.materials.color_distance import color_at
+from translucent.gltf.write_file import check_gltf_output, write_gltf
+from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 
 

@@ -32,7 +32,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
-from translucent.materials.color_distance import color_at, extinction_at
+from translucent.media.color_distance import color_at, extinction_at
 from translucent.media.medium import Medium
 from translucent.units import metres_per_unit
 

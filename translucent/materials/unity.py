@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear
-from translucent.materials.color_distance import color_at, extinction_at
+from translucent.media.color_distance import color_at, extinction_at
 from translucent.media.medium import Medium
 
 

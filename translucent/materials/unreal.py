@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.materials.color_distance import color_at
+from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 
 Array = npt.NDArray[np.float64]

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.formulas.color import parse_color
+from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
 
 Array = npt.NDArray[np.float64]

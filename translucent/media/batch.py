@@ -12,9 +12,8 @@ from typing import Any
 
 from translucent.errors import InputError
 from translucent.files.paths import require_place, write_atomically
-from translucent.media.conversion import CLAMP, clamp_colors, summary
+from translucent.media.conversion import CLAMP, clamp_colors, html_strip, summary
 from translucent.media.medium import Medium
-from translucent.media.swatches import html_strip
 from translucent.media.tables import Row, check_cells, read_table
 from translucent.units import metres_per_unit
 

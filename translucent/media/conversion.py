@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas import optics
+from translucent.media.swatches import html_swatches
 from translucent.units import metres_per_unit
 
 Array = npt.NDArray[np.float64]
@@ -142,8 +143,6 @@ class DistanceMatch:
 
     def _repr_html_(self) -> str:
         """Swatches of the color that was asked for and of the one that is found, for notebooks."""
-        from translucent.media.swatches import html_swatches
-
         with np.errstate(under="ignore"):
             found = np.array(self.color) * np.exp(self.residual)
         return html_swatches([(self.color, "asked for"), (found, f"after {self.distance:.4g} m")])
@@ -273,4 +272,23 @@ def _outside(t: Array) -> InputError:
         f"{int(wrong.sum())} of {t.size} channels",
         f"not in 0 < t <= 1, the first {CHANNELS[first[-1]]} = {t[first]:g}{where}",
         "clamp zeros on purpose, and scale colors to at most 1",
+    )
+
+
+def html_strip(extinction: npt.ArrayLike, distance: float | None = None) -> str:
+    """Swatches of white light after 0.1 to 10 times a distance in a medium, each with its distance and hex color.
+
+    Parameters
+    ----------
+    extinction : array_like (3,)
+        1/m.
+    distance : float, optional
+        Metres. Default: where 1/e is left of the channels' mean exponent; 1 m for a medium without extinction.
+    """
+    sigma = np.asarray(extinction, dtype=np.float64)
+    if distance is None:
+        mean = float(sigma.mean())
+        distance = min(1.0 / mean, 1e300) if mean > 1e-300 else 1.0
+    return html_swatches(
+        (color_at_distance(sigma, factor * distance), f"{factor * distance:.4g} m") for factor in FACTORS
     )

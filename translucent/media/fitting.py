@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.formulas.color import parse_color
+from translucent.media.colors import parse_color
 from translucent.media.conversion import CHANNELS
 from translucent.media.medium import Medium
 from translucent.media.tables import check_cells, read_table

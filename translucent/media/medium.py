@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas import optics
-from translucent.formulas.color import parse_color
 from translucent.frozen import Frozen
 from translucent.media import conversion
+from translucent.media.colors import parse_color
 
 Array = npt.NDArray[np.float64]
 Channels = npt.ArrayLike
@@ -176,7 +176,7 @@ class Medium(Frozen):
 
     def _repr_html_(self) -> str:
         """Swatches of white light after 0.1 to 10 times the 1/e distance, for notebooks."""
-        from translucent.media.swatches import html_strip
+        from translucent.media.conversion import html_strip
 
         return html_strip(self.extinction)
 

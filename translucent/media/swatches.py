@@ -9,9 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.formulas.color import to_hex
-from translucent.media.conversion import FACTORS, color_at_distance
-
-Array = npt.NDArray[np.float64]
 
 
 def terminal_strip(colors: npt.ArrayLike) -> str:
@@ -22,25 +19,6 @@ def terminal_strip(colors: npt.ArrayLike) -> str:
         red, green, blue = (int(text[i : i + 2], 16) for i in (1, 3, 5))
         cells.append(f"\x1b[48;2;{red};{green};{blue}m        \x1b[0m")
     return "".join(cells)
-
-
-def html_strip(extinction: npt.ArrayLike, distance: float | None = None) -> str:
-    """Swatches of white light after 0.1 to 10 times a distance in a medium, each with its distance and hex color.
-
-    Parameters
-    ----------
-    extinction : array_like (3,)
-        1/m.
-    distance : float, optional
-        Metres. Default: where 1/e is left of the channels' mean exponent; 1 m for a medium without extinction.
-    """
-    sigma = np.asarray(extinction, dtype=np.float64)
-    if distance is None:
-        mean = float(sigma.mean())
-        distance = min(1.0 / mean, 1e300) if mean > 1e-300 else 1.0
-    return html_swatches(
-        (color_at_distance(sigma, factor * distance), f"{factor * distance:.4g} m") for factor in FACTORS
-    )
 
 
 def html_swatches(swatches: Iterable[tuple[npt.ArrayLike, str]]) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from translucent.errors import InputError
 from translucent.files.reading import json_value, read_text
-from translucent.formulas.color import parse_color
+from translucent.media.colors import parse_color
 from translucent.units import parse_length
 
 

@@ -93,8 +93,8 @@ def run(
     if window.failure is not None:
         raise window.failure
     if screenshot is not None:
+        from translucent.files.images import write_png
         from translucent.files.paths import write_atomically
-        from translucent.frames.frame import write_png
 
         pixels = hello_imgui.final_app_window_screenshot()
         write_atomically(Path(screenshot), partial(write_png, pixels=pixels))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.frames.animation import check_animation, write_animation
-from translucent.frames.frame import SUFFIXES, check_output
+from translucent.frames.writing import SUFFIXES, check_output
 from translucent.planning.methods import Method
 from translucent.preview.tasks import Report
 from translucent.renderer import Renderer

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear, to_hex
 from translucent.frames.appearance import average_color
-from translucent.materials.color_distance import color_at
+from translucent.media.color_distance import color_at
 from translucent.media.conversion import summary
 from translucent.media.medium import Medium
 from translucent.preview.document import Material, Triple

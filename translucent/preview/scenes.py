@@ -12,7 +12,7 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.geometry.normals import drawn_normals
-from translucent.materials.color_distance import color_at
+from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method, ThinLayer, method_from_name
 from translucent.preview.document import AUTO, Document, Look, Material, Model
@@ -47,8 +47,8 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
         If it cannot be read.
     """
     from translucent.assets import mesh_names, mesh_path
-    from translucent.geometry.mesh import load_mesh
     from translucent.gltf.load import SUFFIXES, load_scene
+    from translucent.mesh_files import load_mesh
     from translucent.scene.showcase import showcase
 
     if Path(model.path).suffix.lower() in SUFFIXES:

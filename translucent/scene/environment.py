@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.formulas.color import ColorLike, parse_color
 from translucent.frozen import Frozen
+from translucent.media.colors import ColorLike, parse_color
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.lights import positive_triple
 
@@ -214,7 +214,7 @@ class Environment(Frozen):
         `environment_filter.Filtered.irradiance`.
         """
         if self.map is not None:
-            from translucent.scene.environment_filter import irradiance_map
+            from translucent.scene.lobes import irradiance_map
 
             return self.scale * irradiance_map(self.map).at(equirectangular_uv(normals, self.turn))
         if self.kind == "gradient":

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array
 
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frozen import Frozen
@@ -98,6 +97,8 @@ class EnvironmentMap(Frozen):
 
         The integral over all directions stays what it is.
         """
+        from scipy.sparse import csr_array  # scenes without pictures of all directions need no SciPy
+
         own_height, own_width = self.pixels.shape[:2]
         rows = _overlaps(-np.cos(np.linspace(0, np.pi, own_height + 1)), -np.cos(np.linspace(0, np.pi, height + 1)))
         columns = _overlaps(np.linspace(0, 1, own_width + 1), np.linspace(0, 1, width + 1))

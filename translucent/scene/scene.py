@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.formulas.color import ColorLike, parse_color
 from translucent.frozen import Frozen
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
+from translucent.media.colors import ColorLike, parse_color
 from translucent.media.density import Density
 from translucent.media.medium import MAX_EMISSION, Medium
 from translucent.scene.camera import Camera

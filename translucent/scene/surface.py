@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.formulas.color import ColorLike, parse_color
 from translucent.frozen import Frozen
+from translucent.media.colors import ColorLike, parse_color
 from translucent.media.medium import MAX_IOR
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.texture import Texture

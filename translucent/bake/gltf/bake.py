@@ -25,7 +25,7 @@ from translucent.units import metres_per_unit
 
 
 def bake_gltf(job: Job, about: Record, progress: Progress | None = None) -> tuple[Record, Results]:
-    """Do a job whose model is a glTF file; see `translucent.bake.jobs.bake_file`."""
+    """Do a job whose model is a glTF file; see `translucent.bake.bake_file.bake_file`."""
     metres = metres_per_unit(job.get("unit", "m"))
     output, vertices, inside = Path(job["output"]), bool(job.get("vertices")), stays_gltf(job)
     size = job.get("settings", {}).get("size", 1024)

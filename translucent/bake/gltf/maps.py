@@ -21,18 +21,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.bake.baked import BakedMap
 from translucent.bake.encoding import Encoding
 from translucent.bake.gltf.bodies import Place
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.gltf.targets import Target
 from translucent.bake.record import Record, describe, shared, unit_of, write_record
-from translucent.bake.thickness_map import ThicknessMap
 from translucent.errors import InputError
+from translucent.files.images import write_png
 from translucent.geometry.mesh import Mesh
-from translucent.gltf.file import GltfFile, Json, write_gltf
+from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import EXCLUDED, TRANSMISSION, VOLUME
 from translucent.gltf.textures import TEXTURE_TRANSFORM
-from translucent.materials.color_distance import color_at
+from translucent.gltf.write_file import write_gltf
+from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 
 #: Largest level of an 8-bit channel.
@@ -45,7 +47,7 @@ _LINEAR, _MIPMAPS, _REPEAT, _CLAMP = 9729, 9987, 10497, 33071
 def write_maps(
     model: GltfFile | GlbBuilder,
     path: Path,
-    results: Mapping[Place, ThicknessMap],
+    results: Mapping[Place, BakedMap],
     *,
     targets: Mapping[Place, Target] | None = None,
     metres: float = 1.0,
@@ -59,7 +61,7 @@ def write_maps(
     model : GltfFile or GlbBuilder
     path : Path
         A .glb file.
-    results : mapping of (mesh, primitive) to ThicknessMap
+    results : mapping of (mesh, primitive) to BakedMap
     targets : mapping, optional
         Which UVs the maps belong to. Default: TEXCOORD_0.
     metres : float
@@ -98,7 +100,7 @@ def write_maps(
 def _give(
     builder: GlbBuilder,
     target: Target,
-    result: ThicknessMap,
+    result: BakedMap,
     encoding: Encoding,
     metres: float,
     medium: Medium | None,
@@ -147,7 +149,7 @@ def _texture_info(old: Json, texture: int, target: Target) -> Json:
     return {**info, "extensions": extensions} if extensions else info
 
 
-def _add_texture(builder: GlbBuilder, result: ThicknessMap, encoding: Encoding) -> int:
+def _add_texture(builder: GlbBuilder, result: BakedMap, encoding: Encoding) -> int:
     """Index of a new texture with the map in its G channel."""
     view = builder.add_view(_png(encoding.encode(result.values)))
     name = f"{result.mesh.name} thickness"
@@ -168,10 +170,8 @@ def wrapping(mesh: Mesh) -> Json:
 
 
 def _png(levels: npt.NDArray[Any]) -> bytes:
-    from PIL import Image
-
     color = np.zeros((*levels.shape, 3), np.uint8)
     color[..., 1] = levels
     stream = io.BytesIO()
-    Image.fromarray(color).save(stream, format="PNG")
+    write_png(stream, color)
     return stream.getvalue()

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from translucent.bake.baked import BakedVertices
 from translucent.bake.encoding import Encoding
 from translucent.bake.gltf.bodies import Place
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.record import Record, describe, shared, unit_of, write_record
-from translucent.bake.thickness_map import VertexThickness
 from translucent.gltf.accessors import Accessors
-from translucent.gltf.file import GltfFile, write_gltf
+from translucent.gltf.file import GltfFile
+from translucent.gltf.write_file import write_gltf
 
 ATTRIBUTE = "_THICKNESS"
 
@@ -24,7 +25,7 @@ ATTRIBUTE = "_THICKNESS"
 def write_vertices(
     model: GltfFile | GlbBuilder,
     path: Path,
-    results: Mapping[Place, VertexThickness],
+    results: Mapping[Place, BakedVertices],
     *,
     metres: float = 1.0,
     about: Record | None = None,
@@ -36,7 +37,7 @@ def write_vertices(
     model : GltfFile or GlbBuilder
     path : Path
         A .glb file.
-    results : mapping of (mesh, primitive) to VertexThickness
+    results : mapping of (mesh, primitive) to BakedVertices
         The vertices of their meshes may be in another order than those of the file, and welded: positions count.
     metres : float
         Per unit of the file.

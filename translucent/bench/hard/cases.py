@@ -1,9 +1,9 @@
-"""H01 to H26, the inputs that break renderers: each measured now, against what is promised for it."""
+"""A hard case, an input that breaks renderers: how it is measured against what is promised for it."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -122,14 +122,3 @@ class Hard:
         worst = checks.worst if checks.worst is not None and np.isfinite(checks.worst) else None
         limit, unit = (self.limit, self.unit) if checks.worst is not None else (None, "")
         return HardCase(self.id, self.title, self.promise, result, passed, worst, limit, unit)
-
-
-def measure_hard_cases(renderer: Renderer) -> Iterator[HardCase]:
-    """All of them, in their order."""
-    from translucent.bench.hard import geometry as hard_geometry
-    from translucent.bench.hard import values as hard_values
-    from translucent.bench.hard import views as hard_views
-
-    cases = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
-    for case in sorted(cases, key=lambda case: case.id):
-        yield case.measure(renderer)

@@ -8,8 +8,9 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from translucent.errors import InputError
-from translucent.formulas.color import parse_color, to_hex
+from translucent.formulas.color import to_hex
 from translucent.materials import text_block
+from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
 from translucent.preview import numbers

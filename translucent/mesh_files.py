@@ -1,4 +1,4 @@
-"""Triangles of mesh files, all parts of a file in one: glTF by the toolkit's own reader, the others by trimesh.
+"""Meshes from files, all parts of a file in one: glTF by the toolkit's own reader, the others by trimesh.
 
 trimesh gets an open file and nothing to follow links with: what an .obj or .ply says of materials and pictures has no
 meaning for a mesh. Archives are no meshes, though trimesh unpacks them.
@@ -13,16 +13,75 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_room, shown
-
-Array = npt.NDArray[np.float64]
-Triangles = tuple[Array, npt.NDArray[np.int32], Array | None]
+from translucent.geometry.mesh import Mesh, mended
+from translucent.geometry.triangles import Triangles, joined
+from translucent.gltf.whole import read_whole
+from translucent.units import metres_per_unit
 
 #: Formats of trimesh that are archives.
 _ARCHIVES = {"zae", "zip"}
+
+#: Files of programs that can all write a .glb.
+_SCENES_OF_PROGRAMS = (
+    ".blend",
+    ".fbx",
+    ".max",
+    ".ma",
+    ".mb",
+    ".c4d",
+    ".skp",
+    ".usd",
+    ".usda",
+    ".usdc",
+    ".usdz",
+    ".abc",
+)
+
+
+def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False) -> Mesh:
+    """Read a triangle mesh from a file, weld it and wind it consistently.
+
+    Parameters
+    ----------
+    path : path
+        What trimesh reads: obj, stl, ply, glb, gltf, off and more. The parts of a scene become one mesh.
+    unit : str
+        Unit of the file's coordinates. glTF is in metres by definition; another unit rescales it.
+    allow_outside : bool
+        Whether the buffers of a .gltf file may lie outside its folder: only for files that you trust.
+
+    Returns
+    -------
+    Mesh
+        In metres. Vertices within 1e-6 of the diagonal are one (with equal uv: seams stay); faces are wound alike per
+        part, and closed parts outwards. `repairs` says what was done; a changed winding is also a `TranslucentWarning`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, has no faces, or has coordinates that are not finite.
+    """
+    path = Path(path)
+    scale = metres_per_unit(unit)
+    vertices, faces, uv = _read(path, allow_outside)
+    raw = Mesh(vertices * scale, faces, uv, name=path.name)
+    raw.require_finite()
+    return mended(raw)
+
+
+def _read(path: Path, allow_outside: bool) -> Triangles:
+    asked = f"mesh {str(path)!r}"
+    require_file(path, asked)
+    if path.suffix[1:].lower() not in mesh_formats():
+        do = (
+            "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
+        )
+        raise InputError(asked, f"format {path.suffix or 'without suffix'!r} is not known", do)
+    return read_triangles(path, asked, allow_outside)
 
 
 def mesh_formats() -> set[str]:
@@ -49,8 +108,6 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
         If the file cannot be read, or has no triangles.
     """
     if path.suffix.lower() in (".glb", ".gltf"):
-        from translucent.gltf.whole import read_whole
-
         return read_whole(path, allow_outside)
     import trimesh
 
@@ -67,20 +124,6 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
             raise
         except Exception as error:  # each of trimesh's readers raises its own kinds
             raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
-
-
-def joined(parts: list[Triangles], asked: str) -> Triangles:
-    """The triangles of all parts; raises `InputError` if there are none."""
-    if not parts:
-        raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
-    starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts[:-1])])
-    faces = [part.astype(np.int64) + start for (_, part, _), start in zip(parts, starts.tolist(), strict=True)]
-    uv = [coordinates for _, _, coordinates in parts if coordinates is not None]
-    return (
-        np.concatenate([vertices for vertices, _, _ in parts]),
-        np.concatenate(faces).astype(np.int32),
-        np.concatenate(uv) if len(uv) == len(parts) else None,
-    )
 
 
 def _part(part: Any) -> Triangles:

@@ -1,0 +1,18 @@
+"""H01 to H26, all of the hard cases: each measured now, against what is promised for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from translucent.bench.hard import geometry as hard_geometry
+from translucent.bench.hard import values as hard_values
+from translucent.bench.hard import views as hard_views
+from translucent.bench.record import HardCase
+from translucent.renderer import Renderer
+
+
+def measure_hard_cases(renderer: Renderer) -> Iterator[HardCase]:
+    """All of them, in their order."""
+    cases = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
+    for case in sorted(cases, key=lambda case: case.id):
+        yield case.measure(renderer)

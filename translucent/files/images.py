@@ -1,0 +1,70 @@
+"""Pictures and arrays as files: PNG, OpenEXR and NumPy's own. Each function fills the file that it is given; that a
+file appears complete or not at all is for `translucent.files.paths.write_atomically` to see to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+
+def write_png(file: Path | BinaryIO, pixels: npt.NDArray[Any], text: Mapping[str, str] | None = None) -> None:
+    """Write pixels as they are.
+
+    Parameters
+    ----------
+    file : Path or binary file
+    pixels : (h, w, 3), (h, w, 4) or (h, w) uint8, or (h, w) uint16
+        Color, color with alpha, or grey.
+    text : mapping, optional
+        For the text chunks, by keyword.
+    """
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    chunks = PngInfo()
+    for key, value in (text or {}).items():
+        chunks.add_text(key, value)
+    Image.fromarray(pixels).save(file, format="PNG", pnginfo=chunks)
+
+
+def write_exr(path: Path, channels: Mapping[str, npt.NDArray[Any]], header: Mapping[str, Any]) -> None:
+    """Write float32 channels with the OpenEXR package, which has to be installed.
+
+    Parameters
+    ----------
+    path : Path
+    channels : mapping
+        Of (h, w), or of (h, w, 3) and (h, w, 4) under the names ``RGB`` and ``RGBA``.
+    header : mapping
+        Attributes beside those that every file has.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    import OpenEXR
+
+    kept = {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in channels.items()}
+    how = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    try:
+        with OpenEXR.File({**how, **header}, kept) as file:
+            file.write(str(path))
+    except RuntimeError as error:  # what a full disk is to OpenEXR
+        raise OSError(str(error).replace(str(path), "the file").rstrip(".")) from error
+
+
+def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Write arrays under their names, compressed."""
+    with path.open("wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
+
+
+def write_npy(path: Path, array: npt.NDArray[Any]) -> None:
+    """Write one array."""
+    with path.open("wb") as stream:
+        np.save(stream, array, allow_pickle=False)
