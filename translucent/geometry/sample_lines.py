@@ -96,6 +96,8 @@ def _crossings(triangles: Array, heights: Array, cell: Integers, line: Integers)
 
 def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:
     """Whether a balanced line winds negatively for longer than rounding explains."""
+    if len(line) == 0:
+        return False
     order = np.lexsort((height, line))
     line, height, sign = line[order], height[order], sign[order]
     winding = np.cumsum(sign)
