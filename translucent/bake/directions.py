@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bake.normals import CREASE
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
+from translucent.geometry.normals import CREASE
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]

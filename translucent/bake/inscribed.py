@@ -18,9 +18,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bake.normals import CREASE
 from translucent.bake.surface import Points, Surface, blend
 from translucent.bake.texels import closest
+from translucent.geometry.normals import CREASE
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]

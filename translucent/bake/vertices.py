@@ -14,7 +14,6 @@ import numpy.typing as npt
 from translucent.bake.bake import check_threads, escape_warnings
 from translucent.bake.baked import BakeReport
 from translucent.bake.measure import Measure, Measured
-from translucent.bake.normals import corner_angles
 from translucent.bake.settings import BakeSettings, settings_from
 from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import VertexThickness
@@ -22,6 +21,7 @@ from translucent.bake.work import Progress, in_order
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import corner_angles
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
