@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.cpu.embree import EmbreeMesh
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import smooth_normals
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Rays start this far from the edges of their triangle at least, as a share of its height: a ray that runs down an
 #: adjacent wall would otherwise run in it.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.bake import check_threads, escape_warnings
 from translucent.bake.baked import BakeReport
 from translucent.bake.measure import Measure, Measured
@@ -22,9 +23,6 @@ from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_angles
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: How far from its vertex the point is that stands for the corner of a face, as a share of the way to the other two.
 CORNER = 1e-3

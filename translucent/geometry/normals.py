@@ -8,11 +8,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.geometry.grouping import equal_rows
 from translucent.geometry.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
 #: Edges whose faces meet at a larger angle than this, in radians, are creases; modelling tools offer 30 to 60 degrees.
 CREASE = math.radians(40.0)
@@ -23,7 +21,7 @@ def corner_normals(mesh: Mesh) -> Array:
     return smooth_normals(mesh.vertices, mesh.faces, mesh.face_normals)
 
 
-def smooth_normals(vertices: Array, faces: Integers, normals: Array) -> Array:
+def smooth_normals(vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> Array:
     """(m, 3, 3): a unit normal for each corner of faces (m, 3).
 
     The mean of the normals of those faces at the vertex that are joined to this one over edges that are no creases,
