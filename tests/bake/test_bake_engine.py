@@ -24,7 +24,7 @@ MEDIUM = tl.Medium(absorption=(10.0, 20.0, 40.0))
 @pytest.fixture(scope="module")
 def bear() -> tl.Mesh:
     """With texture coordinates."""
-    return tl.bake_thickness(tl.load_mesh(mesh_path("bear")), 64, "normal").mesh
+    return tl.bake_thickness(tl.load_mesh(mesh_path("bear")), 64, mode="normal").mesh
 
 
 def same(one: tl.ThicknessMap, other: tl.ThicknessMap) -> bool:
@@ -54,6 +54,21 @@ def test_the_same_bits_in_any_number_of_threads_and_chunks(
         monkeypatch.setattr(strips, "STRIP_TEXELS", texels)
         monkeypatch.setattr(measure, "CHUNK_RAYS", rays)
         assert same(one, tl.bake_thickness(bear, 48, rays=16, threads=2, **asked))
+
+
+def test_settings_and_their_keywords_are_one(bear: tl.Mesh) -> None:
+    asked = tl.BakeSettings(size=32, mode="normal", padding=2)
+    whole = tl.bake_thickness(bear, asked)
+    assert same(whole, tl.bake_thickness(bear, size=32, mode="normal", padding=2))
+    assert same(whole, tl.bake_thickness(bear, tl.BakeSettings(size=32, mode="normal"), padding=2))
+    assert whole.settings.summary() == asked.summary()
+    of_vertices = tl.bake_vertex_thickness(bear, asked)
+    assert np.array_equal(of_vertices.values, tl.bake_vertex_thickness(bear, mode="normal").values)
+    assert (of_vertices.settings.size, of_vertices.settings.padding) == (1, 0)
+    with pytest.raises(tl.InputError, match="thickness per vertex; padding is of maps; leave it out"):
+        tl.bake_vertex_thickness(bear, padding=2)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
+        tl.bake_thickness(bear, colour="red")
 
 
 def test_a_seed_makes_another_map_of_the_same_mesh() -> None:

@@ -102,16 +102,16 @@ def test_overlapping_texture_coordinates_are_counted() -> None:
     uv = grid_uv()
     uv[1] = uv[0] + 1 / 64
     with pytest.warns(tl.TranslucentWarning, match="texels lie in several triangles in UV"):
-        baked = tl.bake_thickness(box_with_uv(uv), 64, "normal")
+        baked = tl.bake_thickness(box_with_uv(uv), 64, mode="normal")
     a, b = (coverage(atlas(uv[i : i + 1], 64)) for i in (0, 1))
     assert 0 < baked.report.overlapping_texels <= (a & b).sum()
-    assert tl.bake_thickness(box_with_uv(grid_uv()), 64, "normal").report.overlapping_texels == 0
+    assert tl.bake_thickness(box_with_uv(grid_uv()), 64, mode="normal").report.overlapping_texels == 0
 
 
 def test_texture_coordinates_outside_repeat_the_map() -> None:
-    inside = tl.bake_thickness(box_with_uv(grid_uv()), 64, "normal")
+    inside = tl.bake_thickness(box_with_uv(grid_uv()), 64, mode="normal")
     with pytest.warns(tl.TranslucentWarning, match=r"12 of 12 faces have texture coordinates outside 0\.\.1"):
-        outside = tl.bake_thickness(box_with_uv(grid_uv(-3.0)), 64, "normal")
+        outside = tl.bake_thickness(box_with_uv(grid_uv(-3.0)), 64, mode="normal")
     assert np.array_equal(inside.coverage, outside.coverage)
     assert np.allclose(inside.values, outside.values)
 
@@ -121,20 +121,20 @@ def test_udim_tiles() -> None:
     uv[6:] += (1.0, 1.0)
     mesh = box_with_uv(uv)
     with pytest.warns(tl.TranslucentWarning, match="UDIM tiles 1001, 1012"):
-        baked = tl.bake_thickness(mesh, 64, "normal")
+        baked = tl.bake_thickness(mesh, 64, mode="normal")
     assert baked.report.udim_tiles == (1001, 1012)
-    one, other = (tl.bake_thickness(mesh, 64, "normal", tile=tile).coverage for tile in (1001, 1012))
+    one, other = (tl.bake_thickness(mesh, 64, mode="normal", tile=tile).coverage for tile in (1001, 1012))
     assert np.array_equal(one | other, baked.coverage)
     assert one.sum() < baked.coverage.sum() > other.sum()
     with pytest.raises(tl.InputError, match="UDIM tile 1002; mesh 'mesh' has faces in 1001, 1012"):
-        tl.bake_thickness(mesh, 64, "normal", tile=1002)
+        tl.bake_thickness(mesh, 64, mode="normal", tile=1002)
 
 
 def test_faces_without_texel_are_counted() -> None:
     uv = grid_uv()
     uv[2:6] = uv[0].mean(axis=0) + 1e-5 * (uv[2:6] - uv[2:6].mean(axis=1, keepdims=True))
     with pytest.warns(tl.TranslucentWarning, match="of 12 faces, 33% of the surface, have no texel"):
-        baked = tl.bake_thickness(box_with_uv(uv), 16, "normal", rays=1, padding=0)
+        baked = tl.bake_thickness(box_with_uv(uv), 16, mode="normal", rays=1, padding=0)
     assert baked.report.faces_without_texel >= 3
 
 
@@ -159,7 +159,7 @@ def test_no_texture_coordinates_and_no_xatlas(monkeypatch: pytest.MonkeyPatch) -
 
 def test_new_texture_coordinates_come_with_the_mesh() -> None:
     solid = Sphere().tessellate(24)
-    baked = tl.bake_thickness(solid, 64, "normal")
+    baked = tl.bake_thickness(solid, 64, mode="normal")
     assert baked.report.uv_from == "xatlas"
     assert baked.mesh.uv is not None
     assert len(baked.mesh.faces) == len(solid.faces)
@@ -183,7 +183,7 @@ def test_padding_takes_the_nearest_and_changes_no_chart() -> None:
 def test_supersampling_averages_points_of_the_texel() -> None:
     """Nine points have a third of the error of one, in the same texels, and about the same mean."""
     mesh = Box().tessellate()
-    one, nine = (tl.bake_thickness(mesh, 48, "cone", supersample=count) for count in (1, 3))
+    one, nine = (tl.bake_thickness(mesh, 48, mode="cone", supersample=count) for count in (1, 3))
     assert np.array_equal(one.coverage, nine.coverage)
     assert nine.report.samples > 6 * one.report.samples
     both = one.coverage
@@ -252,5 +252,5 @@ def test_both_sides_of_a_smooth_edge_have_the_same_points_and_normals() -> None:
 def test_seams_of_the_normal_mode() -> None:
     """No rays at random: both sides read the same but for the slope between texels."""
     sphere = Sphere(radius=0.05)
-    jump, _ = seam_jumps(tl.bake_thickness(sphere.tessellate(64), 256, "normal"))
+    jump, _ = seam_jumps(tl.bake_thickness(sphere.tessellate(64), 256, mode="normal"))
     assert (jump <= 2 * sphere.sagitta(64)).all()

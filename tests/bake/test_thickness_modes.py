@@ -57,7 +57,7 @@ def test_a_sphere(asked: dict, truth: float) -> None:
 
 def test_the_transmittance_of_a_colored_medium() -> None:
     medium = tl.Medium(absorption=(5.0, 40.0, 200.0))
-    values, errors = covered(tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 48, "transmittance", medium=medium))
+    values, errors = covered(tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 48, mode="transmittance", medium=medium))
     weights, sigma = np.array([0.2126, 0.7152, 0.0722]), medium.extinction
     tau = 2 * RADIUS * sigma
     bright = (weights * 2 * (1 - (1 + tau) * np.exp(-tau)) / tau**2).sum()
@@ -71,14 +71,16 @@ def test_the_transmittance_of_a_colored_medium() -> None:
 def test_a_transmittance_that_underflows() -> None:
     """Of a narrow cone through 0.06 m at 1e6 / m nothing comes out, but the thickness is there all the same."""
     dense = tl.Medium(absorption=(1e6, 1e6, 2e6))
-    values, _ = covered(tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 24, "transmittance", spread=20.0, medium=dense))
+    values, _ = covered(
+        tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 24, mode="transmittance", spread=20.0, medium=dense)
+    )
     assert (values > 2 * RADIUS * cos(radians(10)) - FACETS).all()
     assert (values <= 2 * RADIUS).all()
 
 
 def test_the_normal_mode_of_a_box_is_exact() -> None:
     sides = (0.1, 0.2, 0.4)
-    baked = tl.bake_thickness(Box((0, 0, 0), sides).tessellate(), 96, "normal")
+    baked = tl.bake_thickness(Box((0, 0, 0), sides).tessellate(), 96, mode="normal")
     unwrapped = baked.mesh
     values, _ = covered(baked)
     assert unwrapped.uv is not None
@@ -106,7 +108,7 @@ def test_a_slab(weighting: str, share: float) -> None:
 
 def test_a_slab_of_a_hundred_thousandth() -> None:
     slab = Box((0, 0, 0), (1.0, 1.0, 1e-5)).tessellate()
-    values, _ = covered(tl.bake_thickness(slab, 64, "normal"))
+    values, _ = covered(tl.bake_thickness(slab, 64, mode="normal"))
     assert np.isclose(np.median(values), 1e-5, rtol=1e-5, atol=0)
 
 
@@ -131,7 +133,7 @@ def test_the_middle_of_a_box_against_quadrature() -> None:
 @pytest.mark.parametrize("mode", ["normal", "inscribed"])
 def test_the_tube_of_a_torus(mode: str) -> None:
     torus = Torus(0.1, 0.02)
-    values, _ = covered(tl.bake_thickness(torus.tessellate(96), 32, mode))
+    values, _ = covered(tl.bake_thickness(torus.tessellate(96), 32, mode=mode))
     assert (np.abs(values - 0.04) <= 6 * torus.sagitta(96)).all()
 
 

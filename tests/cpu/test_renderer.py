@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tools.cpu_throughput import throughput
 from translucent.cpu import picture, shading
 from translucent.cpu.renderer import CpuRenderer
-from translucent.cpu.throughput import throughput
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Solid, Sphere, Torus

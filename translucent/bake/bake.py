@@ -15,7 +15,7 @@ from translucent.bake.canvas import Canvas, Checkpoint, bake_key
 from translucent.bake.high_low import Projection
 from translucent.bake.measure import Measure
 from translucent.bake.padding import pad
-from translucent.bake.settings import BakeSettings
+from translucent.bake.settings import BakeSettings, settings_from
 from translucent.bake.strips import Strips
 from translucent.bake.surface import Surface
 from translucent.bake.texels import Atlas
@@ -25,7 +25,6 @@ from translucent.bake.work import Progress, bake_strips
 from translucent.cpu.threads import processors
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.mesh import Mesh
-from translucent.media.medium import Medium
 
 #: Share of the surface that may have no texel of its own before a warning says so, and how many texels per face a map
 #: has that could show all.
@@ -34,83 +33,32 @@ MOST_HIDDEN, ENOUGH_TEXELS = 0.1, 4
 
 def bake_thickness(
     mesh: Mesh,
-    size: int = 1024,
-    mode: str = "cone",
-    rays: int = 64,
-    spread: float = 180.0,
-    seed: int = 0,
+    settings: BakeSettings | int | None = None,
     *,
-    weighting: str = "cosine",
-    gaps: str = "first-exit",
-    max_distance: float | None = None,
-    ignore_back_faces: bool = False,
-    medium: Medium | None = None,
-    supersample: int = 1,
-    padding: int = 16,
-    tolerance: float | None = None,
-    tile: int | None = None,
     high: Mesh | None = None,
     cage: Mesh | None = None,
-    high_distance: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
     checkpoint: Path | None = None,
+    **given: Any,
 ) -> ThicknessMap:
     """Bake how thick a mesh is under each texel of its texture coordinates.
 
     Each texel shows the point of the mesh at its center, or the nearest point of a triangle that touches it. Rays go
-    from there into the mesh, around the inward smooth normal; the mode makes one number of their lengths d. With n the
-    outward normal, w the directions and p the density of the weighting:
-
-    - "normal": d(-n), one ray.
-    - "cone": the mean E[d] = integral p(w) d(w) dw over the cone.
-    - "transmittance": the d for which Y(exp(-sigma_t d)) = E[Y(exp(-sigma_t d(w)))], Y being the luminance: what a
-      shader needs to get the mean transmittance of the cone from one length.
-    - "inscribed": the diameter of the largest sphere inside that touches the surface at the point.
-    - "local": P(d(w) >= max_distance), one minus the ambient occlusion with inverted normals (Barre-Brisebois and
-      Bouchard 2011); 1 where the mesh is thick. The only one without a unit.
+    from there into the mesh, around the inward smooth normal; the mode of
+    the settings makes one number of their lengths.
 
     Parameters
     ----------
     mesh : Mesh
         With uv, or xatlas makes them. It should be closed; see `ThicknessMap.escaped`.
-    size : int
-        Texels along each side of the map.
-    mode : str
-        As above.
-    rays : int
-        From each point, >= 2; powers of 2 are best. Mode "normal" casts one, whatever is given, and takes 1, too;
-        "inscribed" begins with them.
-    spread : float
-        Full angle of the cone in degrees, 0 < spread <= 180.
-    seed : int
-        Of the directions. The result does not depend on the number of threads.
-    weighting : str
-        "cosine": p = cos(theta) / (pi sin^2(spread / 2)), or "uniform": p = 1 / (2 pi (1 - cos(spread / 2))).
-    gaps : str
-        "first-exit": d ends where the ray first leaves the mesh. "total": d is the whole length inside, beyond gaps.
-    max_distance : float, optional
-        In metres: d is at most this. Mode "local" takes a tenth of the diagonal where it is not given.
-    ignore_back_faces : bool
-        Seen from inside, as the rays do, the back of a face is its outer side: rays that meet one go on, where meshes
-        of overlapping parts would otherwise end them. "total" counts such parts once in any case.
-    medium : Medium, optional
-        Of mode "transmittance".
-    supersample : int
-        Points along each side of a texel; each has its own rays.
-    padding : int
-        Texels around each chart that get the value of the nearest texel with one.
-    tolerance : float, optional
-        Standard error in metres (mode "local": 1) to be reached: up to 64 times as many rays are cast where it is not.
-    tile : int, optional
-        UDIM tile to bake. Default: texture coordinates outside 0..1 repeat the map.
+    settings : BakeSettings, optional
+        How to bake; an integer is short for its `size`.
     high : Mesh, optional
         Detailed mesh whose thickness is baked to the texture coordinates of `mesh`.
     cage : Mesh, optional
         `mesh` with its vertices moved outwards: points of `high` are looked for from there, through the point of
         `mesh`, and as far again behind it.
-    high_distance : float, optional
-        Instead of a cage, metres on either side of `mesh`, along its smooth normals. Default: 2 % of the diagonal.
     threads : int, optional
         Default: as many as there are processors.
     progress : callable, optional
@@ -118,6 +66,8 @@ def bake_thickness(
     checkpoint : Path, optional
         File that keeps finished parts of the map, every few seconds, until it is done. A bake with the same mesh and
         settings that finds it goes on from there.
+    **given
+        Fields of `BakeSettings` by name, instead of those of `settings`.
 
     Returns
     -------
@@ -137,21 +87,18 @@ def bake_thickness(
         If rays escape through holes, texture coordinates overlap, or parts of the mesh get no value.
     """
     started = time.perf_counter()
-    settings = BakeSettings(
-        mode, size, rays, spread, weighting, gaps, max_distance, ignore_back_faces, medium,  # type: ignore[arg-type]
-        supersample, padding, seed, tolerance, tile, high_distance,
-    )  # fmt: skip
-    _check_high(high, cage, high_distance)
+    settings = settings_from(settings, "size", given)
+    _check_high(high, cage, settings.high_distance)
     threads = check_threads(threads)
-    unwrapped = unwrap(mesh, size, tile)
+    unwrapped = unwrap(mesh, settings.size, settings.tile)
     strips = _strips(mesh, unwrapped, settings, high, cage)
-    canvas = Canvas(size, len(strips.low.faces), -(-size // strips.rows))
+    canvas = Canvas(settings.size, len(strips.low.faces), -(-settings.size // strips.rows))
     kept = None if checkpoint is None else Checkpoint(Path(checkpoint), bake_key(settings, mesh, high, cage))
     if kept is not None:
         kept.read(canvas)
     before = canvas.count("traced")
     bake_strips(strips, canvas, threads, progress, kept)
-    pad(canvas.values, canvas.valued, padding)
+    pad(canvas.values, canvas.valued, settings.padding)
     traced = canvas.count("traced") - before
     report = _report(unwrapped, strips, canvas, traced, time.perf_counter() - started)
     if kept is not None:

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from translucent.arrays import Floats, Mask
 from translucent.bake.settings import BakeSettings
 from translucent.geometry.mesh import Mesh
-
-Floats = npt.NDArray[np.float32]
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

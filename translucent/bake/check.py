@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.gltf.maps import wrapping
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.renderer import CpuRenderer
@@ -29,8 +30,6 @@ from translucent.media.medium import Medium
 from translucent.planning.plan import plan
 from translucent.scene.camera import Camera
 from translucent.scene.showcase import showcase
-
-Array = npt.NDArray[np.float64]
 
 #: What is this close, as a share of the diagonal, is one surface.
 SAME_PLACE = 1e-4

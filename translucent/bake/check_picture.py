@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Pixels
 from translucent.files.paths import write_atomically
 from translucent.formulas.color import linear_to_srgb
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
     from translucent.bake.check import MapCheck
 
-Array = npt.NDArray[np.float64]
-Pixels = npt.NDArray[np.uint8]
 
 #: Colors of the error: the map is too thin, right, too thick (sRGB 0..255).
 THIN, RIGHT, THICK = (30, 90, 200), (245, 245, 245), (200, 50, 30)

@@ -6,8 +6,8 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.gltf.bodies import Bodies, first_transforms, transformed
 from translucent.bake.record import Record
 from translucent.errors import RenderError, TranslucentWarning
@@ -16,7 +16,6 @@ from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile
 from translucent.gltf.materials import GltfMaterial
 
-Array = npt.NDArray[np.float64]
 #: Positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
 Corners = tuple[Array, Array | None]
 

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bake.normals import CREASE
+from translucent.arrays import Array, Floats
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
+from translucent.geometry.normals import CREASE
 
 #: How many independently scrambled sets there are, and how many numbers all of them may hold.
 SETS, TABLE = 256, 1 << 22

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.surface import Points, Surface, blend
 from translucent.bake.unwrap import Unwrapped
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
 
 #: How far on either side of the low mesh the high one is looked for where nothing says so, as a share of the diagonal.
 SEARCH = 0.02

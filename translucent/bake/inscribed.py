@@ -16,15 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from translucent.bake.normals import CREASE
+from translucent.arrays import Array, Floats, Integers
 from translucent.bake.surface import Points, Surface, blend
 from translucent.bake.texels import closest
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Integers = npt.NDArray[np.int64]
+from translucent.geometry.normals import CREASE
 
 #: About how many points of the surface the search tree holds, beyond one for each face, and how many of them are tried
 #: around a center. The center of a round body is as far from all points, so that a search looks at every one.

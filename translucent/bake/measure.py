@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.directions import Directions
 from translucent.bake.inscribed import InscribedSpheres
 from translucent.bake.modes import BLOCKS, RayMean, block_edges
 from translucent.bake.rays import Rays
 from translucent.bake.settings import LOCAL_REACH, BakeSettings
 from translucent.bake.surface import Points, Surface
-
-Array = npt.NDArray[np.float64]
 
 #: Rays that are traced at a time: their arrays stay in the cache of a processor.
 CHUNK_RAYS = 1 << 14

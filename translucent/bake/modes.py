@@ -25,11 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.bake.settings import BakeSettings
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Groups of rays whose means tell the standard error.
 BLOCKS = 8

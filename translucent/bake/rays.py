@@ -13,12 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Floats, Integers
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points, Surface
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Integers = npt.NDArray[np.int64]
 
 #: Rays start this far below the surface, in radii of the mesh: beyond the rounding of float32, below the distance at
 #: which `load_mesh` takes vertices for one.

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.encoding import Encoding
 from translucent.bake.record import read_record
 from translucent.bake.writing import PNG_LEVELS, PNG_PREFIX
@@ -15,8 +16,6 @@ from translucent.errors import InputError, TranslucentError
 from translucent.files.paths import require_file
 from translucent.files.reading import open_file, read_bytes
 from translucent.files.unpacking import open_picture, read_array, read_arrays, read_exr
-
-Array = npt.NDArray[np.float64]
 
 
 def load_thickness_map(path: str | Path) -> Array:

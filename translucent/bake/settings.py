@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -25,7 +27,53 @@ LOCAL_REACH = 0.1
 
 @dataclass(frozen=True, eq=False)
 class BakeSettings:
-    """Settings of a bake; `translucent.bake_thickness` says what each does.
+    """How to bake.
+
+    Rays go from points of the surface into the mesh, around the inward smooth normal; the mode makes one number of
+    their lengths d. With n the outward normal, w the directions and p the density of the weighting:
+
+    - "normal": d(-n), one ray.
+    - "cone": the mean E[d] = integral p(w) d(w) dw over the cone.
+    - "transmittance": the d for which Y(exp(-sigma_t d)) = E[Y(exp(-sigma_t d(w)))], Y being the luminance: what a
+      shader needs to get the mean transmittance of the cone from one length.
+    - "inscribed": the diameter of the largest sphere inside that touches the surface at the point.
+    - "local": P(d(w) >= max_distance), one minus the ambient occlusion with inverted normals (Barre-Brisebois and
+      Bouchard 2011); 1 where the mesh is thick. The only one without a unit.
+
+    Parameters
+    ----------
+    size : int
+        Texels along each side of the map.
+    mode : str
+        As above.
+    rays : int
+        From each point, >= 2; powers of 2 are best. Mode "normal" casts one, whatever is given, and takes 1, too;
+        "inscribed" begins with them.
+    spread : float
+        Full angle of the cone in degrees, 0 < spread <= 180.
+    seed : int
+        Of the directions. The result does not depend on the number of threads.
+    weighting : str
+        "cosine": p = cos(theta) / (pi sin^2(spread / 2)), or "uniform": p = 1 / (2 pi (1 - cos(spread / 2))).
+    gaps : str
+        "first-exit": d ends where the ray first leaves the mesh. "total": d is the whole length inside, beyond gaps.
+    max_distance : float, optional
+        In metres: d is at most this. Mode "local" takes a tenth of the diagonal where it is not given.
+    ignore_back_faces : bool
+        Seen from inside, as the rays do, the back of a face is its outer side: rays that meet one go on, where meshes
+        of overlapping parts would otherwise end them. "total" counts such parts once in any case.
+    medium : Medium, optional
+        Of mode "transmittance".
+    supersample : int
+        Points along each side of a texel; each has its own rays.
+    padding : int
+        Texels around each chart that get the value of the nearest texel with one.
+    tolerance : float, optional
+        Standard error in metres (mode "local": 1) to be reached: up to 64 times as many rays are cast where it is not.
+    tile : int, optional
+        UDIM tile to bake. Default: texture coordinates outside 0..1 repeat the map.
+    high_distance : float, optional
+        Instead of a cage, metres on either side of the mesh, along its smooth normals. Default: 2 % of the diagonal.
 
     Raises
     ------
@@ -107,3 +155,24 @@ def _check_choice(name: str, value: Any, choices: Any) -> None:
 def _check_count(name: str, value: Any, low: int, high: int, do: str) -> None:
     if not (_is_whole(value) and low <= value <= high):
         raise InputError(f"{name} {value!r}", f"not a whole number in {low} to {high}", do)
+
+
+def settings_from(settings: Any, short: str, given: Mapping[str, Any]) -> BakeSettings:
+    """Settings with some fields given instead.
+
+    Parameters
+    ----------
+    settings : BakeSettings, optional
+        Or the value of the field `short` alone.
+    short : str
+    given : mapping
+        Fields by name.
+
+    Raises
+    ------
+    InputError
+        If a field is outside its range.
+    """
+    if isinstance(settings, BakeSettings):
+        return dataclasses.replace(settings, **given)
+    return BakeSettings(**given) if settings is None else BakeSettings(**{short: settings}, **given)

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Floats, Mask
 from translucent.bake.high_low import Projection
 from translucent.bake.measure import Measure
 from translucent.bake.surface import Surface
 from translucent.bake.texels import Atlas
-
-Array = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
-Mask = npt.NDArray[np.bool_]
 
 #: Texels (before supersampling) in a strip, about: one strip is what a thread takes at a time.
 STRIP_TEXELS = 1 << 14

@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from translucent.bake.normals import CREASE, corner_normals
+from translucent.arrays import Array, Integers
 from translucent.cpu.embree import EmbreeMesh
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from translucent.geometry.normals import smooth_normals
 
 #: Rays start this far from the edges of their triangle at least, as a share of its height: a ray that runs down an
 #: adjacent wall would otherwise run in it.
@@ -73,14 +70,12 @@ class Surface:
     normals: Array
 
     @classmethod
-    def of(cls, mesh: Mesh, crease: float = CREASE) -> Surface:
+    def of(cls, mesh: Mesh) -> Surface:
         """Prepare a mesh.
 
         Parameters
         ----------
         mesh : Mesh
-        crease : float
-            Angle in radians from which on an edge is not smooth.
 
         Raises
         ------
@@ -108,7 +103,7 @@ class Surface:
             faces,
             corners,
             np.column_stack([normals, offset]),
-            corner_normals(mesh.vertices, mesh.faces[faces], normals, crease),
+            smooth_normals(mesh.vertices, mesh.faces[faces], normals),
         )
 
     @property

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
+from translucent.arrays import Array, Integers, Mask
 
 #: A texel's center is inside a triangle, or on its edge, by more or less than this share of a texel.
 ON_EDGE = 1e-7

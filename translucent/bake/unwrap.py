@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.geometry.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Texels between the charts that xatlas makes, and the share of a small map's side that this is at most.
 CHART_GAP, GAP_SHARE = 4, 1 / 128

@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 import warnings
 from contextlib import closing
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bake.bake import check_threads, escape_warnings
 from translucent.bake.baked import BakeReport
 from translucent.bake.measure import Measure, Measured
-from translucent.bake.normals import corner_angles
-from translucent.bake.settings import BakeSettings
+from translucent.bake.settings import BakeSettings, settings_from
 from translucent.bake.surface import Surface
 from translucent.bake.thickness_map import VertexThickness
 from translucent.bake.work import Progress, in_order
-from translucent.errors import TranslucentWarning
+from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
-from translucent.media.medium import Medium
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from translucent.geometry.normals import corner_angles
 
 #: How far from its vertex the point is that stands for the corner of a face, as a share of the way to the other two.
 CORNER = 1e-3
+
+#: Settings that have no meaning for vertices.
+_OF_MAPS: dict[str, Any] = {"size": 1, "supersample": 1, "padding": 0, "tile": None, "high_distance": None}
 
 #: Corners that a thread takes at a time.
 PART = 1 << 13
@@ -34,19 +36,11 @@ PART = 1 << 13
 
 def bake_vertex_thickness(
     mesh: Mesh,
-    mode: str = "cone",
-    rays: int = 64,
-    spread: float = 180.0,
-    seed: int = 0,
+    settings: BakeSettings | str | None = None,
     *,
-    weighting: str = "cosine",
-    gaps: str = "first-exit",
-    max_distance: float | None = None,
-    ignore_back_faces: bool = False,
-    medium: Medium | None = None,
-    tolerance: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
+    **given: Any,
 ) -> VertexThickness:
     """Bake how thick a mesh is under each vertex.
 
@@ -56,10 +50,14 @@ def bake_vertex_thickness(
     Parameters
     ----------
     mesh : Mesh
-    mode, rays, spread, seed, weighting, gaps, max_distance, ignore_back_faces, medium, tolerance, threads
-        As for `bake_thickness`; rays are per corner.
+    settings : BakeSettings, optional
+        How to bake; rays are per corner, and what is of maps has no effect. A text is short for its `mode`.
+    threads : int, optional
+        Default: as many as there are processors.
     progress : callable, optional
         Called in this thread with (corners done, all corners, rays traced).
+    **given
+        Fields of `BakeSettings` by name, instead of those of `settings`; none that is of maps.
 
     Returns
     -------
@@ -78,10 +76,9 @@ def bake_vertex_thickness(
         If rays escape through holes.
     """
     started = time.perf_counter()
-    settings = BakeSettings(
-        mode, 1, rays, spread, weighting, gaps, max_distance, ignore_back_faces, medium,  # type: ignore[arg-type]
-        seed=seed, padding=0, tolerance=tolerance,
-    )  # fmt: skip
+    if wrong := sorted(set(_OF_MAPS) & set(given)):
+        raise InputError("thickness per vertex", f"{wrong[0]} is of maps", "leave it out")
+    settings = dataclasses.replace(settings_from(settings, "mode", given), **_OF_MAPS)
     threads = check_threads(threads)
     surface = Surface.of(mesh)
     parts = _measure_corners(surface, settings, threads, progress)

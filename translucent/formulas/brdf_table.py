@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
 
 #: Rows (roughness) and columns (cosine) of the table; both ends are in it.
 TABLE_SIZE = 64

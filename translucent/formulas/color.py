@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
 
 LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
 

@@ -16,9 +16,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.formulas import optics
-
-Array = npt.NDArray[np.float64]
 
 
 @np.errstate(under="ignore")

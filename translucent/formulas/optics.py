@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
 
 #: Smallest cosine that the thin-layer formula divides by (Drobot 2017): a sheet seen edge-on is 1000 times as thick.
 MIN_THIN_LAYER_COSINE = 0.001

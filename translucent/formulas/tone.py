@@ -16,9 +16,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
-
-Array = npt.NDArray[np.float64]
 
 #: PBR Neutral: where highlights begin to be compressed, reflectance at normal incidence, and speed of desaturation.
 NEUTRAL_F90 = 0.04

@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Pixels
 from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.files.paths import require_folder, require_place, write_atomically
 from translucent.frames.film import write_film
 from translucent.frames.writing import write_pictures
-
-Pixels = npt.NDArray[np.uint8]
 
 #: Pictures per second unless told otherwise.
 DEFAULT_FPS = 24.0

@@ -10,13 +10,11 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
+from translucent.arrays import Mask, Pixels
 from translucent.errors import InputError
 from translucent.formulas.color import linear_to_srgb
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 Arrays = Mapping[str, npt.NDArray[Any]]
-Pixels = npt.NDArray[np.uint8]
 
 #: sRGB colors of text and of what lies around it, of pixels without a medium, and of those that cannot be trusted.
 INK, PAPER, EMPTY, WRONG = (225, 225, 225), (24, 24, 24), (52, 52, 52), (255, 110, 60)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.formulas.color import to_hex
@@ -21,8 +22,6 @@ from translucent.media.colors import parse_color
 from translucent.media.conversion import CHANNELS, CLAMP
 from translucent.media.medium import Medium
 from translucent.media.swatches import html_swatches
-
-Array = npt.NDArray[np.float64]
 
 #: Shares of the pixels that are thinner than the thicknesses by which a mesh is described.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

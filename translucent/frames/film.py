@@ -11,9 +11,8 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-Pixels = npt.NDArray[np.uint8]
+from translucent.arrays import Pixels
 
 #: Constant rate factor of H.264, 0 to 51: what is lost is hardly seen.
 _RATE_FACTOR = 10

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Pixels
 from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.files.folders import make_folder
@@ -17,7 +18,6 @@ from translucent.files.images import write_exr, write_npz, write_png
 from translucent.files.paths import require_place, write_atomically
 
 Arrays = Mapping[str, npt.NDArray[Any]]
-Pixels = npt.NDArray[np.uint8]
 
 #: Of files that hold a frame.
 SUFFIXES = (".png", ".exr", ".npz")

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frozen import Frozen
 from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.grouping import equal_rows, used_vertices
 from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
 from translucent.geometry.winding import winding_number
-
-Array = npt.NDArray[np.float64]
 
 #: Largest index of a vertex.
 MAX_INDEX = 2**31 - 1

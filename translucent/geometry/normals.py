@@ -2,36 +2,52 @@
 
 from __future__ import annotations
 
+import math
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.geometry.grouping import equal_rows
 from translucent.geometry.mesh import Mesh
 
-Array = npt.NDArray[np.float64]
-
-#: Edges whose faces meet at a larger angle than this, in degrees, are creases.
-CREASE_ANGLE = 40.0
+#: Edges whose faces meet at a larger angle than this, in radians, are creases; modelling tools offer 30 to 60 degrees.
+CREASE = math.radians(40.0)
 
 
 def corner_normals(mesh: Mesh) -> Array:
-    """(m, 3, 3): a unit normal for each corner of each face; 0 where a face has no area.
+    """(m, 3, 3): a unit normal for each corner of each face, see `smooth_normals`; 0 where a face has no area."""
+    return smooth_normals(mesh.vertices, mesh.faces, mesh.face_normals)
+
+
+def smooth_normals(vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> Array:
+    """(m, 3, 3): a unit normal for each corner of faces (m, 3).
 
     The mean of the normals of those faces at the vertex that are joined to this one over edges that are no creases,
     weighted by their angle at the vertex (Thuermer & Wuethrich 1998). Vertices in one place count as one: seams of
     texture coordinates are no creases.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int
+    normals : (m, 3) float64
+        Of the faces, of unit length; 0 of those without area.
     """
-    faces = _welded(mesh)
-    normals = mesh.face_normals
-    corner_group = _smooth_groups(faces, normals)
-    weighted = normals[:, None] * _corner_angles(mesh)[..., None]
+    corner_group = _smooth_groups(equal_rows(vertices).of[faces], normals)
+    weighted = normals[:, None] * corner_angles(vertices[faces])[..., None]
     smooth = np.empty_like(weighted)
     for axis in range(3):
         smooth[..., axis] = np.bincount(corner_group.ravel(), weighted[..., axis].ravel())[corner_group]
     length = np.linalg.norm(smooth, axis=2, keepdims=True)
     return np.where(length > 1e-12, smooth / np.where(length > 1e-12, length, 1.0), normals[:, None])
+
+
+def corner_angles(corners: Array) -> Array:
+    """(m, 3): angles in radians at the corners (m, 3, 3) of triangles."""
+    a, b = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=2), (a * b).sum(axis=2)))
 
 
 #: Of meshes that have been drawn, or are about to be.
@@ -55,12 +71,7 @@ def has_drawn_normals(mesh: Mesh) -> bool:
     return mesh in _drawn
 
 
-def _welded(mesh: Mesh) -> npt.NDArray[np.int64]:
-    """(m, 3): faces over vertices of which no two are in one place."""
-    return equal_rows(mesh.vertices).of[mesh.faces]
-
-
-def _smooth_groups(faces: npt.NDArray[np.int64], normals: Array) -> npt.NDArray[np.int64]:
+def _smooth_groups(faces: Integers, normals: Array) -> Integers:
     """(m, 3): number of each corner's group: the corners at its vertex that smooth edges join to it."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -71,7 +82,7 @@ def _smooth_groups(faces: npt.NDArray[np.int64], normals: Array) -> npt.NDArray[
     order = np.lexsort((high, low))
     same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
     one, other = order[:-1][same], order[1:][same]  # edges as 3 face + number of their first corner
-    smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) >= np.cos(np.radians(CREASE_ANGLE))
+    smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) >= math.cos(CREASE)
     one, other = one[smooth], other[smooth]
     follows = np.arange(3 * count).reshape(count, 3)
     following = np.roll(follows, -1, axis=1).ravel()
@@ -82,13 +93,3 @@ def _smooth_groups(faces: npt.NDArray[np.int64], normals: Array) -> npt.NDArray[
     second = np.concatenate([np.where(alike, other, following[other]), np.where(alike, following[other], other)])
     graph = coo_matrix((np.ones(len(first), dtype=bool), (first, second)), shape=(3 * count, 3 * count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64).reshape(count, 3)
-
-
-def _corner_angles(mesh: Mesh) -> Array:
-    """(m, 3): angle of each face at each corner."""
-    corners = mesh.vertices[mesh.faces]
-    angles = np.empty(mesh.faces.shape)
-    for i in range(3):
-        a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
-        angles[:, i] = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
-    return angles

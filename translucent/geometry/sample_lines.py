@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from translucent.arrays import Array, Integers
 
 #: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
 #: What is smaller than a cell can slip through.

@@ -7,10 +7,9 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
 
 
 def revolve(profile: npt.ArrayLike, segments: int, closed: bool = False) -> tuple[Array, npt.NDArray[np.int32]]:

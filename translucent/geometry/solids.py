@@ -12,11 +12,11 @@ from math import cos, isfinite, pi, prod
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solid_geometry import between, dot, nearest_to_zero, quadric, revolve, unit_sphere
 
-Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)

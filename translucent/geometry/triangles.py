@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
-
-Array = npt.NDArray[np.float64]
 
 #: Vertices (n, 3), faces (m, 3), and texture coordinates (n, 2) if there are some.
 Triangles = tuple[Array, npt.NDArray[np.int32], Array | None]

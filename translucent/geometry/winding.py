@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.geometry.grouping import shared_edges, side_ends
-
-Array = npt.NDArray[np.float64]
 
 #: A closed part counts as inside out if its volume is below minus this share of its cubed size: less is rounding.
 _FLAT = 1e-12

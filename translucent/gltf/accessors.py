@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.files.reading import require_room
 from translucent.geometry.mesh import MAX_INDEX
 from translucent.gltf.fields import refused, section, whole
 from translucent.gltf.file import GltfFile, Json
 
-Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 #: Types of NumPy by componentType.

@@ -6,15 +6,13 @@ The aspect ratio is left to the frame, and there are no clipping planes. Scale i
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gltf.fields import label, number, refused, section
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.left_out import LeftOut
 from translucent.scene.camera import Camera
-
-Array = npt.NDArray[np.float64]
 
 
 def scene_camera(

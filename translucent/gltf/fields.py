@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gltf.file import GltfFile, Json
-
-Array = npt.NDArray[np.float64]
 
 
 def refused(file: GltfFile, found: str, do: str = "export the file again") -> InputError:

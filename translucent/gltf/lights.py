@@ -6,17 +6,13 @@ channel. `range` has no effect, since light falls off with the inverse square. S
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from translucent.arrays import Array
 from translucent.gltf.cameras import require_regular
 from translucent.gltf.fields import extension, label, number, numbers, refused
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.left_out import LeftOut
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light
-
-Array = npt.NDArray[np.float64]
 
 LIGHTS = "KHR_lights_punctual"
 

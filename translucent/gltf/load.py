@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.mesh import MAX_COORDINATE
 from translucent.gltf.cameras import scene_camera
@@ -26,8 +26,6 @@ from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import LIGHT_TABLE, framing
 from translucent.units import metres_per_unit
-
-Array = npt.NDArray[np.float64]
 
 SUFFIXES = (".glb", ".gltf")
 

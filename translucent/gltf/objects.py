@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.geometry.mesh import MIN_DIAGONAL, Mesh
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import label, refused
@@ -21,8 +21,6 @@ from translucent.gltf.surfaces import VERTEX_COLORED, Finish, finish_reader
 from translucent.media.medium import Medium
 from translucent.scene.scene import Object
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
-
-Array = npt.NDArray[np.float64]
 
 #: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
 WALL_SHARE = 1e-5

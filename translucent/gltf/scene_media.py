@@ -15,14 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import shown
 from translucent.files.unpacking import open_picture
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.materials import GltfMaterial
 from translucent.gltf.textures import sample
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,6 +46,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.gltf.fields import extension, label, number, refused, section, share, shares
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.images import Textures
@@ -56,8 +57,6 @@ from translucent.media.medium import Medium
 from translucent.scene.scene import OPAQUE_COLOR
 from translucent.scene.surface import MAX_DISPERSION, Surface
 from translucent.scene.texture import Texture
-
-Array = npt.NDArray[np.float64]
 
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 UNLIT = "KHR_materials_unlit"

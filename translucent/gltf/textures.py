@@ -16,9 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.gltf.file import Json
-
-Array = npt.NDArray[np.float64]
 
 TEXTURE_TRANSFORM = "KHR_texture_transform"
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pyrender
 
+from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.mesh import Mesh, mended
 from translucent.interop._pyrender_pictures import GAMMA
@@ -20,8 +21,6 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Overlap, Scene
-
-Array = npt.NDArray[np.float64]
 
 #: A camera whose optical center is off the middle by less than this, in pixels, looks through it.
 _CENTERED = 1e-6

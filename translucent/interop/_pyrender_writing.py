@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pyrender
 from pyrender.constants import MAX_N_LIGHTS
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gpu.placement import depth_range
 from translucent.scene.camera import Camera
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Object, Scene
-
-Array = npt.NDArray[np.float64]
 
 
 def written(scene: Scene, near: float | None = None) -> Any:

@@ -21,10 +21,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.medium import Medium
-
-Array = npt.NDArray[np.float64]
 
 
 def absorption_node(medium: Medium) -> tuple[Array, float]:

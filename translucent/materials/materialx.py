@@ -28,15 +28,13 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
 from translucent.media.color_distance import color_at, extinction_at
 from translucent.media.medium import Medium
 from translucent.units import metres_per_unit
-
-Array = npt.NDArray[np.float64]
 
 _LINEAR = ("lin_rec709", "none", "")
 _SRGB = "srgb_texture"

@@ -15,11 +15,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
-
-Array = npt.NDArray[np.float64]
 
 CENTIMETERS_PER_METRE = 100.0
 #: Mean free path in cm that the text gives to a channel without extinction: 10 km.

@@ -18,11 +18,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
 
-Array = npt.NDArray[np.float64]
 Model = Literal["hulst", "chiang"]
 
 _CHIANG = (5.09406, -2.61188, 4.31805)

@@ -12,11 +12,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.media.medium import Medium
-
-Array = npt.NDArray[np.float64]
 
 #: Darkest channel that is written, and what a channel of 0 is read as: no finite extinction makes black.
 BLACKEST = 1e-5

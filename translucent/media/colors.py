@@ -10,11 +10,11 @@ import re
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.color import srgb_to_linear
 from translucent.media.pixel import pixel_color
 
-Array = npt.NDArray[np.float64]
 ColorLike = str | npt.ArrayLike
 
 #: What to do about a color that a shell has dropped.

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.media.swatches import html_swatches
 from translucent.units import metres_per_unit
-
-Array = npt.NDArray[np.float64]
 
 #: What a channel of 0 becomes where clamping is asked for: an optical depth of 9.2.
 CLAMP = 1e-4

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.colors import parse_color
 from translucent.media.conversion import CHANNELS
 from translucent.media.medium import Medium
 from translucent.media.tables import check_cells, read_table
 from translucent.units import metres_per_unit
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

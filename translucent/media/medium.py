@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frozen import Frozen
 from translucent.media import conversion
 from translucent.media.colors import parse_color
 
-Array = npt.NDArray[np.float64]
 Channels = npt.ArrayLike
 
 #: Largest absorption and scattering in 1/m: far beyond any matter, and their products with lengths stay finite.

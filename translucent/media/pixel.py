@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import read_bytes
 from translucent.files.unpacking import open_picture
@@ -16,7 +16,6 @@ from translucent.formulas.color import srgb_to_linear
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-Array = npt.NDArray[np.float64]
 
 _EIGHT_BITS = ("1", "L", "LA", "P", "PA", "RGB", "RGBA")
 _SIXTEEN_BITS = ("RGB;16B", "RGBA;16B")

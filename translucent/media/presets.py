@@ -11,8 +11,8 @@ from importlib.resources import files
 from typing import Literal, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.files.reading import toml_value
 from translucent.formulas.color import to_hex
@@ -20,7 +20,6 @@ from translucent.media.medium import Medium
 from translucent.suggestions import LEAST_PART, close_names, did_you_mean
 from translucent.units import metres_per_unit, parse_length
 
-Array = npt.NDArray[np.float64]
 Kind = Literal["measured", "estimated"]
 Regime = Literal["absorbing", "single scattering", "scattering dominated"]
 Triple = tuple[float, float, float]

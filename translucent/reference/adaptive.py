@@ -6,10 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from translucent.arrays import Array, Integers
 
 #: Values (m, p, 3) of the integrand of intervals (m,) at places (m, p) in them.
 Integrand = Callable[[Integers, Array], Array]

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.reference.borders import Borders, Optics
 from translucent.reference.boxes import Lines
@@ -33,10 +33,6 @@ from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.scene import Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Rays that carry less than this of each color are not followed.
 FAINTEST = 1e-5

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

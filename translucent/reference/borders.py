@@ -13,16 +13,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.formulas.interface import channel_iors
 from translucent.geometry.normals import corner_normals
 from translucent.reference.compositing import _layers
 from translucent.reference.hits import Hits, world_normals
 from translucent.scene.scene import Scene
 from translucent.scene.surface import Surface
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Walls closer together than this share of the scene's diagonal are at one place.
 TOGETHER = 1e-9

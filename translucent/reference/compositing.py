@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.formulas import optics
 from translucent.reference.segments import Segments
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 
 @np.errstate(over="ignore", under="ignore")

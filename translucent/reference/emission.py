@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.formulas import optics
 from translucent.reference.adaptive import integrate
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.volume import Volume, places
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Relative error of what each segment emits: far below that of anything to compare with.
 TOLERANCE = 1e-12

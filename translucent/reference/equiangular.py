@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
 
 #: A light nearer to the line than this share of its distance from the ends counts as this far away. Any distance makes
 #: a valid variable; with this one it keeps its digits where the light is on the line, beyond the ends.

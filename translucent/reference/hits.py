@@ -15,12 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.geometry.mesh import Mesh
 from translucent.scene.camera import Camera, check_size
 from translucent.scene.scene import Object
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 _Arrays = tuple[npt.NDArray[np.generic], ...]
 
 #: Pairs of a triangle and a pixel that are tested at a time: the working arrays stay below 20 MB.

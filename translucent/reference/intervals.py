@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.reference.hits import Hits
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: On a share of the scene's diagonal, rounding may wind a body's surface negatively.
 ROUNDING = 1e-9

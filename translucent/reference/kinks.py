@@ -7,16 +7,13 @@ unless an interval ends there, and miss what is between two of them.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.geometry.grouping import shared_edges
 from translucent.reference.rays import Rays
 from translucent.reference.tracer import TracedObject
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Pairs of an edge and a ray that are looked at together: the working arrays stay below 100 MB.
 PAIRS = 1 << 18

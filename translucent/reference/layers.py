@@ -7,16 +7,14 @@ then it passes 1 - alpha, and adds S (1 - (1 - alpha)) = alpha S.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.opaque import irradiance_at
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import LEAST_COVER
 from translucent.scene.texture import Texture
-
-Array = npt.NDArray[np.float64]
 
 #: Share that an opaque layer leaves: what float32 can hold.
 _LEAST_LEFT = 1e-37

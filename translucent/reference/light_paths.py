@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Mask
 from translucent.formulas import optics
 from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits
@@ -17,10 +17,6 @@ from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight
 from translucent.scene.scene import Light, Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Opaque surfaces within this share of the scene's size of a light, or of a lit place, do not shadow it: it lies on
 #: them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the rest.

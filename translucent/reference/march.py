@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
@@ -28,9 +29,6 @@ from translucent.scene.camera import check_size
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light, Scene
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 Compositing = Literal["front-to-back", "back-to-front"]
 
 #: Samples that are looked at together: the working arrays stay below 500 MB.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.formulas import optics
 from translucent.formulas.interface import (
     ggx_distribution,
@@ -21,10 +21,6 @@ from translucent.reference.legs import Legs
 from translucent.reference.microfacets import scattered_at_border
 from translucent.reference.opaque import irradiance_at, seen_from
 from translucent.scene.lights import PointLight
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Passages of light through a rough sheet after which it counts as lost.
 MOST_PASSAGES = 64

@@ -8,14 +8,10 @@ reflects or refracts by Fresnel and Snell, and no light is lost. Normals as they
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Mask
 from translucent.formulas import optics
 from translucent.formulas.interface import reflected_direction, refracted_direction
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Meetings with microfacets after which light counts as lost; at a roughness of 1 one in a million gets as far.
 MOST_MEETINGS = 100

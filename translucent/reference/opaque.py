@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.rays import Rays
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light, Object, Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.planning.methods import SignedDepth
@@ -25,9 +25,6 @@ from translucent.reference.render import CrossedMedia, crossed_media, scene_hits
 from translucent.reference.volume import places
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Paths that are followed together: the working arrays stay below 500 MB.
 BATCH = 1 << 14

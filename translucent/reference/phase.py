@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
 
 
 def scattered_directions(directions: Array, anisotropy: Array, rng: np.random.Generator) -> Array:

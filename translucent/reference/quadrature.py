@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from translucent.arrays import Array, Integers
+
 Words = npt.NDArray[np.uint64]
 
 _MASK = np.uint64(0xFFFFFFFF)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.planning.methods import Method
 from translucent.reference.bent import BentLight, BentRays
@@ -13,8 +13,6 @@ from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.volume import Volume
 from translucent.scene.scene import Scene
-
-Array = npt.NDArray[np.float64]
 
 #: Borders that a ray may meet, unless told otherwise.
 BOUNCES = 8

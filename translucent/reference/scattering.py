@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.media.medium import MAX_COEFFICIENT
 from translucent.reference.adaptive import integrate
@@ -23,10 +23,6 @@ from translucent.reference.segments import Segments
 from translucent.reference.volume import places
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Segments are cut where they begin, so that a rule of 15 points sees what little of a dense one is seen at all.
 MOST_CUTS = 60

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.formulas import optics
 from translucent.planning.methods import Method, ThinLayer
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.layers import layer_depth, layer_radiance, without_holes
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object, Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: A sheet that lies on an opaque surface is seen: it may be behind it by this share of the scene's diagonal.
 SHEET_ON_OPAQUE = 1e-6

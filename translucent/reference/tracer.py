@@ -10,14 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.hits import Hits, cross_triangles, sorted_hits
 from translucent.scene.scene import Object, Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: The ball around the scene is larger than it by this share.
 MARGIN = 1e-6

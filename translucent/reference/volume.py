@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.formulas import optics
 from translucent.reference.intervals import Intervals
 from translucent.reference.rays import Rays
@@ -14,9 +15,6 @@ from translucent.reference.segments import Segments, _pieces, scene_segments
 from translucent.reference.sheets import Crossings
 from translucent.reference.tracer import center_from
 from translucent.scene.scene import Scene
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 
 class Volume:

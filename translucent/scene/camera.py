@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
-
-Array = npt.NDArray[np.float64]
 
 #: A framed object is smaller than the picture by this factor.
 FRAMING_MARGIN = 1.12

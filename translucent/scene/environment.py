@@ -15,13 +15,13 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 from translucent.media.colors import ColorLike, parse_color
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.lights import positive_triple
 
-Array = npt.NDArray[np.float64]
 EnvironmentKind = Literal["constant", "gradient", "checkerboard", "image"]
 
 #: Stops beyond which no exposure makes sense: the radiance of any image stays far below `lights.MAX_RADIANCE`.

@@ -8,11 +8,10 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.lobes import KEPT, convolved, cosines_between, irradiance_map, sized
-
-Array = npt.NDArray[np.float64]
 
 #: Blurred pictures between roughness 0 and 1, and their rows and columns.
 LEVELS = 8

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frozen import Frozen
 from translucent.scene.lights import MAX_RADIANCE
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 from translucent.scene.camera import MAX_COORDINATE
-
-Array = npt.NDArray[np.float64]
 
 #: Largest radiance, intensity or irradiance: its products with lengths stay within float32.
 MAX_RADIANCE = 1e18

@@ -10,12 +10,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 import scipy.fft
 
+from translucent.arrays import Array
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles
-
-Array = npt.NDArray[np.float64]
 
 #: Rows and columns of the irradiance, which changes slowly.
 IRRADIANCE_SIZE = (64, 128)

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
+
 Indices = npt.NDArray[np.intp]
 
 #: Pairs that are compared at a time: few enough for the memory, and enough for NumPy to be quick.

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
@@ -21,7 +22,6 @@ from translucent.scene.environment import Environment, parse_radiance
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.surface import Surface
 
-Array = npt.NDArray[np.float64]
 Overlap = Literal["add", "union", "priority"]
 Light = PointLight | DirectionalLight
 

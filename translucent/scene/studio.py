@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.scene.environment_map import EnvironmentMap
-
-Array = npt.NDArray[np.float64]
 
 #: Rows of the picture. The edges of the soft boxes are about two pixels wide.
 STUDIO_HEIGHT = 512

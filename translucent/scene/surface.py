@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 from translucent.media.colors import ColorLike, parse_color
 from translucent.media.medium import MAX_IOR
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.texture import Texture
-
-Array = npt.NDArray[np.float64]
 
 #: Largest dispersion, 20 / Abbe number: beyond it the index of red would fall below 1 for any glass.
 MAX_DISPERSION = 10.0

@@ -6,14 +6,12 @@ import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
-
-Array = npt.NDArray[np.float64]
 
 #: Heights that a model is cut into, and points around each, to know what room it takes as it turns.
 CUTS, POINTS_AROUND = 32, 48

@@ -11,8 +11,8 @@ import dataclasses
 import warnings
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import TranslucentWarning
 from translucent.geometry.mesh import Mesh, mended
 from translucent.gltf.accessors import Accessors
@@ -20,7 +20,6 @@ from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.geometry import primitive_mesh
 from translucent.gltf.scene_media import node_transforms, primitives
 
-Array = npt.NDArray[np.float64]
 #: Mesh and primitive of a file.
 Place = tuple[int, int]
 

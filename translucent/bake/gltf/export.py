@@ -13,7 +13,6 @@ from translucent.geometry.grouping import equal_rows
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.file import GltfFile, Json
 
-Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 #: A face whose normal is this far from the smooth one, in degrees, has its own at that corner: an edge stays an edge.

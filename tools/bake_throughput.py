@@ -1,6 +1,6 @@
 """How many rays a second a bake traces, beside Embree alone on the same rays.
 
-Run it with ``python -m translucent.bake.throughput [MESH] [--size 1024] [--rays 64] [--threads N] [--rounds 3]``.
+Run it with ``python tools/bake_throughput.py [MESH] [--size 1024] [--rays 64] [--threads N] [--rounds 3]``.
 """
 
 from __future__ import annotations
