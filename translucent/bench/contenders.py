@@ -81,7 +81,7 @@ class Contender:
     @property
     def fitted(self) -> bool:
         """Whether its thickness, in solids, is chosen to fit the truth best."""
-        return self.technique in ("constant", "ball") or isinstance(self.method, ThinLayer)
+        return self.technique in ("constant", "ball") or self.method.makes_sheets
 
     def refusal(self, scene: Scene) -> str | None:
         """Why it is not measured on a scene though the planner would run it."""

@@ -179,15 +179,16 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
 
 def read_method(name: str | None, thickness: str | None) -> Method | None:
     """The thickness method of this name, if there is one."""
-    from translucent.planning.methods import ThinLayer, method_from_name
+    from translucent.planning.methods import METHODS, method_from_name
     from translucent.units import parse_length
 
     method = method_from_name(name) if name else None
     if thickness is None:
         return method
-    if not isinstance(method, ThinLayer):
-        raise InputError("--thickness", "only --method thin-layer takes it", "add --method thin-layer")
-    return ThinLayer(parse_length(thickness))
+    if method is None or not method.makes_sheets:
+        names = " or ".join(name for name, known in METHODS.items() if known.makes_sheets)
+        raise InputError("--thickness", f"only --method {names} takes it", f"add --method {names}")
+    return method.with_thickness(parse_length(thickness))
 
 
 def look_options(command: F) -> F:

@@ -145,7 +145,7 @@ def _marks(checks: Checks, mesh: Mesh, camera: Camera, policies: tuple[Overlap, 
             name = "planned" if method is None else type(method).__name__
             what = f"{policy}, {name}: defective pixels not marked, of {int(defective.sum())}"
             checks.error(what, (defective & frame.valid).sum())
-            if not isinstance(method, SignedDepth):
+            if method is None or method.ordered:
                 checks.holds("none too many", not (truth.valid & inside & ~frame.valid).any())
 
 
