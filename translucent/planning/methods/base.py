@@ -42,6 +42,8 @@ class Method:
         Follows lights into media that scatter.
     finds_exits : bool
         Tells where each ray first leaves all bodies.
+    peels : bool
+        Draws the geometry again for every layer or two.
     marches : bool
         Steps through the intervals, so that what fills them may vary.
     """
@@ -55,6 +57,7 @@ class Method:
     needs_storage: ClassVar[bool] = False
     samples_lights: ClassVar[bool] = False
     finds_exits: ClassVar[bool] = False
+    peels: ClassVar[bool] = False
     marches: ClassVar[bool] = False
 
     @property

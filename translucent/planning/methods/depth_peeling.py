@@ -37,6 +37,7 @@ class DepthPeeling(Method):
     name: ClassVar[str] = "depth-peeling"
     cost: ClassVar[float] = 2.4  # of each draw
     ordered: ClassVar[bool] = True
+    peels: ClassVar[bool] = True
 
     max_layers: int = 64
     order: Literal["both-ends", "front-to-back", "back-to-front"] = "both-ends"
