@@ -18,8 +18,8 @@ from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.borders import check_borders
-from translucent.planning.limits import LIGHTS_LEFT_OUT
 from translucent.planning.methods import Method
+from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan, plan_over_backdrop
 from translucent.planning.render_plan import Borders, RenderPlan
 from translucent.scene.backdrop import Backdrop
@@ -315,8 +315,9 @@ def _check_backdrop(backdrop: Backdrop | TextureBackdrop, size: tuple[int, int])
 
 
 def _warn(frame: Frame) -> None:
-    if LIGHTS_LEFT_OUT in frame.plan.unmodelled:
-        warnings.warn(LIGHTS_LEFT_OUT, TranslucentWarning, stacklevel=3)
+    for effect in frame.plan.unmodelled:
+        if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
+            warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
     if invalid := int(np.count_nonzero(~frame.valid)):
         covered = int(np.count_nonzero(frame.coverage))
         why = "; ".join(frame.plan.limits) or "a surface that does not balance"

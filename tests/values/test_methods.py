@@ -3,21 +3,51 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.planning.methods import METHODS, method_from_name
+from tests.values.plan_scenes import SCENES
+from translucent.bench.contenders import CONTENDERS
+from translucent.planning.methods import METHODS, Method, method_from_name
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.planning.methods.k_buffer import MAX_K
+from translucent.planning.plan import plan
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_a_method_has_a_name(name: str) -> None:
     for written in (name, name.upper(), name.replace("-", "_")):
         assert method_from_name(written) == METHODS[name]()
+
+
+@pytest.mark.parametrize("method", METHODS.values())
+def test_a_method_is_whole(method: type[Method]) -> None:
+    """It has a cost, passes of its own with reasons, and a row in the report; the README tells of it."""
+    default, scene = method(), SCENES["convex"]
+    found = default.passes(scene, "asked for")
+    assert method.cost > 0
+    assert found
+    assert all(step.reason and step.objects and step.cost > 0 for step in found)
+    assert set(found) <= set(plan(scene, default).passes)
+    assert {row.name for row in CONTENDERS if type(row.method) is method and row.kind == "method"}
+    assert re.search(rf"\b{method.__name__}\(", (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("method", METHODS.values())
+def test_traits_agree_with_each_other(method: type[Method]) -> None:
+    default = method()
+    assert (default.usual_thickness is not None) == method.makes_sheets
+    assert (default.with_thickness(0.25).usual_thickness == 0.25) == method.makes_sheets
+    assert default.light_points == 1 or method.samples_lights
+    # Without an order there are no single surfaces to peel, to count, to light or to step between.
+    assert method.ordered or not (
+        method.peels or method.samples_lights or method.finds_exits or method.marches or default.layer_limit
+    )
+    assert not (method.ordered and (method.makes_sheets or method.convex_only))
 
 
 def test_a_misspelt_method_is_guessed() -> None:
@@ -28,8 +58,8 @@ def test_a_misspelt_method_is_guessed() -> None:
 
 @pytest.mark.parametrize("name", ["magic", ""])
 def test_an_unknown_method_names_the_known_ones(name: str) -> None:
-    known = "signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists, k-buffer"
-    with pytest.raises(tl.InputError, match=f"^method '{name}'; not a known method; use one of {known}"):
+    known = ", ".join(METHODS)
+    with pytest.raises(tl.InputError, match=f"^method '{name}'; not a known method; use one of {known}$"):
         method_from_name(name)
 
 

@@ -25,7 +25,9 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.planning.plan import COSTS, plan, plan_over_backdrop
+from translucent.planning.assembly import COSTS
+from translucent.planning.methods import METHODS
+from translucent.planning.plan import plan, plan_over_backdrop
 from translucent.planning.render_plan import Capabilities
 
 # The table of the planner: what a scene has, the passes it gets, how often geometry is drawn, and whether that is exact
@@ -294,3 +296,4 @@ assert not found, found
 
 def test_every_cost_is_above_zero() -> None:
     assert min(COSTS.values()) > 0
+    assert all(method.cost > 0 for method in METHODS.values())

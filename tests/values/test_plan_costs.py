@@ -25,8 +25,19 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
-from translucent.planning.plan import COSTS, plan
-from translucent.planning.render_plan import PassSpec, RenderPlan
+from translucent.planning.assembly import COSTS
+from translucent.planning.methods import METHODS
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import RenderPlan
+
+#: Of passes that methods have, and of those that any plan has.
+TIMES = {
+    **{name.replace("-", "_"): method.cost for name, method in METHODS.items()},
+    "signed_depth_spectral": tl.SignedDepth.spectral_cost,
+    **COSTS,
+}
 
 
 @pytest.mark.parametrize(
@@ -46,14 +57,14 @@ from translucent.planning.render_plan import PassSpec, RenderPlan
 )
 def test_a_plan_costs_what_its_passes_cost(kind: str, method: Any, steps: list[str]) -> None:
     found = plan(SCENES[kind], method)
-    assert [step.cost for step in found.passes] == [COSTS[name] for name in (*steps, "resolve")]
-    assert found.cost == pytest.approx(sum(COSTS[name] for name in (*steps, "resolve")), rel=1e-12)
+    assert [step.cost for step in found.passes] == [TIMES[name] for name in (*steps, "resolve")]
+    assert found.cost == pytest.approx(sum(TIMES[name] for name in (*steps, "resolve")), rel=1e-12)
 
 
 def test_spectral_fallbacks_cost_more() -> None:
     one, two = (plan(scene(body(mesh=OPEN), body(), body(medium))) for medium in (GLASS, WINE))
     assert one.passes[2].name == two.passes[2].name == "signed_depth_fallback"
-    assert (one.passes[2].cost, two.passes[2].cost) == (COSTS["signed_depth"], COSTS["signed_depth_spectral"])
+    assert (one.passes[2].cost, two.passes[2].cost) == (tl.SignedDepth.cost, tl.SignedDepth.spectral_cost)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +88,7 @@ def test_peeling_draws_once_for_every_layer_or_two(
     objects: list[tl.Object], method: tl.DepthPeeling, draws: int
 ) -> None:
     step = next(step for step in plan(scene(*objects), method).passes if step.name == "depth_peeling")
-    assert (step.geometry_passes, step.cost) == (draws, draws * COSTS["depth_peeling"])
+    assert (step.geometry_passes, step.cost) == (draws, draws * tl.DepthPeeling.cost)
 
 
 def test_a_concave_body_is_expected_to_have_more_layers() -> None:
@@ -93,12 +104,12 @@ def test_the_cheaper_of_the_ordered_methods_is_chosen(
     objects: list[tl.Object], draws: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for cost, name in ((draws - 0.01, "fragment_lists"), (draws + 0.01, "depth_peeling")):
-        monkeypatch.setitem(COSTS, "fragment_lists", cost * COSTS["depth_peeling"])
+        monkeypatch.setattr(tl.FragmentLists, "cost", cost * tl.DepthPeeling.cost)
         assert names(plan(scene(*objects))) == [name, "transmittance"]
 
 
 def test_a_method_that_leaves_surfaces_out_is_never_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(COSTS, "k_buffer", 0.01)
+    monkeypatch.setattr(tl.KBuffer, "cost", 0.01)
     for given_scene in SCENES.values():
         assert not isinstance(plan(given_scene).method, tl.KBuffer)
 
@@ -190,9 +201,12 @@ def test_every_plan_draws_everything_and_says_why(kinds: list[str], overlap: Any
 
 
 def test_the_cost_of_a_plan_is_the_sum_of_its_passes() -> None:
-    passes = (PassSpec("a", "first", (0,), 2, cost=1.25), PassSpec("b", "second", (0, 1), 3, cost=2.5))
+    passes = (
+        PassSpec(PassName.OPAQUE, "first", (0,), 2, cost=1.25),
+        PassSpec(PassName.K_BUFFER, "second", (0, 1), 3, cost=2.5),
+    )
     found = RenderPlan(tl.SignedDepth(), passes)
     assert (found.cost, found.geometry_passes) == (3.75, 5)
     assert found.exact
-    assert not RenderPlan(tl.SignedDepth(), passes, limits=("a hole",)).exact
-    assert RenderPlan(tl.SignedDepth(), passes, unmodelled=("shadows",)).exact
+    assert not RenderPlan(tl.SignedDepth(), passes, limits=(Note(NoteKind.OPEN_MESH, "a hole"),)).exact
+    assert RenderPlan(tl.SignedDepth(), passes, unmodelled=(Note(NoteKind.SHADOWS, "shadows"),)).exact

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 from translucent.bench.row import Kind
 from translucent.errors import InputError
 from translucent.planning.methods import (
+    METHODS,
     BackFaceDepth,
     DepthPeeling,
     FragmentLists,
@@ -81,7 +82,7 @@ class Contender:
     @property
     def fitted(self) -> bool:
         """Whether its thickness, in solids, is chosen to fit the truth best."""
-        return self.technique in ("constant", "ball") or isinstance(self.method, ThinLayer)
+        return self.technique in ("constant", "ball") or self.method.makes_sheets
 
     def refusal(self, scene: Scene) -> str | None:
         """Why it is not measured on a scene though the planner would run it."""
@@ -146,12 +147,19 @@ def _marched() -> Iterable[Contender]:
             yield Contender(name, "RayMarched", method, effects=_SOURCES, quick=rule == "equiangular")
 
 
+def _as_they_are() -> Iterable[Contender]:
+    """The methods without parameters that would be worth rows of their own: none is left out."""
+    for method in METHODS.values():
+        if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched):
+            yield Contender(method.__name__, method.__name__, method())
+
+
 CONTENDERS: tuple[Contender, ...] = (
     Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
     Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
     Contender("ThinLayer", "ThinLayer", ThinLayer(), ior="matched"),
     Contender("ThinLayer, refracted", "ThinLayer", ThinLayer(), quick=False, ior="refracted"),
-    Contender("BackFaceDepth", "BackFaceDepth", BackFaceDepth()),
+    *_as_they_are(),
     Contender(
         "BackFaceDepth, unmarked",
         "BackFaceDepth",

@@ -17,7 +17,8 @@ from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.methods import RayMarched, SignedDepth
-from translucent.planning.render_plan import PassSpec, RenderPlan
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.render_plan import RenderPlan
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
@@ -59,7 +60,7 @@ class Studio:
         self.clock = time.process_time if is_software(renderer) else time.perf_counter
         self._passes: dict[type[Pass], Pass] = {}
 
-    def step(self, name: str) -> Pass:
+    def step(self, name: PassName) -> Pass:
         """The pass of this name in plans."""
         kind = PASSES[name]
         if kind not in self._passes:
@@ -117,7 +118,7 @@ class Floor:
     def __init__(self, studio: Studio, scene: Scene, targets: Targets) -> None:
         self._bodies = tuple(i for i, item in enumerate(scene.objects) if item.medium is not None)
         opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
-        self._staging = (PassSpec("opaque", "staging", opaque, 1),) if opaque else ()
+        self._staging = (PassSpec(PassName.OPAQUE, "staging", opaque, 1),) if opaque else ()
         self._studio = studio
         self._job = FrameJob(studio.gl, scene, RenderPlan(SignedDepth(), self._staging), targets, studio.resources)
         self._pass = DepthOnlyPass(studio.gl)
@@ -173,7 +174,7 @@ class Short(_OnGpu):
     """A shortcut in place of the passes over geometry, and the shading of signed depth."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan, shortcut: Shortcut) -> None:
-        shading = tuple(spec for spec in plan.passes if spec.name == "transmittance")
+        shading = tuple(spec for spec in plan.passes if spec.name is PassName.TRANSMITTANCE)
         super().__init__(studio, scene, targets, RenderPlan(SignedDepth(), shading, plan.spectral))
         self._shortcut = shortcut
 

@@ -22,7 +22,6 @@ from translucent.bench.truth import Truth
 from translucent.errors import InputError, TranslucentError, TranslucentWarning
 from translucent.frames.frame import Frame
 from translucent.gpu.targets import Targets
-from translucent.planning.methods import DepthPeeling
 from translucent.planning.render_plan import RenderPlan
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -155,7 +154,7 @@ class CaseRun:
                     lambda name, error: failures.update({name: error}),
                 )
                 for entry in ready:
-                    if isinstance(entry.contender.method, DepthPeeling) and entry.row.method in found:
+                    if entry.contender.method.peels and entry.row.method in found:
                         entry.row = _peeled(entry)
         finally:
             for entry in ready:
@@ -163,7 +162,10 @@ class CaseRun:
                     entry.drawn.release()
             floor.release()
             targets.release()
-        rows = [_with_times(entry.row, found.get(entry.row.method), failures) for entry in self._entries]
+        rows = [
+            _with_times(entry.row, found.get(entry.row.method), failures, peeled=entry.contender.method.peels)
+            for entry in self._entries
+        ]
         return [_floor_row(list(found.values())), *rows]
 
 
@@ -264,7 +266,7 @@ def _peeled(entry: _Entry) -> Row:
     return dataclasses.replace(entry.row, layers=layers, passes=-(-layers // 2) + bool(frame.truncated.any()))
 
 
-def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception]) -> Row:
+def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception], *, peeled: bool) -> Row:
     if samples is None:
         if (error := failures.get(row.method)) is None:
             return row
@@ -273,7 +275,6 @@ def _with_times(row: Row, samples: Samples | None, failures: dict[str, Exception
             return dataclasses.replace(row, refusal=one_line(error))
         return dataclasses.replace(row, failure=one_line(error))
     wall = timing(samples.wall)
-    peeled = row.family == "DepthPeeling" and wall is not None and row.layers
     return dataclasses.replace(
         row,
         wall=wall,

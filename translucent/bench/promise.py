@@ -4,9 +4,22 @@ from __future__ import annotations
 
 from translucent.bench.contenders import Contender
 from translucent.bench.row import Quantity
-from translucent.planning.methods import RayMarched
+from translucent.planning.notes import NoteKind
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Object, Scene
+
+#: Light that a sum of one event each does not have; rows say so by their effect.
+_LIT = (NoteKind.SCATTERED_AGAIN,)
+
+#: What changes pictures, and leaves the thickness along straight rays as it is.
+_BESIDE_THICKNESS = (
+    *_LIT,
+    NoteKind.LIGHTS_LEFT_OUT,
+    NoteKind.ONLY_REMOVES,
+    NoteKind.REFRACTION,
+    NoteKind.LATER_REFRACTION,
+)
 
 
 def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
@@ -18,18 +31,16 @@ def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Q
     if contender.technique == "half":
         return "none: 11 bits for sums of signed distances", False
     if contender.technique == "march":
-        return f"sums over {getattr(contender.method, 'steps', 0)} steps in each interval", False
-    if isinstance(contender.method, RayMarched) and any(map(_shines, scene.bodies)):
-        return f"sums over {contender.method.steps} steps in each interval", False
-    if any(step.name == "light_views" for step in plan.passes):
-        points = getattr(contender.method, "light_points", 0)
+        return f"sums over {contender.method.light_points} steps in each interval", False
+    if contender.method.marches and any(map(_shines, scene.bodies)):
+        return f"sums over {contender.method.light_points} steps in each interval", False
+    if plan.has(PassName.LIGHT_VIEWS):
+        points = contender.method.light_points
         return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
     if contender.kind == "counter-example" and contender.ior == "matched":
         return "none: borders are left out", False
-    # Thickness is that of straight rays.
-    lit = ("light scattered more",)
-    beside = (*lit, "in-scattered light", "refraction") if quantity == "thickness" else lit
-    missing = [effect for effect in plan.unmodelled if not effect.startswith(beside)]
+    beside = _BESIDE_THICKNESS if quantity == "thickness" else _LIT
+    missing = [effect for effect in plan.unmodelled if effect.kind not in beside]
     limits = [*plan.limits, *missing]
     return "; ".join(limits) or "exact", not limits
 

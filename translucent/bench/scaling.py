@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from translucent.bench.contenders import CONTENDERS
 from translucent.bench.drawing import Floor, Planned, Size, Studio, is_software
 from translucent.bench.measure import one_line
 from translucent.bench.record import ScalePoint, Series
@@ -142,9 +143,8 @@ class ScalingRun:
 
 
 def _label(method: Method) -> str:
-    if isinstance(method, DepthPeeling):
-        return "DepthPeeling, all layers"
-    return f"KBuffer, k = {method.k}" if isinstance(method, KBuffer) else type(method).__name__
+    """As the row of the method is called."""
+    return next((row.name for row in CONTENDERS if row.method == method), type(method).__name__)
 
 
 def _ladders(software: bool) -> list[Ladder]:

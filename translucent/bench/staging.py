@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import cast
 
 from translucent.bench.contenders import REFRACTED_IOR, Contender
 from translucent.bench.drawing import Drawing, OnProcessor, Planned, Short, Studio
@@ -43,7 +44,8 @@ def drawing(
     """The contender's frame, ready to be drawn; `size` is the thickness that a shortcut assumes, in metres."""
     if contender.technique in ("cpu", "march"):
         assert cpu is not None, "there is a plan for it"
-        march = contender.method if isinstance(contender.method, RayMarched) else None
+        # What the reference marches by is `RayMarched`, as it checks.
+        march = cast("RayMarched", contender.method) if contender.technique == "march" else None
         return OnProcessor(studio, cpu, scene, targets.size, march)
     if contender.technique == "plan":
         return Planned(studio, scene, targets, plan)

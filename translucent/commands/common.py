@@ -177,17 +177,39 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
 
 
+class _MethodOption(click.Option):
+    """An option whose help names the methods, which are imported only where it is shown."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from translucent.planning.methods import METHODS
+
+        record = super().get_help_record(ctx)
+        *names, last = METHODS
+        sheets = " and ".join(name for name, method in METHODS.items() if method.makes_sheets)
+        told = (
+            f"{', '.join(names)} or {last}. Default: by plan. Without OpenGL all but {sheets} give way to all surfaces "
+            "on each ray."
+        )
+        return None if record is None else (record[0], told)
+
+
+def method_option(command: F) -> F:
+    """The option for how thickness is found."""
+    return click.option("--method", "method_name", cls=_MethodOption, metavar="NAME")(command)
+
+
 def read_method(name: str | None, thickness: str | None) -> Method | None:
     """The thickness method of this name, if there is one."""
-    from translucent.planning.methods import ThinLayer, method_from_name
+    from translucent.planning.methods import METHODS, method_from_name
     from translucent.units import parse_length
 
     method = method_from_name(name) if name else None
     if thickness is None:
         return method
-    if not isinstance(method, ThinLayer):
-        raise InputError("--thickness", "only --method thin-layer takes it", "add --method thin-layer")
-    return ThinLayer(parse_length(thickness))
+    if method is None or not method.makes_sheets:
+        names = " or ".join(name for name, known in METHODS.items() if known.makes_sheets)
+        raise InputError("--thickness", f"only --method {names} takes it", f"add --method {names}")
+    return method.with_thickness(parse_length(thickness))
 
 
 def look_options(command: F) -> F:

@@ -14,6 +14,7 @@ from translucent.commands.common import (
     common_options,
     look_options,
     medium_options,
+    method_option,
     outside_option,
     overwrite_option,
     read_environment,
@@ -58,13 +59,7 @@ if TYPE_CHECKING:
 @click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
 @click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
 @look_options
-@click.option(
-    "--method",
-    "method_name",
-    metavar="NAME",
-    help="signed-depth, back-face-depth, thin-layer, depth-peeling, fragment-lists, k-buffer or ray-marched. "
-    "Default: by plan. Without OpenGL all but thin-layer give way to all surfaces on each ray.",
-)
+@method_option
 @borders_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")

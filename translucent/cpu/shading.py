@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.cpu.view import slices
-from translucent.planning.plan import FALLBACK_SHEET
+from translucent.planning.assembly import FALLBACK_SHEET
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.reference import Hits, Rays, shade_hits, sheet_thicknesses
 from translucent.scene.scene import Scene
@@ -47,7 +48,7 @@ class Shader:
     def of(cls, scene: Scene, plan: RenderPlan) -> Shader:
         """As a plan of the scene wants it."""
         sheets = sheet_thicknesses(scene, plan.method)
-        drawn = {i for step in plan.passes if step.name == "thin_layer_fallback" for i in step.objects}
+        drawn = {i for step in plan.passes if step.name is PassName.THIN_LAYER_FALLBACK for i in step.objects}
         diagonals = [float(np.linalg.norm(body.bounds[1] - body.bounds[0])) for body in scene.objects]
         fallback = tuple(
             FALLBACK_SHEET * diagonals[i] if i in drawn and metres is None else metres

@@ -9,19 +9,22 @@ from typing import get_args
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.planning.methods import Method, ThinLayer
-from translucent.planning.render_plan import Borders, PassSpec, RenderPlan
+from translucent.planning.methods import Method
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.render_plan import Borders, RenderPlan
 from translucent.planning.slots import overlapping_pair
 from translucent.scene.scene import Object, Scene, object_names
 
 #: What a plan says in which rays bend at the front border alone.
-ONE_BORDER = (
+ONE_BORDER = Note(
+    NoteKind.ONE_BORDER,
     'borders="front": bends once, where a ray enters; leaves without bending: rays leave curved bodies in wrong '
-    "directions"
+    "directions",
 )
 
 #: Time of the passes over borders with one border, as a share of that with two, as measured on a software rasteriser.
-_FRONT_COST = {"interfaces": 0.4, "surfaces": 0.45}
+_FRONT_COST = {PassName.INTERFACES: 0.4, PassName.SURFACES: 0.45}
 
 
 def border_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: float) -> tuple[PassSpec, ...]:
@@ -30,22 +33,30 @@ def border_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: fl
     if not objects:
         return ()
     names = _names(scene, objects)
-    if isinstance(method, ThinLayer) or all(scene.objects[i].sheet_thickness is not None for i in objects):
+    if method.makes_sheets or all(scene.objects[i].sheet_thickness is not None for i in objects):
         # What bends on entering a sheet bends back on leaving it: each has one border, that towards the eye.
         return (
             PassSpec(
-                "interfaces",
+                PassName.INTERFACES,
                 f"{names}: normal and place of the sheet that a ray meets first",
                 objects,
                 1,
-                cost=draw_cost * _FRONT_COST["interfaces"],
+                cost=draw_cost * _FRONT_COST[PassName.INTERFACES],
             ),
-            PassSpec("surfaces", f"{_effects(scene, bends=False)}; rays go straight through sheets", cost=shade_cost),
+            PassSpec(
+                PassName.SURFACES,
+                f"{_effects(scene, bends=False)}; rays go straight through sheets",
+                cost=shade_cost,
+            ),
         )
     found = f"{names}: normal and place of the border where a ray enters, and of the one where it leaves"
     return (
-        PassSpec("interfaces", found, objects, 2, cost=draw_cost),
-        PassSpec("surfaces", f"{_effects(scene)}; the path through the first interval bends with it", cost=shade_cost),
+        PassSpec(PassName.INTERFACES, found, objects, 2, cost=draw_cost),
+        PassSpec(
+            PassName.SURFACES,
+            f"{_effects(scene)}; the path through the first interval bends with it",
+            cost=shade_cost,
+        ),
     )
 
 
@@ -63,9 +74,9 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
     InputError
         If rays start inside such a body: they have no front border.
     """
-    found = [i for step in plan.passes if step.name == "interfaces" for i in step.objects]
+    found = [i for step in plan.passes if step.name is PassName.INTERFACES for i in step.objects]
     solids = [scene.objects[i] for i in found if scene.objects[i].sheet_thickness is None]
-    if not solids or isinstance(plan.method, ThinLayer):
+    if not solids or plan.method.makes_sheets:
         return plan
     for body in solids:
         if _starts_inside(scene, body):
@@ -75,8 +86,8 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
                 'use borders="both", or move the camera outside',
             )
     told = {
-        "interfaces": f"{_names(scene, found)}: normal and place of the border where a ray enters",
-        "surfaces": f"{_effects(scene)}; rays bend where they enter and go straight on",
+        PassName.INTERFACES: f"{_names(scene, found)}: normal and place of the border where a ray enters",
+        PassName.SURFACES: f"{_effects(scene)}; rays bend where they enter and go straight on",
     }
     passes = tuple(
         replace(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.bodies import indices
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Object, Scene
 
 
 def layer_passes(scene: Scene, cost: float) -> tuple[PassSpec, ...]:
     """The pass that paints layers, and what borders of bodies glow; none where nothing covers or glows."""
-    layers, glowing = (_indices(scene, keep) for keep in (_covers, _glows))
+    layers, glowing = (indices(scene, keep) for keep in (_covers, _glows))
     if not layers and not glowing:
         return ()
     reasons = []
@@ -20,24 +22,26 @@ def layer_passes(scene: Scene, cost: float) -> tuple[PassSpec, ...]:
         )
     if glowing:
         reasons.append(f"{_names(scene, glowing)}: the surface glows")
-    return (PassSpec("layers", "; ".join(reasons), tuple(sorted((*layers, *glowing))), 1, cost=cost),)
+    return (PassSpec(PassName.LAYERS, "; ".join(reasons), tuple(sorted((*layers, *glowing))), 1, cost=cost),)
 
 
-def layer_effects(scene: Scene, *, borders: bool) -> list[str]:
+def layer_effects(scene: Scene, *, borders: bool) -> list[Note]:
     """What is not rendered of them; `borders` as for `unmodelled_effects`."""
     effects = []
-    if layers := _names(scene, _indices(scene, _covers)):
-        effects.append(
+    if layers := _names(scene, indices(scene, _covers)):
+        text = (
             f"{layers}: layers cast no shadows, rays that bend do not meet them, all media on a ray dim those behind "
             "its first body, and they are painted object by object, far ones first, also where they cross"
             if borders
             else f"what layers mirror: {layers} show diffuse light alone"
         )
-    if glowing := _names(scene, _indices(scene, _glows)):
+        effects.append(Note(NoteKind.LAYERS, text))
+    if glowing := _names(scene, indices(scene, _glows)):
         what = "add it where a ray first enters a body, and nowhere behind" if borders else "not at all"
-        effects.append(f"light of surfaces that glow: {glowing} {what}")
-    if cut := _names(scene, _indices(scene, _wants_holes)):
-        effects.append(f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside")
+        effects.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {glowing} {what}"))
+    if cut := _names(scene, indices(scene, _wants_holes)):
+        text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
+        effects.append(Note(NoteKind.HOLES, text))
     return effects
 
 
@@ -54,10 +58,6 @@ def _wants_holes(item: Object) -> bool:
         return False
     varies = item.surface.color_texture is not None or item.mesh.colors is not None
     return item.surface.alpha_cutoff > 0 and varies
-
-
-def _indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
-    return tuple(i for i, item in enumerate(scene.objects) if keep(item))
 
 
 def _names(scene: Scene, objects: Iterable[int]) -> str:

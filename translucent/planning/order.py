@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from translucent.planning.bodies import media_differ
 from translucent.planning.borders import touching_borders
-from translucent.planning.methods import BackFaceDepth, Method, ThinLayer
+from translucent.planning.methods import Method
 from translucent.planning.render_plan import Borders
-from translucent.planning.slots import MAX_SLOTS, medium_slots, overlapping_pair, same_medium
+from translucent.planning.slots import MAX_SLOTS, medium_slots, overlapping_pair
 from translucent.scene.scene import Scene
 
 
@@ -18,8 +19,10 @@ def why_order_matters(scene: Scene, method: Method | None, borders: Borders) -> 
         return touching
     if method is None and (why := _inside_out(scene)) is not None:
         return why
-    # Sheets have no inside to overlap, and back-face depth marks the pixels that enter more than once.
-    if scene.overlap == "add" or isinstance(method, BackFaceDepth | ThinLayer):
+    if scene.overlap == "add":
+        return None
+    # Sheets have no inside to overlap, and pixels that enter more than once may be marked.
+    if method is not None and (method.makes_sheets or method.convex_only):
         return None
     solids = [body for body in bodies if body.sheet_thickness is None]
     if (found := overlapping_pair(solids)) is not None:
@@ -40,8 +43,3 @@ def _inside_out(scene: Scene) -> str | None:
     if not broken or len(medium_slots(scene)) > MAX_SLOTS:
         return None
     return f"{broken[0].mesh.name!r} is inside out in places, and a sum does not tell which pixels show one"
-
-
-def media_differ(scene: Scene) -> bool:
-    """Whether not all bodies are filled with the same medium."""
-    return any(not same_medium(scene.bodies[0], body) for body in scene.bodies[1:])

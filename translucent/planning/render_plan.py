@@ -1,11 +1,15 @@
-"""What a plan is made of: passes, each with its reason and its expected cost, and what the machine can do."""
+"""The plan of a frame: its method, passes and notes; and what the machine can do that it is made for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from translucent.planning.methods import Method, ThinLayer
+from translucent.planning.methods import Method
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+
+__all__ = ["Borders", "Capabilities", "PassSpec", "RenderPlan"]
 
 #: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
 Borders: TypeAlias = Literal["both", "front"]
@@ -32,35 +36,6 @@ class Capabilities:
 
 
 @dataclass(frozen=True)
-class PassSpec:
-    """One pass of a plan.
-
-    Attributes
-    ----------
-    name : str
-        What the pass is called in `Frame.seconds`.
-    reason : str
-        Why the scene needs it.
-    objects : tuple of int
-        Indices into `Scene.objects` of what it draws; empty for a pass over pixels.
-    geometry_passes : int
-        How often it draws them, or for depth peeling is expected to.
-    target : {"accumulated", "fallback", "unlit"}
-        Where its paths add up: the fallback is read where the other does not balance, and pixels are marked invalid
-        where there is any in the last.
-    cost : float
-        Expected time, in multiples of drawing the same objects into a depth buffer.
-    """
-
-    name: str
-    reason: str
-    objects: tuple[int, ...] = ()
-    geometry_passes: int = 0
-    target: Literal["accumulated", "fallback", "unlit"] = "accumulated"
-    cost: float = 0.0
-
-
-@dataclass(frozen=True)
 class RenderPlan:
     """What runs and why.
 
@@ -72,9 +47,9 @@ class RenderPlan:
         In order.
     spectral : bool
         The passes add up optical depth per channel, since media differ, and not only thickness.
-    limits : tuple of str
+    limits : tuple of Note
         Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
-    unmodelled : tuple of str
+    unmodelled : tuple of Note
         What the scene asks for and no pass renders.
     borders : {"both", "front"}
         Where rays bend, if anything in the scene bends them.
@@ -86,8 +61,8 @@ class RenderPlan:
     method: Method
     passes: tuple[PassSpec, ...]
     spectral: bool = False
-    limits: tuple[str, ...] = ()
-    unmodelled: tuple[str, ...] = ()
+    limits: tuple[Note, ...] = ()
+    unmodelled: tuple[Note, ...] = ()
     borders: Borders = "both"
     traced: bool = False
 
@@ -97,7 +72,8 @@ class RenderPlan:
         if not self.traced:
             return str(self.method)
         what = "all surfaces on each ray, in float64"
-        return f"{what}, as sheets of {self.method.thickness:g} m" if isinstance(self.method, ThinLayer) else what
+        sheet = self.method.usual_thickness
+        return what if sheet is None else f"{what}, as sheets of {sheet:g} m"
 
     @property
     def exact(self) -> bool:
@@ -119,6 +95,14 @@ class RenderPlan:
         """Expected time, in depth-only draws: the sum over the passes, each in draws of its own objects."""
         return sum(step.cost for step in self.passes)
 
+    def has(self, *names: PassName) -> bool:
+        """Whether any of the passes has one of these names."""
+        return any(step.name in names for step in self.passes)
+
+    def says(self, kind: NoteKind) -> bool:
+        """Whether there is a note of this kind among its limits, or among what it does not model."""
+        return any(note.kind is kind for note in (*self.limits, *self.unmodelled))
+
     def summary(self) -> dict[str, object]:
         """The plan in values that JSON can hold."""
         return {
@@ -128,15 +112,15 @@ class RenderPlan:
             "cost": round(self.cost, 2),
             "passes": [
                 {
-                    "name": step.name,
+                    "name": step.name.value,
                     "reason": step.reason,
                     "geometry_passes": step.geometry_passes,
                     "cost": round(step.cost, 2),
                 }
                 for step in self.passes
             ],
-            "limits": list(self.limits),
-            "unmodelled": list(self.unmodelled),
+            "limits": [str(note) for note in self.limits],
+            "unmodelled": [str(note) for note in self.unmodelled],
         }
 
     def __str__(self) -> str:

@@ -27,6 +27,7 @@ from translucent.geometry.solids import Box
 from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.preview.elsewhere import Companion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
@@ -151,7 +152,7 @@ def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
         for plan in plans
         for step in plan.passes
         for i in step.objects
-        if step.name == "interfaces" or (step.name == "opaque" and scene.objects[i].surface is not None)
+        if step.name is PassName.INTERFACES or (step.name is PassName.OPAQUE and scene.objects[i].surface is not None)
     }
     meshes = (scene.objects[i].mesh for i in sorted(drawn))
     return [mesh for mesh in meshes if len(mesh.faces) > SMOOTHED_AT_ONCE and not has_drawn_normals(mesh)]

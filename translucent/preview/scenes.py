@@ -14,7 +14,7 @@ from translucent.errors import InputError
 from translucent.geometry.normals import drawn_normals
 from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
-from translucent.planning.methods import Method, ThinLayer, method_from_name
+from translucent.planning.methods import Method, method_from_name
 from translucent.preview.document import AUTO, Document, Look, Material, Model
 from translucent.preview.orbiting import camera_of
 from translucent.scene.environment import Environment
@@ -178,5 +178,4 @@ def method_of(name: str, material: Material) -> Method | None:
     """The method of a name; a thin layer is as thick as the material says."""
     if name == AUTO:
         return None
-    method = method_from_name(name)
-    return ThinLayer(material.thickness) if isinstance(method, ThinLayer) else method
+    return method_from_name(name).with_thickness(material.thickness)

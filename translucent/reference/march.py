@@ -14,8 +14,10 @@ from translucent.arrays import Array, Integers, Mask
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
-from translucent.planning.methods import RayMarched
-from translucent.planning.render_plan import PassSpec, RenderPlan
+from translucent.planning.methods import Method, RayMarched
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.render_plan import RenderPlan
 from translucent.reference import blending
 from translucent.reference.blending import Layer
 from translucent.reference.compositing import _layers
@@ -93,8 +95,8 @@ def march(
         **{name: array.reshape(height, width, *array.shape[1:]) for name, array in arrays.items()},
         plan=RenderPlan(
             scheme.method,
-            (PassSpec("march", f"asked for: {scheme}"),),
-            limits=(f"sums over {scheme.method.steps} steps in each interval",),
+            (PassSpec(PassName.MARCH, f"asked for: {scheme}"),),
+            limits=(Note(NoteKind.STEPS, f"sums over {scheme.method.steps} steps in each interval"),),
         ),
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
@@ -112,7 +114,7 @@ class _Scheme:
     termination: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.method, RayMarched):
+        if not isinstance(self.method, Method) or not self.method.marches:
             raise InputError(f"marching by {self.method!r}", "not a way to march", "use tl.RayMarched")
         if self.compositing not in (known := get_args(Compositing)):
             raise InputError(f"compositing {self.compositing!r}", "not known", f"use one of {', '.join(known)}")

@@ -15,7 +15,9 @@ from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.planning.methods import SignedDepth
-from translucent.planning.render_plan import PassSpec, RenderPlan
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.render_plan import RenderPlan
 from translucent.reference.boxes import Lines
 from translucent.reference.compositing import _layers
 from translucent.reference.light_paths import LightPaths
@@ -91,7 +93,11 @@ def path_trace(
     )
     frame = Frame(
         **{name: array.reshape(height, width, *array.shape[1:]) for name, array in arrays.items()},
-        plan=RenderPlan(SignedDepth(), (PassSpec("path_trace", reason),), limits=("radiance has noise",)),
+        plan=RenderPlan(
+            SignedDepth(),
+            (PassSpec(PassName.PATH_TRACE, reason),),
+            limits=(Note(NoteKind.NOISE, "radiance has noise"),),
+        ),
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
     )

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
-from translucent.planning.methods import Method, ThinLayer
+from translucent.planning.methods import Method
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 from translucent.reference.compositing import composite
@@ -101,7 +101,7 @@ def render(
     size = check_size(size)
     if not 1e-12 <= tolerance <= 1:
         raise InputError(f"tolerance {tolerance}", "not in 1e-12 to 1", f"use for example {TOLERANCE:g}")
-    chosen = plan(scene, method if isinstance(method, ThinLayer) else None, TRACED)
+    chosen = plan(scene, method if method is not None and method.makes_sheets else None, TRACED)
     hits = scene_hits(scene, size)
     crossed = time.perf_counter()
     rays, sheets = pixel_rays(scene.camera, size), sheet_thicknesses(scene, method)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 from translucent.formulas import optics
-from translucent.planning.methods import Method, ThinLayer
+from translucent.planning.methods import Method
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.layers import layer_depth, layer_radiance, without_holes
 from translucent.reference.rays import Rays
@@ -53,7 +53,7 @@ def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float
 
     `ThinLayer` makes a sheet of every mesh that declares no thickness of its own. Opaque objects are never sheets.
     """
-    usual = method.thickness if isinstance(method, ThinLayer) else None
+    usual = None if method is None else method.usual_thickness
     return tuple(
         None if body.medium is None else usual if body.sheet_thickness is None else body.sheet_thickness
         for body in scene.objects

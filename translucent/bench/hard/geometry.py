@@ -21,6 +21,7 @@ from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.media.medium import Medium
 from translucent.planning.methods import DepthPeeling, FragmentLists, KBuffer, SignedDepth
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
+from translucent.planning.notes import NoteKind
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Overlap, Scene
 from translucent.scene.showcase import framing, showcase
@@ -62,7 +63,7 @@ def _doubled(checks: Checks) -> None:
     twice = Mesh(box.vertices, np.concatenate([box.faces, box.faces]), name="twice")
     checks.holds(f"{twice.diagnosis.duplicate_faces.count} repeated faces found", bool(twice.diagnosis.duplicate_faces))
     doubled = showcase(twice, GLASS, SIZE)
-    checks.holds("and told by the plan", any("duplicated" in limit for limit in checks.renderer.plan(doubled).limits))
+    checks.holds("and told by the plan", checks.renderer.plan(doubled).says(NoteKind.DUPLICATED_FACES))
     left, right = Box((-1, -1, -1), (0, 1, 1)).tessellate(), Box((0, -1, -1), (1, 1, 1)).tessellate()
     for method in (SignedDepth(), FragmentLists(), DepthPeeling()):
         scene = Scene([Object(left, GLASS), Object(right, RED)], showcase(box, size=SIZE).camera)
@@ -145,7 +146,7 @@ def _marks(checks: Checks, mesh: Mesh, camera: Camera, policies: tuple[Overlap, 
             name = "planned" if method is None else type(method).__name__
             what = f"{policy}, {name}: defective pixels not marked, of {int(defective.sum())}"
             checks.error(what, (defective & frame.valid).sum())
-            if not isinstance(method, SignedDepth):
+            if method is None or method.ordered:
                 checks.holds("none too many", not (truth.valid & inside & ~frame.valid).any())
 
 

@@ -18,6 +18,7 @@ from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightViews
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import PassSpec
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
@@ -144,7 +145,7 @@ class LightViewsPass:
 
     def _draw_opaque(self, job: FrameJob) -> None:
         opaque = tuple(i for i, item in enumerate(job.scene.objects) if item.medium is None)
-        self._opaque.run(job, PassSpec("opaque", "shadows", opaque))
+        self._opaque.run(job, PassSpec(PassName.OPAQUE, "shadows", opaque))
 
     def _sort(self, job: FrameJob, spec: PassSpec, offset: int) -> None:
         """Sort the lists of one view, and add up the optical depth along them."""

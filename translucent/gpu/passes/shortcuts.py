@@ -12,6 +12,7 @@ from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import PassSpec
 
 
@@ -82,7 +83,7 @@ class UnmarkedBackFacePass:
 
     def run(self, job: FrameJob) -> None:
         """Draw the bodies."""
-        self._pass.run(job, PassSpec("back_face_depth", "for comparison", _bodies(job), 2))
+        self._pass.run(job, PassSpec(PassName.BACK_FACE_DEPTH, "for comparison", _bodies(job), 2))
 
     def hand_over(self, job: FrameJob) -> None:
         """Wipe the count of entries and exits, where the method keeps its doubts."""

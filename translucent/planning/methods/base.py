@@ -1,4 +1,4 @@
-"""What a method of finding thickness is: a frozen configuration, and traits by which planner and passes choose."""
+"""What a method of finding thickness is: a frozen configuration, the passes that it needs, and traits to choose by."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from translucent.errors import InputError
+from translucent.planning.notes import Note
+from translucent.planning.passes import PassSpec
+from translucent.scene.scene import Scene
 
 #: More points in an interval change nothing that float32 could show.
 MAX_LIGHT_POINTS = 16
@@ -15,10 +18,16 @@ MAX_LIGHT_POINTS = 16
 class Method:
     """A way to find the thickness of bodies along each view ray; see its subclasses.
 
+    A subclass states its `passes`, and overrides what else is not true of it: traits, `limits`, `check`. What any plan
+    has beside (declared sheets, fallbacks of open bodies, opaque objects, shading) is the planner's.
+
     Attributes
     ----------
     name : str
         On the command line.
+    cost : float
+        Time of its pass in multiples of drawing the same geometry into a depth buffer, as measured on a software
+        rasterizer (`translucent report`).
     ordered : bool
         Finds the intervals of each ray in their order.
     makes_sheets : bool
@@ -33,11 +42,14 @@ class Method:
         Follows lights into media that scatter.
     finds_exits : bool
         Tells where each ray first leaves all bodies.
+    peels : bool
+        Draws the geometry again for every layer or two.
     marches : bool
         Steps through the intervals, so that what fills them may vary.
     """
 
     name: ClassVar[str] = ""
+    cost: ClassVar[float] = 1.0
     ordered: ClassVar[bool] = False
     makes_sheets: ClassVar[bool] = False
     tells_media_apart: ClassVar[bool] = True
@@ -45,6 +57,7 @@ class Method:
     needs_storage: ClassVar[bool] = False
     samples_lights: ClassVar[bool] = False
     finds_exits: ClassVar[bool] = False
+    peels: ClassVar[bool] = False
     marches: ClassVar[bool] = False
 
     @property
@@ -66,6 +79,21 @@ class Method:
     def counts_from_camera(self) -> bool:
         """Whether distances count from the camera, and lose digits with distance."""
         return False
+
+    def check(self, scene: Scene) -> None:
+        """Raise `InputError` where the method cannot find the thickness of this scene, whatever its passes."""
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """The passes of its own, each with its reason; `why` tells why this method was chosen."""
+        raise NotImplementedError
+
+    def limits(self, scene: Scene) -> list[Note]:
+        """Where its thickness is not exact, beside what any method leaves out: see `translucent.planning.limits`."""
+        return []
+
+    def with_thickness(self, thickness: float) -> Method:
+        """The method with that thickness, in metres, of faces that declare none; itself where it makes no sheets."""
+        return self
 
 
 def check_count(what: str, value: object, most: int) -> None:

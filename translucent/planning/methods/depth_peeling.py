@@ -6,10 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from translucent.errors import InputError
+from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import Method, check_count
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene
 
 #: Passes over the geometry that anybody would wait for.
 MAX_LAYERS = 4096
+
+#: Layers of a body that is not convex, for want of a better guess: cost estimates are made before anything is drawn.
+_GUESSED_LAYERS = 8
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,9 @@ class DepthPeeling(Method):
     """
 
     name: ClassVar[str] = "depth-peeling"
+    cost: ClassVar[float] = 2.4  # of each draw
     ordered: ClassVar[bool] = True
+    peels: ClassVar[bool] = True
 
     max_layers: int = 64
     order: Literal["both-ends", "front-to-back", "back-to-front"] = "both-ends"
@@ -43,3 +51,15 @@ class DepthPeeling(Method):
     def layer_limit(self) -> int:
         """Surfaces that a ray may cross."""
         return self.max_layers
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """As many draws of all solids as it is expected to take."""
+        solids = solids_of(scene)
+        bodies = [scene.objects[i] for i in solids]
+        expected = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
+        layers = min(expected, self.max_layers)
+        both_ends = self.order == "both-ends"
+        reason = f"{why}; {'two layers' if both_ends else 'a layer'} with each draw, until all are found"
+        # Where some layers are left out, one more draw counts the faces of the last that is not.
+        draws = (-(-layers // 2) if both_ends else layers) + (expected > layers)
+        return (PassSpec(PassName.DEPTH_PEELING, reason, solids, draws, cost=draws * self.cost),)

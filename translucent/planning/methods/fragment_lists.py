@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,7 @@ class FragmentLists(Method):
     """
 
     name: ClassVar[str] = "fragment-lists"
+    cost: ClassVar[float] = 2.4
     ordered: ClassVar[bool] = True
     needs_storage: ClassVar[bool] = True
     samples_lights: ClassVar[bool] = True
@@ -28,3 +32,8 @@ class FragmentLists(Method):
 
     def __post_init__(self) -> None:
         check_count("FragmentLists light_points", self.light_points, MAX_LIGHT_POINTS)
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """One draw of all solids."""
+        reason = f"{why}; one draw into a list for each pixel, sorted afterwards"
+        return (PassSpec(PassName.FRAGMENT_LISTS, reason, solids_of(scene), 1, cost=self.cost),)

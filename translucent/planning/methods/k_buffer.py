@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.planning.bodies import solids_of
 from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene
 
 #: A pixel's surfaces must fit into the memory of a frame.
 MAX_K = 256
@@ -24,6 +27,7 @@ class KBuffer(Method):
     """
 
     name: ClassVar[str] = "k-buffer"
+    cost: ClassVar[float] = 4.2
     ordered: ClassVar[bool] = True
     needs_storage: ClassVar[bool] = True
     samples_lights: ClassVar[bool] = True
@@ -40,3 +44,8 @@ class KBuffer(Method):
     def layer_limit(self) -> int:
         """Surfaces that a ray may cross."""
         return self.k
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """One draw of all solids."""
+        reason = f"{why}; one draw, of which each pixel keeps the {self.k} nearest surfaces"
+        return (PassSpec(PassName.K_BUFFER, reason, solids_of(scene), 1, cost=self.cost),)

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 from translucent.errors import InputError
-from translucent.planning.methods.base import Method, check_count
+from translucent.planning.bodies import solids_of
+from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_count
+from translucent.planning.methods.fragment_lists import FragmentLists
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene
 
 #: Steps of a ray through one interval that anybody would wait for.
 MAX_STEPS = 65536
@@ -53,6 +58,8 @@ class RayMarched(Method):
     """
 
     name: ClassVar[str] = "ray-marched"
+    cost: ClassVar[float] = FragmentLists.cost
+    step_cost: ClassVar[float] = 0.1
     ordered: ClassVar[bool] = True
     needs_storage: ClassVar[bool] = True
     samples_lights: ClassVar[bool] = True
@@ -87,3 +94,29 @@ class RayMarched(Method):
     def light_points(self) -> int:
         """Points at which each interval looks at each light: its steps."""
         return self.steps
+
+    def check(self, scene: Scene) -> None:
+        """Refuse more Gauss-Legendre points than shaders hold."""
+        if self.quadrature == "gauss" and self.steps > MAX_LIGHT_POINTS:
+            raise InputError(f"{self}", f"shaders hold {MAX_LIGHT_POINTS} Gauss-Legendre points", "use fewer steps")
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """One draw of all solids, and the steps."""
+        reason = f"{why}; one draw into a list for each pixel, then {self.steps} steps through each interval"
+        cost = self.cost + self.step_cost * self.steps
+        return (PassSpec(PassName.FRAGMENT_LISTS, reason, solids_of(scene), 1, cost=cost),)
+
+    def limits(self, scene: Scene) -> list[Note]:
+        """What a sum over steps leaves out."""
+        what = (
+            "optical depth, and what is emitted and scattered, are"
+            if scene.varies
+            else "what is emitted and scattered is"
+        )
+        text = (
+            f"{what} a sum over {self.steps} steps in each interval ({self.quadrature}); what lies behind a "
+            f"transmittance of {LEAST_SEEN:g} is left out of it"
+        )
+        if scene.varies and scene.lights:
+            text += "; depths from the lights are exact, with a path through the density for each step and light"
+        return [Note(NoteKind.STEPS, text)]

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from translucent.planning.bodies import count_of, media_differ, solids_of
 from translucent.planning.methods.base import Method
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,8 @@ class SignedDepth(Method):
     """
 
     name: ClassVar[str] = "signed-depth"
+    cost: ClassVar[float] = 1.1
+    spectral_cost: ClassVar[float] = 1.5
 
     anchored: bool = True
 
@@ -29,3 +35,28 @@ class SignedDepth(Method):
     def counts_from_camera(self) -> bool:
         """Whether distances count from the camera, and lose digits with distance."""
         return not self.anchored
+
+    @classmethod
+    def cost_for(cls, *, spectral: bool) -> float:
+        """Time of its pass, which is longer where it adds up the optical depth of each channel."""
+        return cls.spectral_cost if spectral else cls.cost
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """One draw of all solids."""
+        if not (solids := solids_of(scene)):
+            return ()
+        spectral = media_differ(scene)
+        what = (
+            "optical depth per channel, since media differ"
+            if spectral
+            else "thickness, since all bodies share one medium"
+        )
+        reason = f"{count_of(solids, 'body', 'bodies')} in one unsorted draw each: exits minus entries add up to {what}"
+        return (PassSpec(PassName.SIGNED_DEPTH, reason, solids, 1, cost=self.cost_for(spectral=spectral)),)
+
+    def limits(self, scene: Scene) -> list[Note]:
+        """What distances from the camera lose."""
+        if self.anchored:
+            return []
+        text = "distances count from the camera: float32 loses digits with distance"
+        return [Note(NoteKind.DISTANCE_FROM_CAMERA, text)]

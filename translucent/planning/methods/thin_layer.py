@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from translucent.errors import InputError
 from translucent.geometry.mesh import MAX_COORDINATE
+from translucent.planning.bodies import count_of, indices
 from translucent.planning.methods.base import Method
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene, object_names
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,7 @@ class ThinLayer(Method):
     """
 
     name: ClassVar[str] = "thin-layer"
+    cost: ClassVar[float] = 1.7
     makes_sheets: ClassVar[bool] = True
 
     thickness: float = 1e-3
@@ -35,3 +40,28 @@ class ThinLayer(Method):
     def usual_thickness(self) -> float:
         """Metres through every face that declares none."""
         return self.thickness
+
+    def with_thickness(self, thickness: float) -> ThinLayer:
+        """The method with that thickness, in metres, of faces that declare none."""
+        return replace(self, thickness=thickness)
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """One draw of all bodies."""
+        bodies = indices(scene, lambda body: body.medium is not None)
+        return (
+            sheet_pass(bodies, f"every face of {count_of(bodies, 'mesh', 'meshes')} is a sheet: their paths add up"),
+        )
+
+    def limits(self, scene: Scene) -> list[Note]:
+        """What sheets leave out of closed bodies."""
+        solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
+        if not solid:
+            return []
+        text = f"{object_names(solid)} closed, but drawn as sheets: what is inside is left out"
+        return [Note(NoteKind.CLOSED_AS_SHEETS, text)]
+
+
+def sheet_pass(objects: tuple[int, ...], reason: str) -> PassSpec:
+    """The pass that draws objects as sheets."""
+    reason = f"{reason}, t / max(0.001, n.v) each"
+    return PassSpec(PassName.THIN_LAYER, reason, objects, 1, cost=ThinLayer.cost)

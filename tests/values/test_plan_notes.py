@@ -1,0 +1,124 @@
+"""What plans say has types: names of passes, and kinds of notes, that no program has to read sentences for."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from typing import Any
+
+import pytest
+
+import translucent as tl
+from tests.values.plan_scenes import (
+    COLUMNS,
+    DIAMOND,
+    MILK,
+    NO_STORAGE,
+    OPEN,
+    ORDERED,
+    SCENES,
+    WINE,
+    body,
+    scene,
+    sheet,
+)
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities, RenderPlan
+
+LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
+TRACED = Capabilities(shader_storage=False, opengl=False)
+
+
+def plans(of: tl.Scene) -> list[RenderPlan]:
+    """By all methods and machines that can render the scene."""
+    found = []
+    for method in (*COLUMNS, *ORDERED, tl.RayMarched()):
+        for machine in (Capabilities(), NO_STORAGE, TRACED):
+            try:
+                found.append(plan(of, method, machine))
+            except tl.InputError:
+                continue
+    return found
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_every_pass_has_a_name_and_every_note_a_kind(kind: str) -> None:
+    found = plans(SCENES[kind])
+    assert found
+    for one in found:
+        assert {type(step.name) for step in one.passes} == {PassName}
+        notes = (*one.limits, *one.unmodelled)
+        assert all(type(note) is Note and type(note.kind) is NoteKind for note in notes)
+        assert {step.name for step in one.passes} == {name for name in PassName if one.has(name)}
+        assert {note.kind for note in notes} == {kind for kind in NoteKind if one.says(kind)}
+
+
+@pytest.mark.parametrize(
+    ("asked", "method", "machine", "kind"),
+    [
+        (scene(body(mesh=OPEN)), None, Capabilities(), NoteKind.OPEN_MESH),
+        (scene(body()), tl.ThinLayer(), Capabilities(), NoteKind.CLOSED_AS_SHEETS),
+        (scene(body()), tl.KBuffer(1), Capabilities(), NoteKind.LAYER_LIMIT),
+        (scene(body()), tl.RayMarched(), Capabilities(), NoteKind.STEPS),
+        (scene(body()), tl.SignedDepth(anchored=False), Capabilities(), NoteKind.DISTANCE_FROM_CAMERA),
+        (scene(body(), body(x=3)), tl.BackFaceDepth(), Capabilities(), NoteKind.SEVERAL_BODIES),
+        (scene(body(MILK), lights=LIT), None, NO_STORAGE, NoteKind.UNLIT),
+        (scene(body(MILK), lights=LIT), tl.SignedDepth(), Capabilities(), NoteKind.LIGHTS_LEFT_OUT),
+        (scene(body(MILK), lights=LIT), None, Capabilities(), NoteKind.SCATTERED_AGAIN),
+        (scene(body(MILK)), None, Capabilities(), NoteKind.ONLY_REMOVES),
+        (scene(body(MILK), ambient=(1, 1, 1)), None, Capabilities(), NoteKind.DIMMED_AMBIENT),
+        (scene(body(WINE), lights=LIT), None, Capabilities(), NoteKind.UNUSED_LIGHTS),
+        (scene(body(DIAMOND)), None, Capabilities(), NoteKind.LATER_REFRACTION),
+        (scene(body(DIAMOND)), None, TRACED, NoteKind.REFRACTION),
+        (scene(body(), body(None)), None, Capabilities(), NoteKind.SHADOWS),
+        (scene(body(tl.Medium())), None, Capabilities(), NoteKind.INVISIBLE),
+        (scene(body(), body(x=3, priority=1)), None, Capabilities(), NoteKind.UNUSED_PRIORITIES),
+    ],
+    ids=lambda value: value.name if isinstance(value, NoteKind) else "",
+)
+def test_a_plan_says_what_kind_of_thing_it_leaves_out(
+    asked: tl.Scene, method: Any, machine: Capabilities, kind: NoteKind
+) -> None:
+    assert plan(asked, method, machine).says(kind)
+    clean = plan(scene(sheet()), None, Capabilities())
+    assert not clean.says(kind)
+
+
+def test_ambient_light_takes_the_place_of_light_that_is_only_removed() -> None:
+    assert not plan(scene(body(MILK), ambient=(1, 1, 1))).says(NoteKind.ONLY_REMOVES)
+
+
+def test_a_note_is_the_text_that_it_was() -> None:
+    note = Note(NoteKind.SHADOWS, "shadows: none")
+    assert (note, str(note), hash(note)) == ("shadows: none", "shadows: none", hash("shadows: none"))
+    assert type(str(note)) is str
+    assert "; ".join((note, "more")) == "shadows: none; more"
+    assert note in ("shadows: none",)
+    assert note.startswith("shadows")
+    assert (repr(note), json.dumps([note])) == ("'shadows: none'", '["shadows: none"]')
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda plan: pickle.loads(pickle.dumps(plan))])
+def test_a_plan_keeps_its_kinds_when_it_is_copied(copied: Any) -> None:
+    found = plan(scene(body(mesh=OPEN), body(None)))
+    again = copied(found)
+    assert again == found
+    assert [note.kind for note in (*again.limits, *again.unmodelled)] == [NoteKind.OPEN_MESH, NoteKind.SHADOWS]
+    assert all(step.name is PassName(step.name.value) for step in again.passes)
+
+
+def test_the_name_of_a_pass_is_the_word_that_it_was() -> None:
+    assert {PassName.SIGNED_DEPTH: 1.0}["signed_depth"] == 1.0  # type: ignore[index]
+    assert (repr(PassName.OPAQUE), str(PassName.OPAQUE), f"{PassName.OPAQUE}") == ("'opaque'", "opaque", "opaque")
+    assert json.dumps({PassName.OPAQUE: [PassName.LAYERS]}) == '{"opaque": ["layers"]}'
+
+
+def test_a_plan_has_any_of_the_passes_asked_for() -> None:
+    found = plan(scene(body(), body(None)))
+    assert found.has(PassName.OPAQUE)
+    assert found.has(PassName.BACKDROP, PassName.OPAQUE)
+    assert not found.has(PassName.BACKDROP, PassName.SURFACES)
+    assert not found.has()

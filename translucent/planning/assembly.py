@@ -1,0 +1,163 @@
+"""What any plan has beside the passes of its method: sheets, fallbacks, lights, opaque objects, borders, shading."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from translucent.errors import InputError
+from translucent.planning.bodies import count_of, indices, media_differ, open_bodies, scatters, sheets_of, solids_of
+from translucent.planning.borders import border_passes
+from translucent.planning.effects import unmodelled_effects
+from translucent.planning.layers import layer_passes
+from translucent.planning.limits import (
+    MAX_SCATTER_LIGHTS,
+    UNLIT,
+    layer_limits,
+    mesh_limits,
+    open_limits,
+    scattering_limits,
+    sheet_limits,
+)
+from translucent.planning.methods import FragmentLists, Method, SignedDepth, ThinLayer
+from translucent.planning.methods.thin_layer import sheet_pass
+from translucent.planning.notes import Note
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.slots import MAX_SLOTS, medium_slots
+from translucent.scene.scene import Scene, object_names
+
+#: An open mesh that was declared solid is drawn, where it is not closed, as a sheet of this share of its diagonal.
+FALLBACK_SHEET = 0.01
+
+#: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasterizer
+#: (`translucent report`); those of methods are theirs. Passes that shade pixels (resolve, surfaces): beside 90,000
+#: triangles; beside fewer ones, which cost less, they count for more.
+COSTS = {"opaque": 2.8, "resolve": 0.4, "interfaces": 4.0, "surfaces": 8.0, "layers": 3.0}
+
+
+def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities) -> RenderPlan:
+    """The plan of a method, which was chosen for the reason `why`, with OpenGL and both borders of bodies.
+
+    Raises
+    ------
+    InputError
+        If the method cannot render the scene, or not on this machine.
+    """
+    _check(scene, method, capabilities)
+    spectral = method.ordered or media_differ(scene)
+    own = method.passes(scene, why)
+    beside = () if method.makes_sheets else (*_declared_sheets(scene), *_fallback_passes(scene, spectral))
+    # Sheets go first where intervals are in order: their sums are read where the intervals are resolved.
+    passes = (*beside, *_light_views(scene, method), *own) if method.ordered else (*own, *beside)
+    borders = border_passes(scene, method, COSTS["interfaces"], COSTS["surfaces"])
+    passes = (
+        *_opaque_passes(scene),
+        *passes,
+        *borders[:1],
+        PassSpec(PassName.TRANSMITTANCE, _shading(scene, method), cost=COSTS["resolve"]),
+        *borders[1:],
+        *layer_passes(scene, COSTS["layers"]),
+    )
+    lit = any(step.name is PassName.LIGHT_VIEWS for step in passes)
+    unmodelled = unmodelled_effects(scene, scattering=lit, borders=True)
+    return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled)
+
+
+def with_unlit_marked(scene: Scene, chosen: RenderPlan) -> RenderPlan:
+    """The plan with a pass that finds the pixels in which media scatter light that this OpenGL cannot follow."""
+    media = ((i, scene.objects[i].medium) for i in solids_of(scene))
+    scattering = tuple(i for i, medium in media if medium is not None and medium.scatters)
+    reason = "paths in media that scatter: this OpenGL cannot follow lights there, so their pixels are marked invalid"
+    cost = SignedDepth.cost_for(spectral=chosen.spectral)
+    unlit = PassSpec(PassName.UNLIT, reason, scattering, 1, target="unlit", cost=cost)
+    last = next(i for i, step in enumerate(chosen.passes) if step.name is PassName.TRANSMITTANCE)
+    passes = (*chosen.passes[:last], unlit, *chosen.passes[last:])
+    return replace(chosen, passes=passes, limits=(*chosen.limits, UNLIT))
+
+
+def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
+    name = type(method).__name__
+    if method.ordered and not solids_of(scene):
+        raise InputError(name, "all bodies are declared sheets, which have no inside", "use ThinLayer")
+    if method.needs_storage and not capabilities.shader_storage:
+        raise InputError(name, "this OpenGL has no shader storage buffers, which came with 4.3", "use DepthPeeling")
+    if method.ordered and (count := len(medium_slots(scene))) > MAX_SLOTS:
+        raise InputError(
+            name,
+            f"{count} winding numbers for each ray, one for each medium, priority and open body: more than {MAX_SLOTS}",
+            "let bodies share media and priorities, or close them",
+        )
+    method.check(scene)
+
+
+def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
+    """Where the thickness that a method finds in this scene is not exact."""
+    limits = [] if method.makes_sheets else open_limits(scene)
+    limits += layer_limits(scene, method) + method.limits(scene)
+    if method.ordered:
+        limits += scattering_limits(scene) + sheet_limits(scene)
+    return (*limits, *mesh_limits(scene, method))
+
+
+def _declared_sheets(scene: Scene) -> tuple[PassSpec, ...]:
+    if not (sheets := sheets_of(scene)):
+        return ()
+    return (sheet_pass(sheets, f"{count_of(sheets, 'mesh', 'meshes')} declared thin: paths through faces add up"),)
+
+
+def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
+    """What a pixel shows that enters and leaves unequally often: open bodies as sheets, all others as ever."""
+    leaky = open_bodies(scene)
+    if not leaky:
+        return ()
+    reason = (
+        f"{object_names([scene.objects[i] for i in leaky])} not closed: pixels that enter and leave unequally often "
+        f"get sheets of {FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid"
+    )
+    sheets = leaky + sheets_of(scene)
+    as_sheets = PassSpec(PassName.THIN_LAYER_FALLBACK, reason, sheets, 1, "fallback", ThinLayer.cost)
+    closed = tuple(i for i in solids_of(scene) if i not in leaky)
+    if not closed:
+        return (as_sheets,)
+    reason = "closed bodies, in those pixels, too"
+    cost = SignedDepth.cost_for(spectral=spectral)
+    return (as_sheets, PassSpec(PassName.SIGNED_DEPTH_FALLBACK, reason, closed, 1, "fallback", cost))
+
+
+def _light_views(scene: Scene, method: Method) -> tuple[PassSpec, ...]:
+    """The pass that looks from the lights, where the method follows them into media that scatter."""
+    if not method.samples_lights or not scatters(scene):
+        return ()
+    lights = len(scene.lights)
+    if lights > MAX_SCATTER_LIGHTS:
+        raise InputError(
+            f"{lights} lights on media that scatter",
+            f"at most {MAX_SCATTER_LIGHTS} are followed into media",
+            f"leave out {lights - MAX_SCATTER_LIGHTS}, or let the media only absorb",
+        )
+    reason = (
+        f"{lights} {'light' if lights == 1 else 'lights'} on a medium that scatters: the surfaces on the way from each "
+        f"light, in order, tell how much of it reaches the {method.light_points} points of an interval"
+    )
+    # From each light, surfaces are kept in lists.
+    cost = lights * FragmentLists.cost
+    return (PassSpec(PassName.LIGHT_VIEWS, reason, solids_of(scene), lights, cost=cost),)
+
+
+def _opaque_passes(scene: Scene) -> tuple[PassSpec, ...]:
+    if not (opaque := indices(scene, lambda item: item.medium is None)):
+        return ()
+    reason = (
+        f"{count_of(opaque, 'opaque object', 'opaque objects')}: depth and color of the nearest, where rays through "
+        "the media end"
+    )
+    return (PassSpec(PassName.OPAQUE, reason, opaque, 1, cost=COSTS["opaque"]),)
+
+
+def _shading(scene: Scene, method: Method) -> str:
+    """How the paths become light, in words."""
+    if not any(body.medium is not None and body.medium.emits for body in scene.bodies):
+        return "Beer-Lambert: what is behind, through exp(-optical depth)"
+    if method.ordered:
+        return "Beer-Lambert: what is behind, through exp(-optical depth), and what the intervals emit"
+    return "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"

@@ -1,0 +1,105 @@
+"""What a scene asks for and no pass of a plan renders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from translucent.planning.layers import layer_effects
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName
+from translucent.planning.render_plan import RenderPlan
+from translucent.scene.scene import Object, Scene, object_names
+
+
+def unmodelled_effects(scene: Scene, *, scattering: bool, borders: bool = False) -> tuple[Note, ...]:
+    """What the scene asks for and a plan does not render.
+
+    Parameters
+    ----------
+    scene : Scene
+    scattering : bool
+        The plan has light scattered into the rays.
+    borders : bool
+        The plan has what the borders of bodies and the surfaces of opaque objects do to light.
+    """
+    effects = _scattering_effects(scene, followed=scattering, borders=borders) + _refraction_effects(scene, borders)
+    if clear := [body for body in scene.bodies if _is_invisible(body)]:
+        text = f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits"
+        effects.append(Note(NoteKind.INVISIBLE, text))
+    if not borders and (finished := [item for item in scene.opaque if item.surface is not None]):
+        text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
+        effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
+    effects += layer_effects(scene, borders=borders)
+    if scene.opaque:
+        effects.append(Note(NoteKind.SHADOWS, "shadows: light reaches opaque objects through everything"))
+    if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
+        text = f'priorities: overlap="{scene.overlap}" does not use them'
+        effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
+    return tuple(effects)
+
+
+def with_ambient_told(plan: RenderPlan) -> RenderPlan:
+    """The plan of a scene in which media emit what they scatter of the ambient radiance, made to say so."""
+    told = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
+    shading = (PassName.TRANSMITTANCE, PassName.SHADE)
+    passes = tuple(
+        replace(step, reason=f"{step.reason}; {told}") if step.name in shading else step for step in plan.passes
+    )
+    effects = (effect for effect in plan.unmodelled if effect.kind is not NoteKind.ONLY_REMOVES)
+    way = Note(NoteKind.DIMMED_AMBIENT, "what dims ambient light on its way to a place in the media")
+    return replace(plan, passes=passes, unmodelled=(*effects, way))
+
+
+def _scattering_effects(scene: Scene, *, followed: bool, borders: bool) -> list[Note]:
+    """What is left out of the light that media scatter."""
+    if borders and any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
+        text = (
+            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
+            "path of the ray, which edges and folds are not"
+        )
+        return [Note(NoteKind.SPREAD_INSIDE, text)]
+    if scattering := [body.medium for body in scene.bodies if body.medium is not None and body.medium.scatters]:
+        if followed:
+            densest = max(float(np.max(np.asarray(medium.scattering))) for medium in scattering)
+            text = (
+                "light scattered more than once, of which there is much in bodies that are thicker than a mean free "
+                f"path, here {1 / densest:.2g} m; light of the environment scattered"
+            )
+            return [Note(NoteKind.SCATTERED_AGAIN, text)]
+        if not scene.lights:
+            return [Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light")]
+        text = (
+            "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
+        )
+        return [Note(NoteKind.LIGHTS_LEFT_OUT, text)]
+    if scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
+        text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
+        return [Note(NoteKind.UNUSED_LIGHTS, text)]
+    return []
+
+
+def _refraction_effects(scene: Scene, borders: bool) -> list[Note]:
+    """What is left out of the light that borders bend and mirror."""
+    if not any(body.has_interface for body in scene.bodies):
+        return []
+    if not borders:
+        text = "refraction and reflection: rays go straight, though borders bend and mirror them"
+        return [Note(NoteKind.REFRACTION, text)]
+    text = (
+        "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
+        "and borders mirror the environment only"
+    )
+    return [Note(NoteKind.LATER_REFRACTION, text)]
+
+
+def _is_invisible(body: Object) -> bool:
+    medium = body.medium
+    return (
+        medium is not None
+        and not body.covers
+        and not body.has_interface
+        and not (medium.extinction > 0).any()
+        and not medium.emits
+    )

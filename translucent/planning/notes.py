@@ -1,0 +1,65 @@
+"""What a plan says of itself beside its passes: where it is not exact, and what it does not render."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Self
+
+
+class NoteKind(StrEnum):
+    """What a note is about; its text is for people alone."""
+
+    # Where thickness, transmittance or emission are not exact.
+    OPEN_MESH = "open mesh"
+    CLOSED_AS_SHEETS = "closed as sheets"
+    DUPLICATED_FACES = "duplicated faces"
+    INSIDE_OUT = "inside out"
+    NOT_CONVEX = "not convex"
+    SEVERAL_BODIES = "several bodies"
+    LAYER_LIMIT = "layer limit"
+    STEPS = "steps"
+    DISTANCE_FROM_CAMERA = "distance from camera"
+    DENSE_SCATTERING = "dense scattering"
+    SHEETS_WITHOUT_ORDER = "sheets without order"
+    UNLIT = "unlit"
+    NOISE = "noise"
+
+    # What the scene asks for and no pass renders.
+    LIGHTS_LEFT_OUT = "lights left out"
+    ONLY_REMOVES = "only removes"
+    SCATTERED_AGAIN = "scattered again"
+    SPREAD_INSIDE = "spread inside"
+    DIMMED_AMBIENT = "dimmed ambient"
+    UNUSED_LIGHTS = "unused lights"
+    SHADOWS = "shadows"
+    REFRACTION = "refraction"
+    LATER_REFRACTION = "later refraction"
+    ONE_BORDER = "one border"
+    OPAQUE_SURFACES = "opaque surfaces"
+    LAYERS = "layers"
+    GLOW = "glow"
+    HOLES = "holes"
+    INVISIBLE = "invisible"
+    UNUSED_PRIORITIES = "unused priorities"
+
+
+class Note(str):
+    """A sentence of a plan: the text that it is, and its kind, by which programs know it.
+
+    Attributes
+    ----------
+    kind : NoteKind
+    """
+
+    __slots__ = ("kind",)
+
+    kind: NoteKind
+
+    def __new__(cls, kind: NoteKind, text: str) -> Self:
+        """A note of this kind that reads so."""
+        note = super().__new__(cls, text)
+        note.kind = kind
+        return note
+
+    def __getnewargs__(self) -> tuple[NoteKind, str]:  # type: ignore[override]  # copies and pickles keep the kind
+        return self.kind, str(self)
