@@ -12,8 +12,8 @@ import pytest
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.placement import AxialRange
-from translucent.gpu.shaders import CONSTANTS
 from translucent.planning.plan import plan_over_backdrop
 
 Array = npt.NDArray[Any]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent.gpu.shaders import CONSTANTS
+from translucent.gpu.constants import CONSTANTS
 from translucent.interop.pyrender import backdrop_from_pyrender, render, render_scene, scene_from_pyrender, to_pyrender
 from translucent.reference.hits import line_hits, world_normals
 from translucent.reference.opaque import nearest_opaque

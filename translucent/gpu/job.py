@@ -8,12 +8,12 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.densities import density_uniforms, scene_grids
 from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
 from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import AxialRange, Placement, depth_range
 from translucent.gpu.resources import Resources
-from translucent.gpu.shaders import CONSTANTS
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
     BodyRole,

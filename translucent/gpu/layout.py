@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS
 
 #: GLSL type, size and alignment in bytes (std140) of a NumPy field. Other shapes are not used: std140 pads them oddly.
@@ -26,9 +27,6 @@ MAX_LIGHTS = 32
 
 #: Views from lights that media scatter: one each, or the six of a cube.
 MAX_LIGHT_VIEWS = 6 * MAX_SCATTER_LIGHTS
-
-#: Gauss-Legendre points for each interval.
-MAX_SCATTER_POINTS = 16
 
 
 @dataclass(frozen=True)
@@ -228,7 +226,7 @@ SCATTER = UniformBlock(
             (MAX_SCATTER_LIGHTS, 4),
         ),  # first view, how many, texels along a side, first texel
         ("scatter_views", "f4", (4 * MAX_LIGHT_VIEWS, 4)),  # rows of x, y, w and place, from a position
-        ("gauss", "f4", (MAX_SCATTER_POINTS, 4)),  # points in 0..1 and their weights
+        ("gauss", "f4", (MAX_LIGHT_POINTS, 4)),  # points in 0..1 and their weights
         ("gauss_count", "i4", ()),
         ("scatter_light_count", "i4", ()),
     ),

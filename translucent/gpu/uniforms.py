@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import (
     BODY,
     ENVIRONMENT,
     LIGHTS,
     MAX_LIGHT_VIEWS,
     MAX_LIGHTS,
-    MAX_SCATTER_POINTS,
     MEDIA,
     SCATTER,
     SHADE,
@@ -24,9 +24,9 @@ from translucent.gpu.layout import (
     VIEW,
 )
 from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
-from translucent.gpu.shaders import CONSTANTS
 from translucent.media.medium import Medium
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.reference.sheets import SHEET_ON_OPAQUE
 from translucent.scene.camera import Camera
@@ -259,8 +259,8 @@ def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightV
         spans[i] = lights.spans[i]
     rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
     rows[: len(lights.rows)] = lights.rows
-    gauss = np.zeros((MAX_SCATTER_POINTS, 4))
-    points = min(points, MAX_SCATTER_POINTS)  # marching by other rules has no use for them
+    gauss = np.zeros((MAX_LIGHT_POINTS, 4))
+    points = min(points, MAX_LIGHT_POINTS)  # marching by other rules has no use for them
     nodes, weights = np.polynomial.legendre.leggauss(points)
     gauss[:points, 0], gauss[:points, 1] = (nodes + 1) / 2, weights / 2
     center = lights.center - camera.eye

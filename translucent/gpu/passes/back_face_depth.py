@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import moderngl
 
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import CONSTANTS, build_program
+from translucent.gpu.shaders import build_program
 from translucent.planning.render_plan import PassSpec
 
 

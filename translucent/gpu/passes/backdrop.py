@@ -8,9 +8,10 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.render_plan import PassSpec
 from translucent.scene.backdrop import Backdrop
 

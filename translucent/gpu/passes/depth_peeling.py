@@ -5,9 +5,10 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from translucent.gpu.constants import CONSTANTS, PEEL_BATCH, PEEL_TILE
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
-from translucent.gpu.shaders import CONSTANTS, PEEL_BATCH, PEEL_TILE, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.methods import DepthPeeling
 from translucent.planning.render_plan import PassSpec
 

@@ -6,9 +6,10 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.methods import RayMarched
 from translucent.planning.render_plan import PassSpec
 
