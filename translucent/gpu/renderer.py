@@ -189,7 +189,7 @@ class GpuRenderer:
             provenance=dict(self.provenance),
             layers=layers,
             truncated=truncated,
-            normals=_read_normals(job.targets.entered()) if job.has_surfaces else None,
+            normals=_read_normals(job.targets.entered()) if job.features.has_surfaces else None,
         )
 
     def close(self) -> None:

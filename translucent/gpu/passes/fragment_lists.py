@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import moderngl
 import numpy as np
 
@@ -91,7 +93,7 @@ class FragmentListsPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX
         job.bind_opaque(0)
-        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, GRADIENT=0, OPAQUE=job.has_opaque)
+        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, GRADIENT=0, OPAQUE=job.features.has_opaque)
         set_uniform(program, "cell_offset", 0)
         job.draw(program, spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
@@ -104,9 +106,10 @@ class FragmentListsPass:
         job.bind_opaque(0)
         job.bind_grids(1)
         job.targets.steepest().color_attachments[0].use(2)
-        switches = {"OPAQUE": job.has_opaque, "BORDERS": job.finds_exits}
-        program = self._resolve.program(**walk_switches(job), GRADIENT=0, **switches)
-        if isinstance(method := job.plan.method, RayMarched):
+        switches = {"OPAQUE": job.features.has_opaque, "BORDERS": job.features.finds_exits}
+        program = self._resolve.program(**walk_switches(job.features), GRADIENT=0, **switches)
+        if job.features.marches:
+            method = cast(RayMarched, job.plan.method)
             set_uniform(program, "march_steps", method.steps)
             set_uniform(program, "march_rule", int(CONSTANTS[f"MARCH_{method.quadrature.upper()}"]))
             set_uniform(program, "march_seed", method.seed - (1 << 32 if method.seed >= 1 << 31 else 0))

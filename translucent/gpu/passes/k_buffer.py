@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import moderngl
 import numpy as np
 
@@ -23,8 +25,7 @@ class KBufferPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies, then walk along what is kept."""
-        assert isinstance(job.plan.method, KBuffer)
-        gl, k = job.gl, job.plan.method.k
+        gl, k = job.gl, cast(KBuffer, job.plan.method).k
         width, height = job.targets.size
         words = job.targets.buffers.get("words", 4 * (k + 1) * width * height)
         # A count of 0, and k times no crossing.
@@ -37,7 +38,7 @@ class KBufferPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX
         job.bind_opaque(0)
-        program = self._insert.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
+        program = self._insert.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.features.has_opaque)
         set_uniform(program, "k", k)
         job.draw(program, spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
@@ -45,7 +46,9 @@ class KBufferPass:
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT)
         job.targets.ordered().use()
         steepest.color_attachments[0].use(1)
-        program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque, BORDERS=job.finds_exits)
+        program = self._resolve.program(
+            **walk_switches(job.features), OPAQUE=job.features.has_opaque, BORDERS=job.features.finds_exits
+        )
         set_uniform(program, "k", k)
         self._resolve.draw_fullscreen(program)
         # The next frame must not clear the words before these have been walked along.
