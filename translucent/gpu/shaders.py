@@ -12,7 +12,7 @@ import moderngl
 from translucent.assets import shader_path
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.layout import BLOCKS
+from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
 _CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")
@@ -111,11 +111,12 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
     if name == "<constants>":
         return "\n".join(f"#define {key} {value}" for key, value in CONSTANTS.items())
     if name.startswith("<"):
-        if (block := BLOCKS.get(name[1:-1])) is None:
+        generated: dict[str, UniformBlock | PackedTable] = {**BLOCKS, **TABLES}
+        if (found := generated.get(name[1:-1])) is None:
             raise RenderError(
-                f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(BLOCKS)}, constants"
+                f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(generated)}, constants"
             )
-        return block.glsl
+        return found.glsl
     return shader_path(name).read_text(encoding="utf-8")
 
 

@@ -21,16 +21,18 @@ from translucent.gpu.layout import (
     MEDIA,
     SCATTER,
     SHADE,
+    SURFACE_ROW,
     SURFACES,
     VIEW,
 )
 from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.media.medium import Medium
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PointLight
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 
 Array = npt.NDArray[np.float64]
@@ -219,23 +221,26 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
 
 
 def surface_table(scene: Scene, sheets: Mapping[int, float]) -> npt.NDArray[np.float32]:
-    """(objects, 5, 4): what ``shaders/shade/surfaces.frag`` reads of each object, besides what textures vary.
+    """(objects, texels, 4): a `SURFACE_ROW` of each object; that of an opaque one is not read.
 
     `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers.
     """
-    table = np.zeros((len(scene.objects), 5, 4), dtype=np.float32)
-    for i, (row, body) in enumerate(zip(table, scene.objects, strict=True)):
-        if body.medium is None:
-            continue
-        medium, surface = body.medium, body.surface or Surface()
-        stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
-        limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
-        passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
-        much = surface.multiple_scattering and medium.scatters
-        row[0] = medium.ior, surface.dispersion, i in sheets, much
-        row[1, :3] = bounded_extinction(medium, scene.diagonal) * sheets.get(i, 0.0)
-        row[1, 3] = np.linalg.norm(body.bounds[1] - body.bounds[0])
-        row[2] = *passed, surface.roughness
-        row[3] = *np.minimum(stream[0], limit), surface.transmission
-        row[4] = *np.minimum(stream[1], limit), surface.diffuse_transmission
-    return table
+    return SURFACE_ROW.pack([_surface_row(scene, body, sheets.get(i)) for i, body in enumerate(scene.objects)])
+
+
+def _surface_row(scene: Scene, body: Object, sheet: float | None) -> dict[str, npt.ArrayLike]:
+    medium, surface = body.medium or Medium(), body.surface or Surface()
+    stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
+    limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
+    return {
+        "ior": medium.ior,
+        "dispersion": surface.dispersion,
+        "is_sheet": sheet is not None,
+        "scatters_much": surface.multiple_scattering and medium.scatters,
+        "sheet_depth": bounded_extinction(medium, scene.diagonal) * (sheet or 0.0),
+        "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
+        "painted_through": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
+        "painted_share": surface.diffuse_transmission,
+        "stream_absorption": np.minimum(stream[0], limit),
+        "stream_scattering": np.minimum(stream[1], limit),
+    }
