@@ -60,8 +60,8 @@ float border_reflectance(float cosine, float ior, float roughness) {
     float polished = fresnel_dielectric(cosine, ior);
     if (roughness == 0.0 || polished >= 1.0) { return polished; }
     float facing = fresnel_dielectric(1.0, ior);
-    vec2 rough = texture(reflectance_table, (vec2(cosine, roughness) * 63.0 + 0.5) / 64.0).rg;
-    vec2 smooth_one = texture(reflectance_table, (vec2(cosine, 0.0) * 63.0 + 0.5) / 64.0).rg;
+    vec2 rough = texture(reflectance_table, reflectance_place(cosine, roughness)).rg;
+    vec2 smooth_one = texture(reflectance_table, reflectance_place(cosine, 0.0)).rg;
     return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.tone import (
@@ -25,6 +26,19 @@ PEEL_BATCH = 8
 
 #: Pixels along a side of the tiles of which peeling learns how many crossings they have at most.
 PEEL_TILE = 16
+
+#: Binding points of the buffers that shaders write to. Lists of lights are made at those of the lists of pixels, which
+#: are there at no other time.
+STORAGE_BINDINGS = {
+    "words": 0,
+    "count": 0,
+    "heads": 1,
+    "nodes": 2,
+    "light_heads": 3,
+    "light_nodes": 4,
+    "light_media": 5,
+    "light_ends": 6,
+}
 
 #: What each name stands for in GLSL.
 CONSTANTS: dict[str, str] = {
@@ -68,5 +82,7 @@ CONSTANTS: dict[str, str] = {
     "AGX_SLOPE": repr(AGX_SLOPE),
     "AGX_DISPLAY": repr(AGX_DISPLAY),
     "TOUCHING": "1e-6",  # places between surfaces that count as one border
+    "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
+    **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
 }

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
-from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.constants import CONSTANTS, STORAGE_BINDINGS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
@@ -23,8 +23,6 @@ _FIRST_NODES_PER_PIXEL = 2
 
 #: Room beyond what a frame needed, so that the next one does not have to grow again.
 _SLACK = 1.25
-
-_COUNT, _HEADS, _NODES = 0, 1, 2
 
 
 class FragmentListsPass:
@@ -85,8 +83,8 @@ class FragmentListsPass:
         count, heads = job.targets.buffers.get("count", 4), job.targets.buffers.get("heads", 4 * width * height)
         count.write(np.zeros(1, np.uint32))
         heads.clear()
-        for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, self._nodes(job))):
-            buffer.bind_to_storage_buffer(binding)
+        for name, buffer in (("count", count), ("heads", heads), ("nodes", self._nodes(job))):
+            buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
         _use_rows(job.targets.steepest(), first, last)
         job.targets.steepest().clear()
         gl.enable_only(moderngl.BLEND)

@@ -7,6 +7,7 @@ from typing import cast
 import moderngl
 import numpy as np
 
+from translucent.gpu.constants import STORAGE_BINDINGS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
@@ -30,7 +31,7 @@ class KBufferPass:
         words = job.targets.buffers.get("words", 4 * (k + 1) * width * height)
         # A count of 0, and k times no crossing.
         words.clear(chunk=np.array([0] + [0xFFFFFFFF] * k, np.uint32).tobytes(), size=4 * (k + 1) * width * height)
-        words.bind_to_storage_buffer(0)
+        words.bind_to_storage_buffer(STORAGE_BINDINGS["words"])
         steepest = job.targets.steepest()
         steepest.use()
         steepest.clear()

@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
+from translucent.gpu.constants import STORAGE_BINDINGS
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.light_cameras import light_cameras
@@ -27,9 +28,8 @@ _NODE, _MEDIUM = 16, 16
 #: Texels along a side of a light's view, and twice those of each of the six of a cube: the first that fit are taken.
 _SIDES = (1024, 512, 256, 128)
 
-#: Binding points of the buffers while they are made, and while they are read.
-_COUNT, _HEADS, _NODES, _MEDIA, _ENDS = 0, 1, 2, 5, 6
-_READ = {"light_heads": 3, "light_nodes": 4, "light_media": _MEDIA, "light_ends": _ENDS}
+#: Buffers that shaders read once they are made.
+_READ = ("light_heads", "light_nodes", "light_media", "light_ends")
 
 #: Nodes in the first buffers, for each texel: enough for most bodies. Frames that need more get larger ones, and keep
 #: them.
@@ -59,9 +59,9 @@ class LightViewsPass:
             self._held = seen, self._look(job, spec)
         job.light(self._held[1])
         job.uniforms.bind()
-        for name, binding in _READ.items():
+        for name in _READ:
             if name != "light_ends" or job.scene.opaque:
-                job.resources.light_lists.get(name, 1).bind_to_storage_buffer(binding)
+                job.resources.light_lists.get(name, 1).bind_to_storage_buffer(STORAGE_BINDINGS[name])
 
     def _look(self, job: FrameJob, spec: PassSpec) -> LightLookup:
         """What all lights see, in the largest views that fit."""
@@ -103,14 +103,14 @@ class LightViewsPass:
             return False
         heads, count = lists.get("light_heads", 4 * cells), lists.get("light_count", 4)
         if job.scene.opaque:
-            lists.get("light_ends", 4 * cells).bind_to_storage_buffer(_ENDS)
+            lists.get("light_ends", 4 * cells).bind_to_storage_buffer(STORAGE_BINDINGS["light_ends"])
         needed = min(int(_FIRST_SHARE * cells) + 1, most)
         while True:
             nodes, media = lists.get("light_nodes", _NODE * needed), lists.get("light_media", _MEDIUM * needed)
             count.write(np.zeros(1, np.uint32))
             heads.clear()
-            for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, nodes), (_MEDIA, media)):
-                buffer.bind_to_storage_buffer(binding)
+            for name, buffer in (("count", count), ("heads", heads), ("nodes", nodes), ("light_media", media)):
+                buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
             for view, offset in zip(views, first_texels(views), strict=True):
                 self._draw(view, spec, offset)
             found = int(np.frombuffer(count.read(), np.uint32)[0]) + spare
