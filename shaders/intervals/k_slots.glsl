@@ -1,6 +1,8 @@
 // For each pixel: how many crossings there were, and the k nearest of them in order.
 
-layout(std430, binding = 0) buffer Words { uint words[]; };
+#include <constants>
+
+layout(std430, binding = WORDS_BINDING) buffer Words { uint words[]; };
 
 uniform int k;
 

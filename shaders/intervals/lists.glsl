@@ -1,14 +1,16 @@
 // Lists of crossings, one for each pixel. A link is the number of a node, counted from 1; 0 ends a list. So it ends, too,
 // for the neighbors of a pixel that are shaded along with it at an edge, and that on some hardware read 0 everywhere.
 
-layout(std430, binding = 0) buffer Count { uint node_count; };
-layout(std430, binding = 1) buffer Heads { uint heads[]; };  // links
+#include <constants>
+
+layout(std430, binding = COUNT_BINDING) buffer Count { uint node_count; };
+layout(std430, binding = HEADS_BINDING) buffer Heads { uint heads[]; };  // links
 #if GRADIENT
 #define NODE uvec4
 #else
 #define NODE uvec2
 #endif
-layout(std430, binding = 2) buffer Nodes { NODE nodes[]; };  // word, link to the next; how the place changes across pixels
+layout(std430, binding = NODES_BINDING) buffer Nodes { NODE nodes[]; };  // word, link to the next; how the place changes across pixels
 
 const uint END_OF_LIST = 0u;
 

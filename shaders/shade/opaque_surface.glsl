@@ -58,7 +58,7 @@ vec3 fresnel_of(Layer layer, float away) {
 vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) {
     float ior = opaque_finish.z;
     float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
-    vec2 table = textureLod(reflectance_table, (vec2(cos_view, finish.roughness) * 63.0 + 0.5) / 64.0, 0.0).rg;
+    vec2 table = textureLod(reflectance_table, reflectance_place(cos_view, finish.roughness), 0.0).rg;
     Layer coat = layer_of(vec3((ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0))), table);
     Layer metal = layer_of(finish.base, table);
     float painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored.r);

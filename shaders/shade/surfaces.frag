@@ -7,6 +7,7 @@
 #include <Environment>
 #include <Lights>
 #include <Surfaces>
+#include <SurfaceRow>
 #include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
@@ -25,7 +26,6 @@ uniform sampler2D surface_color;
 #if !ONE_BORDER
 uniform sampler2D left_finish;       // object of what is left
 #endif
-uniform sampler2D surface_table;     // a row for each object
 uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
 
 layout(location = 0) out vec4 out_radiance;
@@ -48,13 +48,11 @@ struct Finish {
     float unoccluded;     // share of the light of the environment that reaches it
 };
 
-Finish finish_of(int object) {
-    vec4 a = texelFetch(surface_table, ivec2(0, object), 0);
-    vec4 b = texelFetch(surface_table, ivec2(1, object), 0);
-    vec4 c = texelFetch(surface_table, ivec2(2, object), 0);
-    vec4 d = texelFetch(surface_table, ivec2(3, object), 0);
-    vec4 e = texelFetch(surface_table, ivec2(4, object), 0);
-    return Finish(a.x, a.y, a.z > 0.5, a.w > 0.5, b.rgb, c.rgb, e.w, d.rgb, e.rgb, b.w, c.w, d.w, vec3(1.0), 1.0);
+// surface: object, roughness, transmission.
+Finish finish_of(vec4 surface) {
+    SurfaceRow row = surface_table_row(int(surface.x + 0.5));
+    return Finish(row.ior, row.dispersion, row.is_sheet > 0.5, row.scatters_much > 0.5, row.sheet_depth, row.painted_through,
+        row.painted_share, row.stream_absorption, row.stream_scattering, row.longest, surface.y, surface.z, vec3(1.0), 1.0);
 }
 
 // Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -62,8 +60,8 @@ float border_reflectance(float cosine, float ior, float roughness) {
     float polished = fresnel_dielectric(cosine, ior);
     if (roughness == 0.0 || polished >= 1.0) { return polished; }
     float facing = fresnel_dielectric(1.0, ior);
-    vec2 rough = texture(reflectance_table, (vec2(cosine, roughness) * 63.0 + 0.5) / 64.0).rg;
-    vec2 smooth_one = texture(reflectance_table, (vec2(cosine, 0.0) * 63.0 + 0.5) / 64.0).rg;
+    vec2 rough = texture(reflectance_table, reflectance_place(cosine, roughness)).rg;
+    vec2 smooth_one = texture(reflectance_table, reflectance_place(cosine, 0.0)).rg;
     return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
 }
 
@@ -229,9 +227,7 @@ void main() {
 #else
     vec4 surface = starts_inside ? texelFetch(left_finish, texel, 0) : texelFetch(surface_finish, texel, 0);
 #endif
-    Finish finish = finish_of(int(surface.x + 0.5));
-    finish.roughness = surface.y;
-    finish.transmission = surface.z;
+    Finish finish = finish_of(surface);
     if (!starts_inside) {
         vec4 tint = texelFetch(surface_color, texel, 0);
         finish.color = tint.rgb;

@@ -1,5 +1,6 @@
 // Sorts the crossings on the ray of each texel of a view from a light, and notes what is behind each.
 
+#include <constants>
 #include <View>
 #include "intervals/lists.glsl"
 #include "intervals/sort_list.glsl"
@@ -11,8 +12,8 @@
 #else
 #define MEDIUM vec4
 #endif
-layout(std430, binding = 5) buffer LightMedia { MEDIUM light_media[]; };
-layout(std430, binding = 6) buffer LightEnds { float light_ends[]; };
+layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { MEDIUM light_media[]; };
+layout(std430, binding = LIGHT_ENDS_BINDING) buffer LightEnds { float light_ends[]; };
 
 #if OPAQUE
 uniform sampler2D opaque_place;

@@ -2,17 +2,18 @@
 // across the texel, and what is behind each. So the optical depth from the light to any point is a sum over the crossings
 // before it, moved along their faces to the very ray of the point.
 
+#include <constants>
 #include <Scatter>
 #include "intervals/crossing.glsl"
 
-layout(std430, binding = 3) buffer LightHeads { uint light_heads[]; };    // links, view after view
-layout(std430, binding = 4) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the place
+layout(std430, binding = LIGHT_HEADS_BINDING) buffer LightHeads { uint light_heads[]; };    // links, view after view
+layout(std430, binding = LIGHT_NODES_BINDING) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the place
 #if VARIES
-layout(std430, binding = 5) buffer LightMedia { uvec4 light_media[]; };   // turns of the slots, metres for each place
+layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { uvec4 light_media[]; };   // turns of the slots, metres for each place
 #else
-layout(std430, binding = 5) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres for each place
+layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres for each place
 #endif
-layout(std430, binding = 6) buffer LightEnds { float light_ends[]; };     // place where an opaque surface ends each ray
+layout(std430, binding = LIGHT_ENDS_BINDING) buffer LightEnds { float light_ends[]; };     // place where an opaque surface ends each ray
 
 // Where the views of a light are: their texels begin at first, and each has size x size of them.
 struct LightCells {

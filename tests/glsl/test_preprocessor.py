@@ -9,7 +9,7 @@ import pytest
 
 import translucent as tl
 from translucent.gpu import shaders
-from translucent.gpu.layout import BLOCKS, UniformBlock
+from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
 from translucent.gpu.shaders import build_program, preprocess, set_uniform
 
 
@@ -114,3 +114,33 @@ def test_block_layout_is_what_the_driver_uses(renderer: tl.Renderer, block: Unif
 def test_a_block_wants_all_its_fields_and_no_others() -> None:
     with pytest.raises(KeyError, match="frame_size"):
         BLOCKS["View"].pack(frame=1.0)
+
+
+@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
+def test_a_record_of_a_table_reads_as_it_was_packed(renderer: tl.Renderer, table: PackedTable) -> None:
+    """Read every component of the second of three records back, each into an output of its own."""
+    rng = np.random.default_rng(2)
+    records = [{name: rng.random(shape) for name, _, shape in table.fields} for _ in range(3)]
+    sizes = [int(np.prod(shape)) for _, _, shape in table.fields]
+    places = [
+        f"row.{name}" + (f"[{i}]" if shape else "")
+        for (name, _, shape), size in zip(table.fields, sizes, strict=True)
+        for i in range(size)
+    ]
+    choices = "".join(f"if (gl_VertexID == {i}) {{ value = {place}; }}\n" for i, place in enumerate(places))
+    read = f"{table.name} row = {table.sampler}_row(1);\nvalue = 0.0;\n{choices}"
+    code = f"#version 330 core\n{table.glsl}out float value;\nvoid main() {{\n{read}}}\n"
+    packed = table.pack(records)
+    with renderer.gpu.context.current() as gl:
+        program = gl.program(vertex_shader=code, varyings=["value"])
+        texture, output = gl.texture(packed.shape[1::-1], 4, packed, dtype="f4"), gl.buffer(reserve=4 * len(places))
+        texture.use(0)
+        gl.framebuffer([gl.texture((1, 1), 1)]).use()
+        gl.vertex_array(program, []).transform(output, vertices=len(places))
+        found = np.frombuffer(output.read(), np.float32)
+    assert (found == np.concatenate([np.ravel(value) for value in records[1].values()]).astype(np.float32)).all()
+
+
+def test_a_record_wants_all_its_fields() -> None:
+    with pytest.raises(KeyError, match=r"packed table SurfaceRow: .*'sheet_depth'"):
+        TABLES["SurfaceRow"].pack([{"ior": 1.5}])

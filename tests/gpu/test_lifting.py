@@ -13,8 +13,9 @@ from translucent.assets import shader_library, shader_names
 from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import shaders
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.lifting import PLAIN, WITH_STORAGE, find_shader, lift, switches
-from translucent.gpu.shaders import CONSTANTS, ShaderSource, gather
+from translucent.gpu.shaders import ShaderSource, gather
 
 SIZE = (24, 18)
 BALL, BOX = Sphere().tessellate(12), Box((-0.4, -0.3, -0.6), (0.5, 0.7, 0.2)).tessellate()

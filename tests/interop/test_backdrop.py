@@ -12,8 +12,8 @@ import pytest
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.placement import AxialRange
-from translucent.gpu.shaders import CONSTANTS
 from translucent.planning.plan import plan_over_backdrop
 
 Array = npt.NDArray[Any]
@@ -63,7 +63,7 @@ def opaque_picture(renderer: tl.Renderer, scene: tl.Scene) -> tuple[Array, Array
         job.release()
     seen = place[..., 0] < float(CONSTANTS["NOTHING"])
     metres = np.full(SIZE[::-1], np.inf)
-    metres[seen] = place[seen, 0] * job.media_range.length + job.media_range.near
+    metres[seen] = place[seen, 0] * job.placed.media.length + job.placed.media.near
     return np.where(seen[..., None], radiance[..., :3], 0.0), metres
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
-from translucent.gpu.shaders import CONSTANTS
+from translucent.gpu.constants import CONSTANTS
 from translucent.interop.pyrender import backdrop_from_pyrender, render, render_scene, scene_from_pyrender, to_pyrender
 from translucent.reference.hits import line_hits, world_normals
 from translucent.reference.opaque import nearest_opaque
@@ -102,7 +102,7 @@ def _ahead(renderer: tl.Renderer, scene: tl.Scene) -> Array:
         place = np.frombuffer(texels, np.float32).reshape(SIZE[::-1])[::-1].astype(np.float64)
         job.release()
     nothing = place >= float(CONSTANTS["NOTHING"])
-    return np.where(nothing, np.inf, np.where(nothing, 0.0, place) * job.media_range.length + job.media_range.near)
+    return np.where(nothing, np.inf, np.where(nothing, 0.0, place) * job.placed.media.length + job.placed.media.near)
 
 
 def _slopes(scene: tl.Scene) -> Array:

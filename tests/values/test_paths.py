@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from translucent.files.images import write_png
 
 import translucent as tl
+from translucent.files.images import write_png
 from translucent.files.paths import require_file, require_folder, require_place, write_atomically, write_text_atomically
 
 

@@ -101,7 +101,7 @@ class _OnGpu:
     def bytes_per_pixel(self) -> int | None:
         """Of all targets and buffers that have been made in this size."""
         width, height = self._job.targets.size
-        lights = self._job.resources.light_lists.size // (width * height) if self._job.scatters else 0
+        lights = self._job.resources.light_lists.size // (width * height) if self._job.features.scatters else 0
         return self._job.targets.bytes_per_pixel() + lights
 
     def release(self) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import RenderError
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import DENSITY
-from translucent.gpu.shaders import CONSTANTS
 from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.scene import Object, Scene

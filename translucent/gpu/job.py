@@ -1,4 +1,4 @@
-"""One frame under way: the scene, its plan, and what the passes share."""
+"""One frame under way: its scene and plan, and what the passes share."""
 
 from __future__ import annotations
 
@@ -8,61 +8,44 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.balance import Balance, face_counts
+from translucent.gpu.body_uniforms import body_roles
 from translucent.gpu.densities import density_uniforms, scene_grids
-from translucent.gpu.layout import BODY, DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, VIEW
+from translucent.gpu.features import FrameFeatures
+from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, UniformBlock
 from translucent.gpu.light_cameras import media_sphere
-from translucent.gpu.placement import AxialRange, Placement, depth_range
+from translucent.gpu.placement import PlacedScene, SampleView, depth_range
 from translucent.gpu.resources import Resources
-from translucent.gpu.shaders import CONSTANTS
+from translucent.gpu.scene_view import SceneView
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
-    BodyRole,
-    LightViews,
-    View,
-    body_uniforms,
+    LightLookup,
     environment_uniforms,
     light_uniforms,
     media_uniforms,
     scatter_uniforms,
     shade_uniforms,
     surface_uniforms,
-    view_uniforms,
 )
-from translucent.planning.methods import FragmentLists, KBuffer, RayMarched, SignedDepth, ThinLayer
-from translucent.planning.plan import FALLBACK_SHEET
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.slots import medium_slots
 from translucent.scene.backdrop import Backdrop
-from translucent.scene.scene import Object, Scene
-
-_UNEXPECTED = float(CONSTANTS["UNEXPECTED"])
-
-#: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
-_ALIGNMENT = 256
-
-#: A path of less than this share of the diagonal is the rounding of a sum that should be 0.
-_COVERAGE_FLOOR = 2e-7
-
-#: Counts of open bodies must not cancel: the first gets 16 times the weight of closed ones, the next 16 times that, and
-#: so on, as far as float32 counts exactly. Beyond, they share the last weight.
-_OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
-
-#: With weights up to this, a count's fraction still resolves how far the rasterizer may misplace a face.
-_SHARING_WEIGHT = 256.0
-
-#: Share of the diagonal that a path may be below 0 by rounding; it then counts as 0. Steep faces have the largest
-#: errors, of some 1e-5.
-_ROUNDING = 1e-5
+from translucent.scene.scene import Scene
 
 
-class FrameJob:
-    """What a pass needs: bodies placed before the camera, uniform buffers, targets.
+class FrameJob(SceneView):
+    """What a pass needs: the features of the frame, its bodies placed before the camera, its targets.
 
     Parameters
     ----------
     gl, scene, plan, targets, resources
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
+
+    Attributes
+    ----------
+    features : FrameFeatures
+    averaging : bool
+        The samples of the frame are being summed up.
     """
 
     def __init__(
@@ -74,125 +57,47 @@ class FrameJob:
         resources: Resources,
         backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> None:
-        self.gl = gl
-        self.scene = scene
+        self.started = time.perf_counter()
         self.plan = plan
-        self.targets = targets
-        self.resources = resources
         self.backdrop = backdrop
         self.averaging = False
-        self.light_views: LightViews | None = None
-        self.started = time.perf_counter()
-        self.slots = medium_slots(scene)
-        self._placements = [Placement.of(body, scene.camera) for body in scene.objects]
-        self.media_range = AxialRange.of(scene.bodies, scene.camera)
-        self._opaque_range = AxialRange.of(scene.opaque, scene.camera) if scene.opaque else None
-        self._roles = self._body_roles()
-        self._stride = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
-        self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
-        self._bodies = gl.buffer(reserve=self._stride * len(scene.objects))
-        self._constant = {
-            SHADE: gl.buffer(
-                shade_uniforms(scene, self._expected_counts(), self._rounding(), _COVERAGE_FLOOR * scene.diagonal)
-            ),
-            MEDIA: gl.buffer(media_uniforms(scene, self.slots, self._placements, self.media_range)),
-            LIGHTS: gl.buffer(light_uniforms(scene, self.has_opaque or self.has_surfaces or self.has_layers)),
-            ENVIRONMENT: gl.buffer(environment_uniforms(scene.environment)),
-        }
-        if self.has_surfaces:
-            view = View(scene.camera, targets.size)
-            self._constant[SURFACES] = gl.buffer(surface_uniforms(scene, self.media_range, view))
-        if self.scene.varies:
-            densities = density_uniforms(scene, self.slots, media_sphere(scene)[0])
-            self._constant[DENSITY] = gl.buffer(densities)
+        self.features = FrameFeatures(scene, plan)
+        placed = PlacedScene.of(scene)
+        counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
+        contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
+        super().__init__(gl, placed, body_roles(self.features, counts), contents, targets, resources)
         self._cleared: set[str] = set()
+        self._lit = False
+        if self.features.marches and not self.features.scatters:
+            self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))
         self.place((0.0, 0.0))
 
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene
         depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
-        view = View(scene.camera, self.targets.size, shift, depths)
-        for i, (placement, role) in enumerate(zip(self._placements, self._roles, strict=True)):
-            record = body_uniforms(placement, view, role, self.media_range, scene.diagonal)
-            self._bodies.write(record, offset=i * self._stride)
-        self._view.write(view_uniforms(view, self.media_range, self._opaque_range))
+        self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths))
         self._cleared.clear()
-        self.bind()
 
-    def bind(self) -> None:
-        """Bind this frame's uniforms, where another's have been bound since it was placed."""
-        if self.marches and not self.scatters and self.light_views is None:
-            self.light_views = LightViews(media_sphere(self.scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4)))
-        if self.light_views is not None and SCATTER not in self._constant:
-            view = View(self.scene.camera, self.targets.size)
-            method = self.plan.method
-            points = method.steps if isinstance(method, RayMarched) else getattr(method, "light_points", 1)
-            content = scatter_uniforms(self.scene, self.media_range, view, self.light_views, points)
-            self._constant[SCATTER] = self.gl.buffer(content)
-        self._view.bind_to_uniform_block(VIEW.binding)
-        for block, buffer in self._constant.items():
-            buffer.bind_to_uniform_block(block.binding)
+    def light(self, lights: LightLookup) -> None:
+        """Tell the shaders where the lights are that media scatter; they are the same for all samples."""
+        if not self._lit:
+            content = scatter_uniforms(self.placed, self.targets.size, lights, self.plan.method.light_points)
+            self.uniforms.add(SCATTER, content)
+            self._lit = True
 
-    @property
-    def has_opaque(self) -> bool:
-        """Whether rays may end on an opaque surface."""
-        return any(step.name in ("opaque", "backdrop") for step in self.plan.passes)
-
-    @property
-    def has_surfaces(self) -> bool:
-        """Whether light changes at the border of a body."""
-        return any(step.name == "surfaces" for step in self.plan.passes)
-
-    @property
-    def has_layers(self) -> bool:
-        """Whether layers are painted over the picture, or borders glow: a sample is summed up after that."""
-        return any(step.name == "layers" for step in self.plan.passes)
-
-    @property
-    def one_border(self) -> bool:
-        """Whether rays bend at the border where they enter a body, and not at the one where they leave it."""
-        return self.plan.borders == "front"
-
-    @property
-    def finds_exits(self) -> bool:
-        """Whether the intervals tell where each ray first leaves all bodies: borders need it where bodies touch."""
-        return self.has_surfaces and isinstance(self.plan.method, FragmentLists | KBuffer | RayMarched)
-
-    @property
-    def scatters(self) -> bool:
-        """Whether light from the lights is scattered into the rays."""
-        return any(step.name == "light_views" for step in self.plan.passes)
-
-    @property
-    def marches(self) -> bool:
-        """Whether the method steps through the intervals."""
-        return isinstance(self.plan.method, RayMarched)
-
-    @property
-    def starts_inside(self) -> bool:
-        """Whether rays may start inside a body."""
-        return any(placement.expected_count[1] > 0 for placement in self._placements)
-
-    @property
-    def emits(self) -> bool:
-        """Whether any medium emits light."""
-        return any(body.medium is not None and body.medium.emits for body in self.scene.bodies)
+    def release(self) -> None:
+        """Free the uniform buffers; targets and resources are the renderer's."""
+        self.uniforms.release()
 
     @property
     def picture(self) -> moderngl.Framebuffer:
         """Whose first attachment is the frame's radiance."""
-        return self.targets.surfaced() if self.has_surfaces else self.targets.result()
+        return self.targets.surfaced() if self.features.has_surfaces else self.targets.result()
 
-    @property
-    def sheets(self) -> dict[int, float]:
-        """Thickness in metres of the objects that are drawn as sheets, without an inside, by their numbers."""
-        thin = isinstance(self.plan.method, ThinLayer)
-        return {
-            i: self._sheet_thickness(body)
-            for i, body in enumerate(self.scene.objects)
-            if body.medium is not None and (thin or body.sheet_thickness is not None)
-        }
+    def sums_after(self, name: str) -> bool:
+        """Whether the pass of this name adds a sample to the averages, in place of showing it."""
+        return self.averaging and name == self.features.last_pass
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
         """Target in which thickness passes add up, cleared when a frame first asks for it."""
@@ -214,86 +119,29 @@ class FrameJob:
 
     def bind_opaque(self, unit: int) -> None:
         """Give the places where rays end to the shader that reads texture `unit`, if there are any."""
-        if self.has_opaque:
+        if self.features.has_opaque:
             self.targets.opaque().color_attachments[0].use(unit)
 
     def bind_grids(self, unit: int) -> None:
         """Give the density grids to the shader that reads texture `unit`, if a density varies."""
         if self.scene.varies:
-            self.resources.grids.use(unit, scene_grids(self.scene, self.slots))
-
-    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
-        """Draw objects with the current state; front faces are those where a ray enters."""
-        for i in objects:
-            body = self.scene.objects[i]
-            self._bodies.bind_to_uniform_block(BODY.binding, offset=i * self._stride, size=BODY.dtype.itemsize)
-            self.gl.front_face = "cw" if body.faces_inwards else "ccw"
-            self.resources.meshes[body.mesh].vertex_array(program, body.mesh).render()
-        self.gl.front_face = "ccw"
-
-    def release(self) -> None:
-        """Free the uniform buffers."""
-        for buffer in (self._view, self._bodies, *self._constant.values()):
-            buffer.release()
-
-    def _body_roles(self) -> list[BodyRole]:
-        anchored = not (isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored)
-        slot_of = {i: number for number, slot in enumerate(self.slots) for i in slot.objects}
-        weights = _count_weights(self.scene)
-        # Where a body is broken, paths below 0 are more likely to be real than swapped at a silhouette.
-        sound = all(body.mesh.diagnosis.sound for body in self.scene.bodies if body.sheet_thickness is None)
-        subpixel = 0.5 ** int(self.gl.info["GL_SUBPIXEL_BITS"]) if sound else 0.0
-        return [
-            BodyRole(
-                anchored,
-                self._sheet_thickness(body),
-                weights[i],
-                _UNEXPECTED if body.medium is not None and body.mesh.diagnosis.inside_out else 0.0,
-                subpixel,
-                max(weights) <= _SHARING_WEIGHT,
-                slot_of.get(i, 0),
-                i,
-            )
-            for i, body in enumerate(self.scene.objects)
-        ]
-
-    def _sheet_thickness(self, body: Object) -> float:
-        if body.sheet_thickness is not None:
-            return body.sheet_thickness
-        if isinstance(self.plan.method, ThinLayer):
-            return self.plan.method.thickness
-        return FALLBACK_SHEET * float(np.linalg.norm(body.bounds[1] - body.bounds[0]))
-
-    def _expected_counts(self) -> tuple[float, float]:
-        """Least and greatest sum of signed counts of a pixel that can be trusted."""
-        if isinstance(self.plan.method, ThinLayer):
-            return 0.0, 0.0
-        pairs = [
-            (role.count_weight * placement.expected_count[0], role.count_weight * placement.expected_count[1])
-            for role, placement in zip(self._roles, self._placements, strict=True)
-        ]
-        low, high = zip(*pairs, strict=True)
-        return sum(low), sum(high)
-
-    def _rounding(self) -> float:
-        """How far below 0 a path may be, in metres, by the rounding of float32 alone.
-
-        Next to a silhouette a rasterizer may swap two faces, and a path is then below 0 by as much as it misplaces
-        them; that differs from pixel to pixel, and goes along with what they hold (``thickness/snapping.glsl``).
-        """
-        reach = self.scene.diagonal
-        if isinstance(self.plan.method, SignedDepth) and not self.plan.method.anchored:
-            # Distances from the camera cancel with an error that grows with them.
-            reach += max(float(np.linalg.norm(placement.anchor)) for placement in self._placements)
-        return _ROUNDING * reach
+            self.resources.grids.use(unit, scene_grids(self.scene, self.features.slots))
 
 
-def _count_weights(scene: Scene) -> list[float]:
-    """What a face of each object adds to a pixel's count."""
-    weights = []
-    used = 0
-    for body in scene.objects:
-        is_open = body.medium is not None and body.sheet_thickness is None and not body.mesh.diagnosis.solid
-        weights.append(_OPEN_WEIGHTS[min(used, len(_OPEN_WEIGHTS) - 1)] if is_open else 1.0)
-        used += is_open
-    return weights
+def _contents(
+    features: FrameFeatures, placed: PlacedScene, balance: Balance, size: tuple[int, int]
+) -> dict[UniformBlock, bytes]:
+    """Contents of the blocks that are alike for all samples of a frame."""
+    scene = placed.scene
+    shine = features.has_opaque or features.has_surfaces or features.has_layers
+    contents = {
+        SHADE: shade_uniforms(scene, balance),
+        MEDIA: media_uniforms(placed, features.slots),
+        LIGHTS: light_uniforms(scene, shine),
+        ENVIRONMENT: environment_uniforms(scene.environment),
+    }
+    if features.has_surfaces:
+        contents[SURFACES] = surface_uniforms(placed, size)
+    if scene.varies:
+        contents[DENSITY] = density_uniforms(scene, features.slots, media_sphere(scene)[0])
+    return contents

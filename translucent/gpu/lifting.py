@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 from translucent.assets import shader_names
 from translucent.errors import InputError
-from translucent.gpu.shaders import CONSTANTS, Gathered, gather
+from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.shaders import Gathered, gather
 from translucent.suggestions import close_names, did_you_mean
 
 _NAME = re.compile(r"[A-Za-z_]\w*")

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.scene.camera import Camera
-from translucent.scene.scene import Object
+from translucent.scene.scene import Object, Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -82,6 +82,60 @@ class AxialRange:
     def length(self) -> float:
         """In metres, above 0."""
         return self.far - self.near
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedScene:
+    """A scene as its camera sees it.
+
+    Attributes
+    ----------
+    scene : Scene
+    placements : tuple of Placement
+        Of its objects.
+    media : AxialRange
+        Of all its media.
+    opaque : AxialRange, optional
+        Of what is opaque, if anything is.
+    """
+
+    scene: Scene
+    placements: tuple[Placement, ...]
+    media: AxialRange
+    opaque: AxialRange | None
+
+    @classmethod
+    def of(cls, scene: Scene) -> PlacedScene:
+        """Place the objects of a scene before its camera."""
+        placements = tuple(Placement.of(body, scene.camera) for body in scene.objects)
+        opaque = AxialRange.of(scene.opaque, scene.camera) if scene.opaque else None
+        return cls(scene, placements, AxialRange.of(scene.bodies, scene.camera), opaque)
+
+    @property
+    def starts_inside(self) -> bool:
+        """Whether rays may start inside a body."""
+        return any(placement.expected_count[1] > 0 for placement in self.placements)
+
+
+@dataclass(frozen=True)
+class SampleView:
+    """The camera, and the sample points of a picture.
+
+    Attributes
+    ----------
+    camera : Camera
+    size : (int, int)
+        Width and height in pixels.
+    shift : (float, float)
+        Of the sample points from the pixel centers, right and down, in pixels.
+    depth_range : (float, float), optional
+        Write depth between these metres; else all depths are alike, so that nothing is clipped but what is behind.
+    """
+
+    camera: Camera
+    size: tuple[int, int]
+    shift: tuple[float, float] = (0.0, 0.0)
+    depth_range: tuple[float, float] | None = None
 
 
 def depth_range(objects: Sequence[Object], camera: Camera, diagonal: float) -> tuple[float, float]:

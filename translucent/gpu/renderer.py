@@ -17,12 +17,12 @@ from translucent.errors import RenderError
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
-from translucent.gpu.shaders import CONSTANTS
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.render_plan import Capabilities, RenderPlan
@@ -189,7 +189,7 @@ class GpuRenderer:
             provenance=dict(self.provenance),
             layers=layers,
             truncated=truncated,
-            normals=_read_normals(job.targets.entered()) if job.has_surfaces else None,
+            normals=_read_normals(job.targets.entered()) if job.features.has_surfaces else None,
         )
 
     def close(self) -> None:

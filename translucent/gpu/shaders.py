@@ -5,79 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import moderngl
 
 from translucent.assets import shader_path
 from translucent.errors import RenderError
-from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
-from translucent.formulas.tone import (
-    AGX_DISPLAY,
-    AGX_MIDDLE_GREY,
-    AGX_MIX,
-    AGX_SHOULDER,
-    AGX_SLOPE,
-    AGX_STOPS,
-    AGX_TOE,
-    NEUTRAL_DESATURATION,
-    NEUTRAL_F90,
-    NEUTRAL_START,
-)
-from translucent.gpu.layout import BLOCKS
-from translucent.planning.methods.ray_marched import LEAST_SEEN, Quadrature
-
-#: Peeling passes that are folded at a time: as many textures as every driver can read, besides those of their state.
-PEEL_BATCH = 8
-
-#: Pixels along a side of the tiles of which peeling learns how many crossings they have at most.
-PEEL_TILE = 16
-
-#: Numbers that shaders share; Python is the only place where they are written.
-CONSTANTS: dict[str, str] = {
-    "PI": "3.14159265358979",
-    "LUMINANCE_WEIGHTS": f"vec3{LUMINANCE_WEIGHTS}",
-    "MIN_THIN_LAYER_COSINE": repr(MIN_THIN_LAYER_COSINE),
-    "MAX_OPTICAL_DEPTH": "1e4",  # exp of its negative is 0 with a wide margin
-    "SERIES_LIMIT": "0.5",
-    "NOTHING": "1e30",  # beyond every distance: coordinates end at 1e18
-    "UNEXPECTED": "1e6",  # a count that no pixel expects
-    "PLACE_BITS": "29",  # of a crossing's 30 bits, those that place and slot share; one is the side's
-    "LARGEST_WORD": "0x3fffffffu",
-    "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
-    "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
-    "PEEL_BATCH": str(PEEL_BATCH),
-    "PEEL_TILE": str(PEEL_TILE),
-    "STEEP_IN_LIGHT_VIEW": "5e-3",  # places per texel, from which on a face may well curve within a texel
-    **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
-    "LEAST_SEEN": repr(LEAST_SEEN),
-    "DENSITY_GRID": "1.0",
-    "DENSITY_LINEAR": "2.0",
-    "DENSITY_EXPONENTIAL": "3.0",
-    "TURNS_BITS": "6",  # of a word, for how often a medium fills a place
-    "TURNS_PER_WORD": "5",
-    "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this share of it are near
-    "FLAG_COVERED": "1.0",
-    "FLAG_VALID": "2.0",
-    "ENVIRONMENT_CONSTANT": "0",
-    "ENVIRONMENT_GRADIENT": "1",
-    "ENVIRONMENT_CHECKERBOARD": "2",
-    "ENVIRONMENT_IMAGE": "3",
-    "NEUTRAL_F90": repr(NEUTRAL_F90),
-    "NEUTRAL_START": repr(NEUTRAL_START),
-    "NEUTRAL_DESATURATION": repr(NEUTRAL_DESATURATION),
-    "AGX_LOW": repr(AGX_STOPS[0]),
-    "AGX_HIGH": repr(AGX_STOPS[1]),
-    "AGX_MIDDLE_GREY": repr(AGX_MIDDLE_GREY),
-    "AGX_MIX": f"vec3{AGX_MIX}",
-    "AGX_TOE": repr(AGX_TOE),
-    "AGX_SHOULDER": repr(AGX_SHOULDER),
-    "AGX_SLOPE": repr(AGX_SLOPE),
-    "AGX_DISPLAY": repr(AGX_DISPLAY),
-    "TOUCHING": "1e-6",  # places between surfaces that count as one border
-    "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
-}
+from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
 _CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")
@@ -176,11 +111,12 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
     if name == "<constants>":
         return "\n".join(f"#define {key} {value}" for key, value in CONSTANTS.items())
     if name.startswith("<"):
-        if (block := BLOCKS.get(name[1:-1])) is None:
+        generated: dict[str, UniformBlock | PackedTable] = {**BLOCKS, **TABLES}
+        if (found := generated.get(name[1:-1])) is None:
             raise RenderError(
-                f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(BLOCKS)}, constants"
+                f"shader {parents[-1]!r}", f"includes {name}", f"use one of {', '.join(generated)}, constants"
             )
-        return block.glsl
+        return found.glsl
     return shader_path(name).read_text(encoding="utf-8")
 
 

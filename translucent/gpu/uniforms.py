@@ -10,176 +10,37 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
+from translucent.gpu.balance import Balance
+from translucent.gpu.body_uniforms import MAX_SCENE_OPTICAL_DEPTH, bounded_extinction
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import (
-    BODY,
     ENVIRONMENT,
     LIGHTS,
     MAX_LIGHT_VIEWS,
     MAX_LIGHTS,
-    MAX_SCATTER_POINTS,
     MEDIA,
     SCATTER,
     SHADE,
+    SURFACE_ROW,
     SURFACES,
     VIEW,
 )
-from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement
-from translucent.gpu.shaders import CONSTANTS
+from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.media.medium import Medium
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
+from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
-from translucent.reference.sheets import SHEET_ON_OPAQUE
-from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PointLight
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 
 Array = npt.NDArray[np.float64]
 
-#: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
-MAX_SCENE_OPTICAL_DEPTH = 1e30
 
-
-@dataclass(frozen=True)
-class View:
-    """The camera, and the sample points of a frame.
-
-    Attributes
-    ----------
-    camera : Camera
-    size : (int, int)
-        Width and height in pixels.
-    shift : (float, float)
-        Of the sample points from the pixel centers, right and down, in pixels.
-    depth_range : (float, float), optional
-        Write depth between these metres; else all depths are alike, so that nothing is clipped but what is behind.
-    """
-
-    camera: Camera
-    size: tuple[int, int]
-    shift: tuple[float, float] = (0.0, 0.0)
-    depth_range: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class BodyRole:
-    """What a body is in a frame, besides where it is.
-
-    Attributes
-    ----------
-    anchored : bool
-        Distances count from the body's center, not from the camera.
-    sheet_thickness : float
-        In metres, for passes that draw the body as a sheet.
-    count_weight : float
-        What one face adds to the count, with the sign of its side.
-    count_offset : float
-        What it adds whatever its side: not 0 marks all pixels that the body covers.
-    subpixel : float
-        Step of the grid onto which the rasterizer moves vertices, in pixels; 0 where nothing is put down to it.
-    counts_share : bool
-        The fraction of a count has room for how far the rasterizer may misplace a face.
-    slot : int
-        Whose winding number its crossings change.
-    number : int
-        Its place among the objects of the scene.
-    """
-
-    anchored: bool
-    sheet_thickness: float
-    count_weight: float
-    count_offset: float
-    subpixel: float
-    counts_share: bool
-    slot: int
-    number: int
-
-
-def body_uniforms(placement: Placement, view: View, role: BodyRole, media: AxialRange, diagonal: float) -> bytes:
-    """Contents of the Body block.
-
-    Parameters
-    ----------
-    placement, view, role
-    media : AxialRange
-        Of all media of the scene.
-    diagonal : float
-        Of the scene, in metres.
-    """
-    body, camera = placement.body, view.camera
-    seen = placement.camera_from_offset(camera)
-    axis = seen[2].copy()
-    if role.anchored and not placement.cut:
-        axis[3] = 0.0
-    anchor = seen[2, 3] - axis[3]
-    eye_from_offset = np.eye(4)
-    eye_from_offset[:3, :3], eye_from_offset[:3, 3] = body.matrix[:3, :3], placement.anchor
-    return BODY.pack(
-        clip_from_offset=_clip_rows(placement, view, seen),
-        world_from_normal=_normal_matrix(placement),
-        eye_from_offset=eye_from_offset,
-        axis=axis,
-        extinction=[*bounded_extinction(body.medium, diagonal), 0.0],
-        color=[*body.base_color, 0.0],
-        sheet_thickness=role.sheet_thickness,
-        sheet_ior=1.0 if body.medium is None else body.medium.ior,
-        sheet_tolerance=SHEET_ON_OPAQUE * diagonal,
-        axial_start=0.0 if camera.fov_y is None and placement.cut else -float(CONSTANTS["NOTHING"]),
-        count_weight=role.count_weight,
-        count_offset=role.count_offset,
-        subpixel=role.subpixel,
-        snapping_share=role.subpixel / diagonal if role.counts_share else 0.0,
-        place_scale=1.0 / media.length,
-        place_start=(anchor - media.near) / media.length,
-        slot=role.slot,
-        starts_unknown=placement.on_surface,
-        object=role.number,
-    )
-
-
-def _clip_rows(placement: Placement, view: View, seen: Array) -> Array:
-    camera = view.camera
-    half_width, half_height = camera.half_extent(view.size)
-    clip = np.zeros((4, 4))
-    clip[0], clip[1] = seen[0] / half_width, seen[1] / half_height
-    if camera.fov_y is None:
-        clip[3, 3] = 1.0
-    else:
-        clip[3] = seen[2]
-    clip[0] -= 2.0 * view.shift[0] / view.size[0] * clip[3]
-    clip[1] += 2.0 * view.shift[1] / view.size[1] * clip[3]
-    if view.depth_range is not None:
-        near, far = view.depth_range
-        if camera.fov_y is None:
-            clip[2] = (2.0 * seen[2] - (near + far) * clip[3]) / (far - near)
-        else:
-            clip[2] = clip[3] * (far + near) / (far - near) - np.eye(4)[3] * 2.0 * far * near / (far - near)
-    elif placement.on_surface:
-        # Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
-        clip[2, 3] = -NEAR_SURFACE * placement.body.mesh.diagonal
-    return clip
-
-
-def _normal_matrix(placement: Placement) -> Array:
-    body = placement.body
-    matrix = np.eye(4)
-    # The inverse transpose keeps outwards outwards under a mirror; only an inverted mesh has its normals inside.
-    matrix[:3, :3] = np.linalg.inv(body.matrix[:3, :3]).T * (-1.0 if body.mesh.diagnosis.inverted else 1.0)
-    # The scale of a normal is lost when it is normalised; unit scale keeps it within float32.
-    matrix[:3, :3] /= np.abs(matrix[:3, :3]).max()
-    return matrix
-
-
-def bounded_extinction(medium: Medium | None, diagonal: float) -> Array:
-    """(3,): extinction in 1/m that float32 can multiply with lengths of the scene; 0 without a medium."""
-    limit = MAX_SCENE_OPTICAL_DEPTH / max(diagonal, float(np.finfo(np.float64).tiny))
-    return np.zeros(3) if medium is None else np.minimum(medium.extinction, limit)
-
-
-def view_uniforms(view: View, media: AxialRange, opaque: AxialRange | None) -> bytes:
+def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
     """Contents of the View block."""
-    camera = view.camera
+    camera, media, opaque = view.camera, placed.media, placed.opaque
     half_width, half_height = camera.half_extent(view.size)
     perspective = camera.fov_y is not None
     reach = (0.0, 0.0)
@@ -194,8 +55,9 @@ def view_uniforms(view: View, media: AxialRange, opaque: AxialRange | None) -> b
     )
 
 
-def media_uniforms(scene: Scene, slots: tuple[Slot, ...], placements: list[Placement], media: AxialRange) -> bytes:
+def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
     """Contents of the Media block."""
+    scene, placements = placed.scene, placed.placements
     extinction, emission, scattering = (np.zeros((MAX_SLOTS, 4)) for _ in range(3))
     for i, slot in enumerate(slots[:MAX_SLOTS]):
         density = scene.objects[slot.objects[0]].density
@@ -210,14 +72,14 @@ def media_uniforms(scene: Scene, slots: tuple[Slot, ...], placements: list[Place
         slot_extinction=extinction,
         slot_emission=emission,
         slot_scattering=scattering,
-        place_metres=media.length,
+        place_metres=placed.media.length,
         slot_bits=slot_bits(len(slots)),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class LightViews:
-    """Views from the lights that media scatter.
+class LightLookup:
+    """Numbers by which shaders find points in the views from the lights that media scatter.
 
     Attributes
     ----------
@@ -237,17 +99,20 @@ class LightViews:
     rows: Array
 
 
-def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightViews, points: int) -> bytes:
+def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLookup, points: int) -> bytes:
     """Contents of the Scatter block.
 
     Parameters
     ----------
-    scene, media, view, lights
+    placed : PlacedScene
+    size : (int, int)
+        Width and height of the picture, in pixels.
+    lights : LightLookup
     points : int
         Gauss-Legendre points for each interval and light.
     """
-    camera = view.camera
-    half_width, half_height = camera.half_extent(view.size)
+    scene, camera, media = placed.scene, placed.scene.camera, placed.media
+    half_width, half_height = camera.half_extent(size)
     place, power, spans = (np.zeros((MAX_SCATTER_LIGHTS, 4)) for _ in range(3))
     seen = scene.lights[: len(lights.spans)]
     for i, light in enumerate(seen):
@@ -259,8 +124,8 @@ def scatter_uniforms(scene: Scene, media: AxialRange, view: View, lights: LightV
         spans[i] = lights.spans[i]
     rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
     rows[: len(lights.rows)] = lights.rows
-    gauss = np.zeros((MAX_SCATTER_POINTS, 4))
-    points = min(points, MAX_SCATTER_POINTS)  # marching by other rules has no use for them
+    gauss = np.zeros((MAX_LIGHT_POINTS, 4))
+    points = min(points, MAX_LIGHT_POINTS)  # marching by other rules has no use for them
     nodes, weights = np.polynomial.legendre.leggauss(points)
     gauss[:points, 0], gauss[:points, 1] = (nodes + 1) / 2, weights / 2
     center = lights.center - camera.eye
@@ -305,17 +170,17 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
     return LIGHTS.pack(light_place=place, light_power=power, light_count=len(lights))
 
 
-def shade_uniforms(scene: Scene, expected_count: tuple[float, float], rounding: float, coverage_floor: float) -> bytes:
+def shade_uniforms(scene: Scene, balance: Balance) -> bytes:
     """Contents of the Shade block; the first body's medium stands for all where they are alike."""
     medium = scene.bodies[0].medium
     assert medium is not None
     return SHADE.pack(
         extinction=[*bounded_extinction(medium, scene.diagonal), 0.0],
         emission=[*np.asarray(medium.emission), 0.0],
-        expected_count=expected_count,
-        rounding=rounding,
+        expected_count=balance.expected_count,
+        rounding=balance.rounding,
         count_share=scene.diagonal,
-        coverage_floor=coverage_floor,
+        coverage_floor=balance.coverage_floor,
     )
 
 
@@ -337,10 +202,10 @@ def environment_uniforms(environment: Environment) -> bytes:
     )
 
 
-def surface_uniforms(scene: Scene, media: AxialRange, view: View) -> bytes:
-    """Contents of the Surfaces block."""
-    camera = view.camera
-    half_width, half_height = camera.half_extent(view.size)
+def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
+    """Contents of the Surfaces block, for a picture of this size."""
+    scene, camera, media = placed.scene, placed.scene.camera, placed.media
+    half_width, half_height = camera.half_extent(size)
     boxes = np.stack([body.bounds for body in scene.bodies])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     center = 0.5 * low + 0.5 * high - camera.eye
@@ -356,23 +221,26 @@ def surface_uniforms(scene: Scene, media: AxialRange, view: View) -> bytes:
 
 
 def surface_table(scene: Scene, sheets: Mapping[int, float]) -> npt.NDArray[np.float32]:
-    """(objects, 5, 4): what ``shaders/shade/surfaces.frag`` reads of each object, besides what textures vary.
+    """(objects, texels, 4): a `SURFACE_ROW` of each object; that of an opaque one is not read.
 
     `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers.
     """
-    table = np.zeros((len(scene.objects), 5, 4), dtype=np.float32)
-    for i, (row, body) in enumerate(zip(table, scene.objects, strict=True)):
-        if body.medium is None:
-            continue
-        medium, surface = body.medium, body.surface or Surface()
-        stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
-        limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
-        passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
-        much = surface.multiple_scattering and medium.scatters
-        row[0] = medium.ior, surface.dispersion, i in sheets, much
-        row[1, :3] = bounded_extinction(medium, scene.diagonal) * sheets.get(i, 0.0)
-        row[1, 3] = np.linalg.norm(body.bounds[1] - body.bounds[0])
-        row[2] = *passed, surface.roughness
-        row[3] = *np.minimum(stream[0], limit), surface.transmission
-        row[4] = *np.minimum(stream[1], limit), surface.diffuse_transmission
-    return table
+    return SURFACE_ROW.pack([_surface_row(scene, body, sheets.get(i)) for i, body in enumerate(scene.objects)])
+
+
+def _surface_row(scene: Scene, body: Object, sheet: float | None) -> dict[str, npt.ArrayLike]:
+    medium, surface = body.medium or Medium(), body.surface or Surface()
+    stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
+    limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
+    return {
+        "ior": medium.ior,
+        "dispersion": surface.dispersion,
+        "is_sheet": sheet is not None,
+        "scatters_much": surface.multiple_scattering and medium.scatters,
+        "sheet_depth": bounded_extinction(medium, scene.diagonal) * (sheet or 0.0),
+        "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
+        "painted_through": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
+        "painted_share": surface.diffuse_transmission,
+        "stream_absorption": np.minimum(stream[0], limit),
+        "stream_scattering": np.minimum(stream[1], limit),
+    }

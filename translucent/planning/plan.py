@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from translucent.errors import InputError
-from translucent.planning.assembly import COSTS, FALLBACK_SHEET, assembled, with_unlit_marked
+from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
 from translucent.planning.borders import check_borders, with_one_border
 from translucent.planning.effects import unmodelled_effects, with_ambient_told
@@ -18,7 +18,7 @@ from translucent.planning.render_plan import Borders, Capabilities, RenderPlan
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
-__all__ = ["FALLBACK_SHEET", "plan", "plan_over_backdrop"]
+__all__ = ["plan", "plan_over_backdrop"]
 
 
 def plan(

@@ -20,7 +20,7 @@ from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.surfaces import SurfacesPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassName, PassSpec
 
 
 class Pass(Protocol):
@@ -32,21 +32,21 @@ class Pass(Protocol):
         """Do what `spec` says."""
 
 
-PASSES: dict[str, type[Pass]] = {
-    "signed_depth": SignedDepthPass,
-    "signed_depth_fallback": SignedDepthPass,
-    "unlit": SignedDepthPass,
-    "thin_layer": ThinLayerPass,
-    "thin_layer_fallback": ThinLayerPass,
-    "back_face_depth": BackFaceDepthPass,
-    "opaque": OpaquePass,
-    "backdrop": BackdropPass,
-    "light_views": LightViewsPass,
-    "depth_peeling": DepthPeelingPass,
-    "fragment_lists": FragmentListsPass,
-    "k_buffer": KBufferPass,
-    "transmittance": TransmittancePass,
-    "interfaces": InterfacesPass,
-    "surfaces": SurfacesPass,
-    "layers": LayersPass,
+PASSES: dict[PassName, type[Pass]] = {
+    PassName.SIGNED_DEPTH: SignedDepthPass,
+    PassName.SIGNED_DEPTH_FALLBACK: SignedDepthPass,
+    PassName.UNLIT: SignedDepthPass,
+    PassName.THIN_LAYER: ThinLayerPass,
+    PassName.THIN_LAYER_FALLBACK: ThinLayerPass,
+    PassName.BACK_FACE_DEPTH: BackFaceDepthPass,
+    PassName.OPAQUE: OpaquePass,
+    PassName.BACKDROP: BackdropPass,
+    PassName.LIGHT_VIEWS: LightViewsPass,
+    PassName.DEPTH_PEELING: DepthPeelingPass,
+    PassName.FRAGMENT_LISTS: FragmentListsPass,
+    PassName.K_BUFFER: KBufferPass,
+    PassName.TRANSMITTANCE: TransmittancePass,
+    PassName.INTERFACES: InterfacesPass,
+    PassName.SURFACES: SurfacesPass,
+    PassName.LAYERS: LayersPass,
 }

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import moderngl
 
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import CONSTANTS, build_program
+from translucent.gpu.shaders import build_program
 from translucent.planning.render_plan import PassSpec
 
 
@@ -31,7 +32,7 @@ class BackFaceDepthPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX, moderngl.FUNC_ADD
         job.bind_opaque(0)
-        program = self._faces.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
+        program = self._faces.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.features.has_opaque)
         for culled in ("back", "front"):
             gl.cull_face = culled
             job.draw(program, spec.objects)

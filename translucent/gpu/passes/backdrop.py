@@ -8,9 +8,10 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.backdrop import TextureBackdrop
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.render_plan import PassSpec
 from translucent.scene.backdrop import Backdrop
 
@@ -41,7 +42,7 @@ class BackdropPass:
         backdrop.color.use(_COLOR)
         backdrop.depth.use(_DEPTH)
         program = self._variants.program(ORTHOGRAPHIC=backdrop.orthographic, INFINITE=math.isinf(backdrop.far))
-        media = job.media_range
+        media = job.placed.media
         set_uniform(program, "near", backdrop.near)
         if not math.isinf(backdrop.far):
             set_uniform(program, "far", backdrop.far)
@@ -55,7 +56,7 @@ class BackdropPass:
 def _upload(job: FrameJob, backdrop: Backdrop) -> None:
     """Write the arrays; metres become places in float64, or those of far scenes would lose digits."""
     with np.errstate(under="ignore"):
-        place = np.minimum((backdrop.depth - job.media_range.near) / job.media_range.length, _BEHIND_ALL)
+        place = np.minimum((backdrop.depth - job.placed.media.near) / job.placed.media.length, _BEHIND_ALL)
         place = place.astype(np.float32)
     if backdrop.coverage is not None:
         place = np.where(backdrop.coverage, place, np.float32(CONSTANTS["NOTHING"]))

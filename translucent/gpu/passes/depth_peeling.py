@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import moderngl
 import numpy as np
 
+from translucent.gpu.constants import CONSTANTS, PEEL_BATCH, PEEL_TILE
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
-from translucent.gpu.shaders import CONSTANTS, PEEL_BATCH, PEEL_TILE, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.methods import DepthPeeling
 from translucent.planning.render_plan import PassSpec
 
@@ -36,8 +39,7 @@ class DepthPeelingPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Peel until a pass finds nothing more, or the layers of the method are used up."""
-        assert isinstance(job.plan.method, DepthPeeling)
-        method = job.plan.method
+        method = cast(DepthPeeling, job.plan.method)
         both = method.order == "both-ends"
         ends = {"NEAR": method.order != "back-to-front", "FAR": method.order != "front-to-back"}
         allowed = -(-method.max_layers // 2) if both else method.max_layers
@@ -53,7 +55,7 @@ class DepthPeelingPass:
                 # Where there are more layers than allowed, one more pass counts the faces of the last that is.
                 most = needed if needed <= allowed else allowed + 1
             # An opaque surface makes all alike that it hides: fewer passes may do than there are crossings.
-            done = job.has_opaque and number > 0 and not self._found_any(job, batch[-1])
+            done = job.features.has_opaque and number > 0 and not self._found_any(job, batch[-1])
             number += 1
             last = number == most or done
             if last or len(batch) == PEEL_BATCH:
@@ -71,7 +73,7 @@ class DepthPeelingPass:
         """Draw what a pass finds; after the first, only where it is not known already."""
         gl, target = job.gl, batch[-1]
         # Before any state is set: the frame may be postponed here.
-        switches = {"FIRST": number == 0, "OPAQUE": job.has_opaque, **ends}
+        switches = {"FIRST": number == 0, "OPAQUE": job.features.has_opaque, **ends}
         program = self._peel.program(WITH_NORMAL=0, WITH_POSITION=0, **switches)
         target.use()
         if number == 0:
@@ -134,7 +136,7 @@ class DepthPeelingPass:
                 texture.use(unit)
         # Crossings that an opaque surface hides have been moved onto it: the walks need not know of it.
         switches = {
-            **walk_switches(job),
+            **walk_switches(job.features),
             "SCATTER": False,
             "MARCH": False,
             "BORDERS": False,

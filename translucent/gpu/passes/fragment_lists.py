@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
+from translucent.gpu.constants import CONSTANTS, STORAGE_BINDINGS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.methods import RayMarched
 from translucent.planning.render_plan import PassSpec
 
@@ -20,8 +23,6 @@ _FIRST_NODES_PER_PIXEL = 2
 
 #: Room beyond what a frame needed, so that the next one does not have to grow again.
 _SLACK = 1.25
-
-_COUNT, _HEADS, _NODES = 0, 1, 2
 
 
 class FragmentListsPass:
@@ -82,15 +83,15 @@ class FragmentListsPass:
         count, heads = job.targets.buffers.get("count", 4), job.targets.buffers.get("heads", 4 * width * height)
         count.write(np.zeros(1, np.uint32))
         heads.clear()
-        for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, self._nodes(job))):
-            buffer.bind_to_storage_buffer(binding)
+        for name, buffer in (("count", count), ("heads", heads), ("nodes", self._nodes(job))):
+            buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
         _use_rows(job.targets.steepest(), first, last)
         job.targets.steepest().clear()
         gl.enable_only(moderngl.BLEND)
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX
         job.bind_opaque(0)
-        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, GRADIENT=0, OPAQUE=job.has_opaque)
+        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, GRADIENT=0, OPAQUE=job.features.has_opaque)
         set_uniform(program, "cell_offset", 0)
         job.draw(program, spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
@@ -103,9 +104,10 @@ class FragmentListsPass:
         job.bind_opaque(0)
         job.bind_grids(1)
         job.targets.steepest().color_attachments[0].use(2)
-        switches = {"OPAQUE": job.has_opaque, "BORDERS": job.finds_exits}
-        program = self._resolve.program(**walk_switches(job), GRADIENT=0, **switches)
-        if isinstance(method := job.plan.method, RayMarched):
+        switches = {"OPAQUE": job.features.has_opaque, "BORDERS": job.features.finds_exits}
+        program = self._resolve.program(**walk_switches(job.features), GRADIENT=0, **switches)
+        if job.features.marches:
+            method = cast(RayMarched, job.plan.method)
             set_uniform(program, "march_steps", method.steps)
             set_uniform(program, "march_rule", int(CONSTANTS[f"MARCH_{method.quadrature.upper()}"]))
             set_uniform(program, "march_seed", method.seed - (1 << 32 if method.seed >= 1 << 31 else 0))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import texture_units
 from translucent.planning.borders import picture_cuts
 from translucent.planning.render_plan import PassSpec
@@ -27,11 +28,11 @@ class InterfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies for each border, with the depth test on; sheets have one, seen from either side."""
         nothing = float(CONSTANTS["NOTHING"])
-        thin = job.sheets
+        thin = job.features.sheets
         sheets = tuple(i for i in spec.objects if i in thin)
         solids = tuple(i for i in spec.objects if i not in thin)
-        starts_inside = job.starts_inside or any(picture_cuts(job.scene, job.scene.objects[i]) for i in solids)
-        for back in (False,) if job.one_border else (False, True):
+        starts_inside = job.placed.starts_inside or any(picture_cuts(job.scene, job.scene.objects[i]) for i in solids)
+        for back in (False,) if job.features.one_border else (False, True):
             framebuffer = job.targets.left() if back else job.targets.entered()
             framebuffer.use()
             framebuffer.clear(0.0, 0.0, 0.0, nothing, depth=1.0)
@@ -39,13 +40,13 @@ class InterfacesPass:
             job.gl.depth_func = "<="
             job.gl.cull_face = "front" if back else "back"
             job.bind_opaque(_UNITS["opaque_place"])
-            exits = back and job.finds_exits
+            exits = back and job.features.finds_exits
             beyond = back and not exits and not starts_inside
             if beyond:
                 job.targets.entered().color_attachments[0].use(_UNITS["entered"])
             if exits:
                 job.targets.ordered().color_attachments[2].use(_UNITS["ordered_layers"])
-            switches = {"BACK": back, "BEYOND": beyond, "EXITS": exits, "OPAQUE": job.has_opaque}
+            switches = {"BACK": back, "BEYOND": beyond, "EXITS": exits, "OPAQUE": job.features.has_opaque}
             self._draw(job, switches, solids)
             if not back:
                 job.gl.enable_only(moderngl.DEPTH_TEST)

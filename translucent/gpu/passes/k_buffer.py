@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import moderngl
 import numpy as np
 
+from translucent.gpu.constants import STORAGE_BINDINGS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
@@ -23,13 +26,12 @@ class KBufferPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies, then walk along what is kept."""
-        assert isinstance(job.plan.method, KBuffer)
-        gl, k = job.gl, job.plan.method.k
+        gl, k = job.gl, cast(KBuffer, job.plan.method).k
         width, height = job.targets.size
         words = job.targets.buffers.get("words", 4 * (k + 1) * width * height)
         # A count of 0, and k times no crossing.
         words.clear(chunk=np.array([0] + [0xFFFFFFFF] * k, np.uint32).tobytes(), size=4 * (k + 1) * width * height)
-        words.bind_to_storage_buffer(0)
+        words.bind_to_storage_buffer(STORAGE_BINDINGS["words"])
         steepest = job.targets.steepest()
         steepest.use()
         steepest.clear()
@@ -37,7 +39,7 @@ class KBufferPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE
         gl.blend_equation = moderngl.MAX
         job.bind_opaque(0)
-        program = self._insert.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.has_opaque)
+        program = self._insert.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=job.features.has_opaque)
         set_uniform(program, "k", k)
         job.draw(program, spec.objects)
         gl.blend_equation = moderngl.FUNC_ADD
@@ -45,7 +47,9 @@ class KBufferPass:
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT)
         job.targets.ordered().use()
         steepest.color_attachments[0].use(1)
-        program = self._resolve.program(**walk_switches(job), OPAQUE=job.has_opaque, BORDERS=job.finds_exits)
+        program = self._resolve.program(
+            **walk_switches(job.features), OPAQUE=job.features.has_opaque, BORDERS=job.features.finds_exits
+        )
         set_uniform(program, "k", k)
         self._resolve.draw_fullscreen(program)
         # The next frame must not clear the words before these have been walked along.

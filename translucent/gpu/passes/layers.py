@@ -5,10 +5,11 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps
 from translucent.gpu.passes.variants import Variants, look_switches
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.render_plan import PassSpec
 from translucent.scene.scene import Object
 from translucent.scene.surface import LEAST_COVER
@@ -35,16 +36,16 @@ class LayersPass:
         if bodies:
             self._find_fronts(job, bodies)
         self._paint(job, spec, bool(bodies))
-        self._put_over(job)
+        self._put_over(job, job.sums_after(spec.name))
 
     def _find_fronts(self, job: FrameJob, bodies: tuple[int, ...]) -> None:
         """Where each ray first meets a body: at once, if it starts inside one."""
         framebuffer = job.targets.fronts()
         framebuffer.use()
         nothing = float(CONSTANTS["NOTHING"])
-        framebuffer.clear(-nothing if job.starts_inside else nothing, depth=1.0)
+        framebuffer.clear(-nothing if job.placed.starts_inside else nothing, depth=1.0)
         job.gl.enable_only(moderngl.DEPTH_TEST)
-        if not job.starts_inside:
+        if not job.placed.starts_inside:
             job.draw(self._fronts.program(WITH_NORMAL=0, WITH_POSITION=0), bodies)
 
     def _paint(self, job: FrameJob, spec: PassSpec, bodies: bool) -> None:
@@ -56,7 +57,7 @@ class LayersPass:
         gl.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         self._maps.bind(job)
         job.bind_opaque(self._units["opaque_place"])
-        if job.has_surfaces:
+        if job.features.has_surfaces:
             job.targets.entered().color_attachments[0].use(self._units["entered"])
         if bodies:
             job.targets.fronts().color_attachments[0].use(self._units["fronts"])
@@ -69,30 +70,30 @@ class LayersPass:
         surface = body.surface
         assert surface is not None
         program = self._painted.program(
-            GLOW=not body.covers, OPAQUE=job.has_opaque, BODIES=bodies, **look_switches(body)
+            GLOW=not body.covers, OPAQUE=job.features.has_opaque, BODIES=bodies, **look_switches(body)
         )
         self._maps.set_finish(job, program, surface, surface.alpha_cutoff or (LEAST_COVER if body.covers else 0.0))
         if body.covers:
             set_uniform(program, "layer_opacity", surface.opacity)
         # The far side first, as in viewers of glTF; a sheet that glows does so on both sides.
-        back = surface.double_sided if body.covers else number in job.sheets
+        back = surface.double_sided if body.covers else number in job.features.sheets
         for culled in ("front", "back") if back else ("back",):
             job.gl.cull_face = culled
             job.draw(program, (number,))
 
-    def _put_over(self, job: FrameJob) -> None:
+    def _put_over(self, job: FrameJob, sums: bool) -> None:
         gl, targets = job.gl, job.targets
         gl.enable_only(moderngl.BLEND)
         in_front, behind = targets.layers().color_attachments
         transmittance = targets.result().color_attachments[1]
         for unit, texture in enumerate((in_front, behind, transmittance, job.picture.color_attachments[0])):
             texture.use(unit)
-        shown = "surfaced" if job.has_surfaces else "result"
+        shown = "surfaced" if job.features.has_surfaces else "result"
         steps = (
             ("RADIANCE", targets.view(shown, 0), (moderngl.ONE, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
             ("SHARE", targets.view("result", 1), (moderngl.ZERO, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)),
             ("DEPTH", targets.view("result", 2), (moderngl.ONE, moderngl.ONE)),
-            ("SUM", targets.average() if job.averaging else None, (moderngl.ONE, moderngl.ONE)),
+            ("SUM", targets.average() if sums else None, (moderngl.ONE, moderngl.ONE)),
         )
         for step, framebuffer, blending in steps:
             if framebuffer is not None:

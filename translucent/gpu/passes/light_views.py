@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
-from dataclasses import replace
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
 from translucent.errors import RenderError
+from translucent.gpu.constants import STORAGE_BINDINGS
+from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
-from translucent.gpu.light_cameras import light_cameras, media_sphere
+from translucent.gpu.light_cameras import light_cameras
+from translucent.gpu.light_view import LightView, first_texels, light_lookup
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
-from translucent.gpu.uniforms import LightViews
+from translucent.gpu.uniforms import LightLookup
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import PassSpec
 from translucent.scene.lights import PointLight
@@ -26,14 +26,11 @@ from translucent.scene.scene import Light
 #: Bytes of a node, and of what is recorded at each.
 _NODE, _MEDIUM = 16, 16
 
-Array = npt.NDArray[np.float64]
-
 #: Texels along a side of a light's view, and twice those of each of the six of a cube: the first that fit are taken.
 _SIDES = (1024, 512, 256, 128)
 
-#: Binding points of the buffers while they are made, and while they are read.
-_COUNT, _HEADS, _NODES, _MEDIA, _ENDS = 0, 1, 2, 5, 6
-_READ = {"light_heads": 3, "light_nodes": 4, "light_media": _MEDIA, "light_ends": _ENDS}
+#: Buffers that shaders read once they are made.
+_READ = ("light_heads", "light_nodes", "light_media", "light_ends")
 
 #: Nodes in the first buffers, for each texel: enough for most bodies. Frames that need more get larger ones, and keep
 #: them.
@@ -52,7 +49,7 @@ class LightViewsPass:
         self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_place=0)
         self._opaque = OpaquePass(gl)
         self._targets: dict[int, Targets] = {}
-        self._held: tuple[object, LightViews] | None = None
+        self._held: tuple[object, LightLookup] | None = None
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Make the lists of all views, and tell the shaders where the lights are."""
@@ -61,13 +58,13 @@ class LightViewsPass:
         if self._held is None or self._held[0] != seen:
             self._held = None
             self._held = seen, self._look(job, spec)
-        job.light_views = self._held[1]
-        job.bind()
-        for name, binding in _READ.items():
+        job.light(self._held[1])
+        job.uniforms.bind()
+        for name in _READ:
             if name != "light_ends" or job.scene.opaque:
-                job.resources.light_lists.get(name, 1).bind_to_storage_buffer(binding)
+                job.resources.light_lists.get(name, 1).bind_to_storage_buffer(STORAGE_BINDINGS[name])
 
-    def _look(self, job: FrameJob, spec: PassSpec) -> LightViews:
+    def _look(self, job: FrameJob, spec: PassSpec) -> LightLookup:
         """What all lights see, in the largest views that fit."""
         for side in _SIDES:
             if (found := self._look_closely(job, spec, side)) is not None:
@@ -79,88 +76,87 @@ class LightViewsPass:
             "use fewer lights, or simpler bodies",
         )
 
-    def _look_closely(self, job: FrameJob, spec: PassSpec, side: int) -> LightViews | None:
+    def _look_closely(self, job: FrameJob, spec: PassSpec, side: int) -> LightLookup | None:
         """What all lights see, in views of some size; None if no buffer holds it."""
-        groups = [self._light_jobs(job, light, side) for light in job.scene.lights]
-        jobs = [light_job for group in groups for light_job in group]
+        groups = [self._views(job, light, side) for light in job.scene.lights]
+        views = [view for group in groups for view in group]
         try:
-            return light_views(groups) if self._fill(job, spec, jobs) else None
+            return light_lookup(groups) if self._fill(job, spec, views) else None
         finally:
-            for light_job in jobs:
-                light_job.release()
+            for view in views:
+                view.uniforms.release()
 
-    def _light_jobs(self, job: FrameJob, light: Light, side: int) -> list[FrameJob]:
+    def _views(self, job: FrameJob, light: Light, side: int) -> list[LightView]:
         cameras = light_cameras(light, job.scene)
         side = side if len(cameras) == 1 else side // 2
         if side not in self._targets:
             self._targets[side] = Targets(self._gl, (side, side))
-        scenes = [replace(job.scene, camera=camera) for camera in cameras]
-        return [FrameJob(job.gl, scene, job.plan, self._targets[side], job.resources) for scene in scenes]
+        return [LightView(job, camera, self._targets[side]) for camera in cameras]
 
-    def _fill(self, job: FrameJob, spec: PassSpec, jobs: list[FrameJob]) -> bool:
+    def _fill(self, job: FrameJob, spec: PassSpec, views: list[LightView]) -> bool:
         """Make all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
         lists = job.resources.light_lists
-        cells = sum(_cells(light_job) for light_job in jobs)
+        cells = sum(view.texels for view in views)
         # Where a light is inside, each of its lists begins with a crossing of its own.
-        spare = sum(_cells(light_job) for light_job in jobs if light_job.starts_inside)
+        spare = sum(view.texels for view in views if view.placed.starts_inside)
         most = lists.largest // max(_NODE, _MEDIUM)
         if 4 * cells > lists.largest or spare > most:
             return False
         heads, count = lists.get("light_heads", 4 * cells), lists.get("light_count", 4)
         if job.scene.opaque:
-            lists.get("light_ends", 4 * cells).bind_to_storage_buffer(_ENDS)
+            lists.get("light_ends", 4 * cells).bind_to_storage_buffer(STORAGE_BINDINGS["light_ends"])
         needed = min(int(_FIRST_SHARE * cells) + 1, most)
         while True:
             nodes, media = lists.get("light_nodes", _NODE * needed), lists.get("light_media", _MEDIUM * needed)
             count.write(np.zeros(1, np.uint32))
             heads.clear()
-            for binding, buffer in ((_COUNT, count), (_HEADS, heads), (_NODES, nodes), (_MEDIA, media)):
-                buffer.bind_to_storage_buffer(binding)
-            for light_job, offset in zip(jobs, _offsets(jobs), strict=True):
-                self._draw(light_job, spec, offset)
+            for name, buffer in (("count", count), ("heads", heads), ("nodes", nodes), ("light_media", media)):
+                buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
+            for view, offset in zip(views, first_texels(views), strict=True):
+                self._draw(view, spec, offset)
             found = int(np.frombuffer(count.read(), np.uint32)[0]) + spare
             if found <= min(nodes.size // _NODE, media.size // _MEDIUM):
                 break
             if found > most:
                 return False
             needed = min(int(found * _SLACK), most)
-        for light_job, offset in zip(jobs, _offsets(jobs), strict=True):
-            self._sort(light_job, spec, offset)
+        for view, offset in zip(views, first_texels(views), strict=True):
+            self._sort(view, job.features, offset)
         return True
 
-    def _draw(self, job: FrameJob, spec: PassSpec, offset: int) -> None:
+    def _draw(self, view: LightView, spec: PassSpec, offset: int) -> None:
         """Put the crossings of one view into its lists."""
         gl = self._gl
-        job.bind()
-        if job.scene.opaque:
-            self._draw_opaque(job)
-        job.targets.nothing().use()
+        view.uniforms.bind()
+        if view.scene.opaque:
+            self._draw_opaque(view)
+        view.targets.nothing().use()
         gl.enable_only(moderngl.NOTHING)
-        if job.scene.opaque:
-            job.targets.opaque().color_attachments[0].use(0)
-        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=bool(job.scene.opaque), GRADIENT=1)
+        if view.scene.opaque:
+            view.targets.opaque().color_attachments[0].use(0)
+        program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=bool(view.scene.opaque), GRADIENT=1)
         set_uniform(program, "cell_offset", offset)
-        job.draw(program, spec.objects)
+        view.draw(program, spec.objects)
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 
-    def _draw_opaque(self, job: FrameJob) -> None:
-        opaque = tuple(i for i, item in enumerate(job.scene.objects) if item.medium is None)
-        self._opaque.run(job, PassSpec(PassName.OPAQUE, "shadows", opaque))
+    def _draw_opaque(self, view: LightView) -> None:
+        opaque = tuple(i for i, item in enumerate(view.scene.objects) if item.medium is None)
+        self._opaque.run(view, PassSpec(PassName.OPAQUE, "shadows", opaque))
 
-    def _sort(self, job: FrameJob, spec: PassSpec, offset: int) -> None:
+    def _sort(self, view: LightView, features: FrameFeatures, offset: int) -> None:
         """Sort the lists of one view, and add up the optical depth along them."""
-        job.bind()
-        if job.scene.opaque:
-            self._draw_opaque(job)
-            job.targets.opaque().color_attachments[0].use(0)
-        job.targets.nothing().use()
+        view.uniforms.bind()
+        if view.scene.opaque:
+            self._draw_opaque(view)
+            view.targets.opaque().color_attachments[0].use(0)
+        view.targets.nothing().use()
         self._gl.enable_only(moderngl.NOTHING)
         switches = {
-            **walk_switches(job),
+            **walk_switches(features),
             "EMISSION": False,
             "SCATTER": False,
             "MARCH": False,
-            "OPAQUE": bool(job.scene.opaque),
+            "OPAQUE": bool(view.scene.opaque),
             "GRADIENT": 1,
         }
         program = self._sorting.program(**switches)
@@ -189,38 +185,3 @@ def _seen(job: FrameJob) -> object:
 def _light_key(light: Light) -> tuple[object, ...]:
     where = light.position if isinstance(light, PointLight) else light.direction
     return type(light), np.asarray(where).tobytes()
-
-
-def _cells(job: FrameJob) -> int:
-    return job.targets.size[0] * job.targets.size[1]
-
-
-def _offsets(jobs: Sequence[FrameJob]) -> list[int]:
-    """Number of the first texel of each view."""
-    return [sum(_cells(light_job) for light_job in jobs[:i]) for i in range(len(jobs))]
-
-
-def light_views(groups: Sequence[Sequence[FrameJob]]) -> LightViews:
-    """Where each light's views are, and how points get into them; a group holds the views of one light."""
-    jobs = [light_job for group in groups for light_job in group]
-    offsets = _offsets(jobs)
-    spans, first = [], 0
-    for group in groups:
-        spans.append((first, len(group), group[0].targets.size[0], offsets[first]))
-        first += len(group)
-    center, _ = media_sphere(jobs[0].scene)
-    rows = np.concatenate([_rows(light_job, center) for light_job in jobs])
-    inside = tuple(group[0].starts_inside for group in groups)
-    return LightViews(center, inside, np.array(spans, dtype=np.float64), rows)
-
-
-def _rows(job: FrameJob, center: Array) -> Array:
-    """(4, 4): x, y and w of the picture, and place, of a point given from the center of the media."""
-    camera = job.scene.camera
-    axes = np.stack([camera.right, camera.up, camera.forward])
-    seen = np.column_stack([axes, axes @ (center - camera.eye)])
-    half_width, half_height = camera.half_extent(job.targets.size)
-    one = np.array([0.0, 0.0, 0.0, 1.0])
-    media = job.media_range
-    place = (seen[2] - media.near * one) / media.length
-    return np.stack([seen[0] / half_width, seen[1] / half_height, one if camera.fov_y is None else seen[2], place])

@@ -5,9 +5,10 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from translucent.gpu.job import FrameJob
+from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.passes.variants import Variants, look_switches
-from translucent.gpu.shaders import CONSTANTS, set_uniform
+from translucent.gpu.scene_view import SceneView
+from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.planning.render_plan import PassSpec
 from translucent.scene.surface import Surface
@@ -26,30 +27,30 @@ class OpaquePass:
         self._finished = Variants(gl, "geometry/border.vert", "shade/opaque.frag", **FINISH_UNITS)
         self._maps = FinishMaps(gl)
 
-    def run(self, job: FrameJob, spec: PassSpec) -> None:
+    def run(self, view: SceneView, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
-        framebuffer = job.targets.opaque()
+        framebuffer = view.targets.opaque()
         framebuffer.use()
         _clear(framebuffer)
-        job.gl.enable_only(moderngl.DEPTH_TEST)
+        view.gl.enable_only(moderngl.DEPTH_TEST)
         # Surfaces at the very end of the range count, too; and of surfaces in one place, those of the first object.
-        job.gl.depth_func = "<="
-        environment = job.scene.environment
+        view.gl.depth_func = "<="
+        environment = view.scene.environment
         light_map = environment.kind == "image"
         if light_map:
-            job.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
+            view.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
         for i in spec.objects[::-1]:
-            if (surface := job.scene.objects[i].surface) is None:
+            if (surface := view.scene.objects[i].surface) is None:
                 program = self._plain.program(
                     WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, LIGHT_MAP=light_map, VERTEX_COLORS=0, OCCLUSION=0
                 )
             else:
-                looks = look_switches(job.scene.objects[i])
+                looks = look_switches(view.scene.objects[i])
                 program = self._finished.program(SURFACE=1, LIGHT_MAP=light_map, **looks)
-                self._maps.bind(job)
-                self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
-            job.draw(program, (i,))
-        job.gl.depth_func = "<"
+                self._maps.bind(view)
+                self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
+            view.draw(program, (i,))
+        view.gl.depth_func = "<"
 
 
 class FinishMaps:
@@ -59,19 +60,19 @@ class FinishMaps:
         self._gl = gl
         self._reflectance: moderngl.Texture | None = None
 
-    def bind(self, job: FrameJob) -> None:
+    def bind(self, view: SceneView) -> None:
         """Give the environment's maps to the texture units of `FINISH_UNITS`."""
         if self._reflectance is None:
             self._reflectance = reflectance_table(self._gl)
-        environment = job.scene.environment
-        maps = job.resources.environments.light(environment)
-        textures = maps.irradiance, job.resources.environments.sharp(environment), maps.levels, self._reflectance
+        environment = view.scene.environment
+        maps = view.resources.environments.light(environment)
+        textures = maps.irradiance, view.resources.environments.sharp(environment), maps.levels, self._reflectance
         for unit, texture in enumerate(textures):
             texture.use(unit)
 
-    def set_finish(self, job: FrameJob, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
+    def set_finish(self, view: SceneView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
         """Tell a program the surface of an object; there is a hole where alpha is less than `hole_below`."""
-        job.resources.textures.bind(surface, program, _FIRST_TEXTURE)
+        view.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         finish = surface.metallic, surface.roughness, surface.ior, hole_below
         set_uniform(program, "opaque_finish", finish)

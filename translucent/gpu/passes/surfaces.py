@@ -44,7 +44,7 @@ class SurfacesPass:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl, environment = job.gl, job.scene.environment
         require_borders(gl.info)
-        sums = job.averaging and not job.has_layers
+        sums = job.sums_after(spec.name)
         (job.targets.average() if sums else job.targets.surfaced()).use()
         gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
         gl.blend_equation = moderngl.FUNC_ADD
@@ -52,11 +52,11 @@ class SurfacesPass:
         seen_map = environment.seen.kind == "image"
         seen_lights = seen_map and environment.seen is environment
         textures = [*job.targets.result().color_attachments[:4], *job.targets.entered().color_attachments]
-        if not job.one_border:
+        if not job.features.one_border:
             textures += job.targets.left().color_attachments
         for unit, texture in enumerate(textures):
             texture.use(unit)
-        if job.has_opaque:
+        if job.features.has_opaque:
             place, radiance = job.targets.opaque().color_attachments
             if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
                 radiance.build_mipmaps()  # rough refraction blurs what is behind
@@ -65,7 +65,7 @@ class SurfacesPass:
             place.use(_SAMPLERS.index("opaque_place"))
             radiance.use(_SAMPLERS.index("opaque_radiance"))
         maps = job.resources.environments.light(environment)
-        table = surface_table(job.scene, job.sheets)
+        table = surface_table(job.scene, job.features.sheets)
         finishes = gl.texture(table.shape[1::-1], 4, table, dtype="f4")
         rest = (
             finishes,
@@ -79,11 +79,11 @@ class SurfacesPass:
         if seen_map:
             job.resources.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
         program = self._variants.program(
-            ONE_BORDER=job.one_border,
-            OPAQUE=job.has_opaque,
+            ONE_BORDER=job.features.one_border,
+            OPAQUE=job.features.has_opaque,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_lights,
-            SINGLE_SCATTERING=job.scatters,
+            SINGLE_SCATTERING=job.features.scatters,
         )
         self._variants.draw_fullscreen(program)
         finishes.release()

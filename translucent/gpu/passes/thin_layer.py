@@ -26,7 +26,7 @@ class ThinLayerPass:
         """Draw the sheets."""
         job.begin_adding(spec.target)
         job.bind_opaque(0)
-        switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.has_opaque}
+        switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.features.has_opaque}
         holed = tuple(i for i in spec.objects if job.scene.objects[i].has_holes)
         if whole := tuple(i for i in spec.objects if i not in holed):
             program = self._variants.program(WITH_NORMAL=1, WITH_POSITION=0, HOLES=0, VERTEX_COLORS=0, **switches)

@@ -33,22 +33,19 @@ class TransmittancePass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Resolve the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
-        gl, plan = job.gl, job.plan
-        fallback = any(step.target == "fallback" for step in plan.passes)
-        unlit = any(step.target == "unlit" for step in plan.passes)
-        accumulated = not plan.ordered or any(step.name == "thin_layer" for step in plan.passes)
+        gl, plan, features = job.gl, job.plan, job.features
         inputs = {
-            "accumulated": job.accumulator() if accumulated else None,
-            "fallback": job.accumulator("fallback") if fallback else None,
-            "unlit": job.accumulator("unlit") if unlit else None,
+            "accumulated": job.accumulator() if features.accumulates else None,
+            "fallback": job.accumulator("fallback") if features.has_fallback else None,
+            "unlit": job.accumulator("unlit") if features.has_unlit else None,
             "ordered_depth": job.targets.ordered() if plan.ordered else None,
-            "opaque_place": job.targets.opaque() if job.has_opaque else None,
+            "opaque_place": job.targets.opaque() if features.has_opaque else None,
         }
         seen = job.scene.environment.seen
-        seen_map = seen.kind == "image" and not job.has_surfaces
+        seen_map = seen.kind == "image" and not features.has_surfaces
         if seen_map:
             job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
-        sums = job.averaging and not job.has_surfaces and not job.has_layers
+        sums = job.sums_after(spec.name)
         if sums:
             job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
@@ -63,14 +60,14 @@ class TransmittancePass:
                     texture.use(unit)
         program = self._variants.program(
             SPECTRAL=plan.spectral,
-            FALLBACK=fallback,
-            UNLIT=unlit,
+            FALLBACK=features.has_fallback,
+            UNLIT=features.has_unlit,
             AVERAGE=sums,
-            SURFACES=job.has_surfaces,
+            SURFACES=features.has_surfaces,
             SEEN_MAP=seen_map,
-            EMISSION=job.emits and not plan.ordered,
+            EMISSION=features.emits and not plan.ordered,
             ORDERED=plan.ordered,
-            ACCUMULATED=accumulated,
-            OPAQUE=job.has_opaque,
+            ACCUMULATED=features.accumulates,
+            OPAQUE=features.has_opaque,
         )
         self._variants.draw_fullscreen(program)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.gpu.features import FrameFeatures
 from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import build_program
 from translucent.scene.scene import Object
@@ -50,20 +49,20 @@ class Variants:
         self._fullscreen[program.glo].render(moderngl.TRIANGLES, vertices=3)
 
 
-def walk_switches(job: Any) -> dict[str, bool | int]:
+def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
     """Switches of ``shaders/intervals/walk.glsl`` for a frame: what fills segments, and how many slots there are."""
     return {
         # Powers of two, so that scenes which differ by a medium share programs.
-        "SLOTS": 1 << max(len(job.slots) - 1, 0).bit_length(),
-        "UNION": job.scene.overlap == "union",
-        "PRIORITY": job.scene.overlap == "priority",
-        "EMISSION": job.emits,
-        "SCATTER": job.scatters or job.marches,
-        "MARCH": job.marches,
-        "VARIES": job.scene.varies,
+        "SLOTS": 1 << max(len(features.slots) - 1, 0).bit_length(),
+        "UNION": features.scene.overlap == "union",
+        "PRIORITY": features.scene.overlap == "priority",
+        "EMISSION": features.emits,
+        "SCATTER": features.scatters or features.marches,
+        "MARCH": features.marches,
+        "VARIES": features.scene.varies,
         # One set of points serves all channels where light fares alike in them.
-        "GRAY": all(_is_gray(slot.medium.extinction) for slot in job.slots),
-        "SHADOWS": bool(job.scene.opaque),
+        "GRAY": all(_is_gray(slot.medium.extinction) for slot in features.slots),
+        "SHADOWS": bool(features.scene.opaque),
     }
 
 

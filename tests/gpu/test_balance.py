@@ -1,0 +1,115 @@
+"""Rules by which pixels are trusted, worked out without OpenGL."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+
+import translucent as tl
+from tests.values.plan_scenes import BOX, GLASS, OPEN, body, scene, sheet
+from translucent.gpu.balance import COVERAGE_FLOOR, ROUNDING, UNEXPECTED, Balance, count_weights, face_counts
+from translucent.gpu.placement import PlacedScene
+from translucent.planning.methods import Method
+
+INSIDE, ON_FACE, OUTSIDE = (0.1, 0.1, 0.1), (0.1, 0.2, 0.5), (0.1, 0.1, 20.0)
+
+
+def seen_from(eye: tuple[float, float, float], *objects: tl.Object) -> tl.Scene:
+    return tl.Scene(objects, tl.Camera.look_at(eye, (0, 0, -30)))
+
+
+def balance(found: tl.Scene, method: Method | None = None) -> Balance:
+    return Balance.of(PlacedScene.of(found), method or tl.SignedDepth(), face_counts(found, 8))
+
+
+def half_turned() -> tl.Mesh:
+    """Two boxes apart, of which one looks inwards."""
+    box = trimesh.creation.box((1, 1, 1))
+    vertices = np.concatenate([box.vertices, box.vertices + [3.0, 0.0, 0.0]])
+    return tl.Mesh(vertices, np.concatenate([box.faces, box.faces[:, ::-1] + len(box.vertices)]))
+
+
+def test_only_open_bodies_of_a_medium_weigh_more() -> None:
+    objects = [body(), body(mesh=OPEN), body(None, OPEN), body(x=2.0), body(mesh=OPEN, x=4.0)]
+    assert count_weights(scene(*objects)) == [1.0, 16.0, 1.0, 1.0, 256.0]
+
+
+def test_the_last_weight_is_shared_where_float32_ends() -> None:
+    weights = count_weights(scene(*(body(mesh=OPEN, x=2.0 * i) for i in range(8))))
+    assert weights == [16.0, 256.0, 4096.0, 65536.0, 1048576.0, 1048576.0, 1048576.0, 1048576.0]
+
+
+def test_holes_of_several_bodies_never_cancel() -> None:
+    """Up to 7 faces too many or too few of each: the sum is 0 only where all balance, exactly in float32."""
+    weights = count_weights(scene(body(), *(body(mesh=OPEN, x=2.0 * i) for i in range(1, 6))))
+    missing = np.array(list(itertools.product((-7, -1, 0, 1, 7), repeat=len(weights))), dtype=np.float32)
+    parts = missing * np.array(weights, dtype=np.float32)
+    sums = np.add.accumulate(parts, axis=1, dtype=np.float32)[:, -1]
+    assert (sums == parts.astype(np.float64).sum(axis=1)).all()
+    assert ((sums == 0) == (missing == 0).all(axis=1)).all()
+
+
+def test_a_body_that_is_inside_out_is_marked_wherever_it_is() -> None:
+    turned = half_turned()
+    assert turned.diagnosis.inside_out
+    found = scene(body(mesh=turned), body(None, turned), body())
+    assert [count.offset for count in face_counts(found, 8)] == [UNEXPECTED, 0.0, 0.0]
+
+
+def test_only_sound_bodies_blame_the_rasterizer() -> None:
+    found = scene(body(), body(mesh=half_turned()))
+    assert [count.subpixel for count in face_counts(found, 4)] == [1 / 16, 0.0]
+    assert [count.snapping_share for count in face_counts(found, 4)] == [1 / 16 / found.diagonal, 0.0]
+
+
+def test_large_weights_leave_no_room_in_the_fraction_of_counts() -> None:
+    counts = face_counts(scene(body(), body(mesh=OPEN, x=2.0)), 8)
+    assert [(count.subpixel, count.snapping_share) for count in counts] == [(1 / 256, 0.0), (0.0, 0.0)]
+
+
+def test_a_pixel_expects_the_winding_number_of_the_eye() -> None:
+    assert balance(seen_from(OUTSIDE, body())).expected_count == (0.0, 0.0)
+    assert balance(seen_from(INSIDE, body())).expected_count == (1.0, 1.0)
+    assert balance(seen_from(INSIDE, body(), body(x=0.2), body(None), body(x=5.0))).expected_count == (2.0, 2.0)
+
+
+def test_on_a_surface_rays_start_on_either_side() -> None:
+    assert balance(seen_from(ON_FACE, body())).expected_count == (0.0, 1.0)
+    assert balance(seen_from(ON_FACE, body(), body(x=0.2, mesh=BOX))).expected_count == (0.0, 2.0)
+
+
+def test_an_open_body_around_the_eye_counts_with_its_weight() -> None:
+    """Of a box without one of 12 triangles the eye is still mostly inside."""
+    assert balance(seen_from(INSIDE, body(), body(mesh=OPEN))).expected_count == (17.0, 17.0)
+
+
+@pytest.mark.parametrize("found", [seen_from(INSIDE, sheet()), seen_from(INSIDE, sheet(), body(x=9.0))])
+def test_sheets_have_no_inside(found: tl.Scene) -> None:
+    assert balance(found).expected_count == (0.0, 0.0)
+
+
+def test_a_method_that_makes_sheets_expects_nothing() -> None:
+    assert balance(seen_from(INSIDE, body()), tl.ThinLayer()).expected_count == (0.0, 0.0)
+
+
+def test_orthographic_rays_are_whole_lines() -> None:
+    camera = tl.Camera.orthographic(INSIDE, (0, 0, -30), height=2.0)
+    assert balance(tl.Scene([body()], camera)).expected_count == (0.0, 0.0)
+
+
+def test_rounding_grows_with_distance_only_where_distances_count_from_the_camera() -> None:
+    near, far = (seen_from((0.0, 0.0, z), body()) for z in (4.0, 4000.0))
+    assert balance(near).rounding == balance(far).rounding == ROUNDING * near.diagonal
+    unanchored = tl.SignedDepth(anchored=False)
+    assert balance(far, unanchored).rounding == pytest.approx(ROUNDING * (far.diagonal + 4000.0))
+    assert balance(near, unanchored).rounding == pytest.approx(ROUNDING * (near.diagonal + 4.0))
+
+
+def test_what_counts_as_covered_scales_with_the_scene() -> None:
+    large = tl.Object(BOX, GLASS, np.diag([1e3, 1e3, 1e3, 1.0]))
+    small, big = seen_from(OUTSIDE, body()), seen_from((0.0, 0.0, 1e4), large)
+    assert balance(small).coverage_floor == COVERAGE_FLOOR * np.sqrt(3.0)
+    assert balance(big).coverage_floor == pytest.approx(1e3 * balance(small).coverage_floor)

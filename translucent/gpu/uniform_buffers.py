@@ -1,0 +1,75 @@
+"""Uniform buffers of a picture: what its camera decides, body by body, and what stays the same for all its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import moderngl
+
+from translucent.gpu.body_uniforms import BodyRole, body_uniforms
+from translucent.gpu.layout import BODY, VIEW, UniformBlock
+from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.gpu.uniforms import view_uniforms
+
+#: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
+_ALIGNMENT = 256
+
+_STRIDE = -(-BODY.dtype.itemsize // _ALIGNMENT) * _ALIGNMENT
+
+
+class UniformBuffers:
+    """The buffers of all uniform blocks that programs read when they draw a scene as one camera sees it.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    placed : PlacedScene
+    roles : sequence of BodyRole
+        One for each object of the scene.
+    contents : mapping of UniformBlock to bytes
+        Of the blocks that are alike for all samples of a picture.
+    """
+
+    def __init__(
+        self,
+        gl: moderngl.Context,
+        placed: PlacedScene,
+        roles: Sequence[BodyRole],
+        contents: Mapping[UniformBlock, bytes],
+    ) -> None:
+        self._gl = gl
+        self._placed = placed
+        self._roles = roles
+        self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
+        self._bodies = gl.buffer(reserve=_STRIDE * len(roles))
+        self._constant = {block: gl.buffer(content) for block, content in contents.items()}
+
+    def place(self, view: SampleView) -> None:
+        """Write and bind the uniforms for some sample points."""
+        placed = self._placed
+        for i, (placement, role) in enumerate(zip(placed.placements, self._roles, strict=True)):
+            record = body_uniforms(placement, view, role, placed.media, placed.scene.diagonal)
+            self._bodies.write(record, offset=i * _STRIDE)
+        self._view.write(view_uniforms(view, placed))
+        self.bind()
+
+    def add(self, block: UniformBlock, content: bytes) -> None:
+        """Take in another block that is alike for all samples; `bind` makes it known."""
+        if block in self._constant:
+            self._constant[block].release()
+        self._constant[block] = self._gl.buffer(content)
+
+    def bind(self) -> None:
+        """Bind these uniforms, where others have been bound since they were placed."""
+        self._view.bind_to_uniform_block(VIEW.binding)
+        for block, buffer in self._constant.items():
+            buffer.bind_to_uniform_block(block.binding)
+
+    def bind_body(self, number: int) -> None:
+        """Let the next draw be of the object of this number."""
+        self._bodies.bind_to_uniform_block(BODY.binding, offset=number * _STRIDE, size=BODY.dtype.itemsize)
+
+    def release(self) -> None:
+        """Free the buffers."""
+        for buffer in (self._view, self._bodies, *self._constant.values()):
+            buffer.release()
