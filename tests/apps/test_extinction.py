@@ -20,6 +20,7 @@ from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
 from translucent.commands.extinction import TARGETS
 from translucent.commands.on_model import SIZE
+from translucent.formulas.color import parse_color
 from translucent.media.batch import MOST_SHOWN, convert_table
 
 
@@ -231,9 +232,9 @@ def test_a_model_takes_the_place_of_the_distance(run: Run, renderer: tl.Renderer
     frame = renderer.render(tl.showcase(mesh, tl.Medium(absorption=extinction), SIZE), SIZE)
     seen = frame.transmittance[frame.coverage & frame.valid].mean(axis=0, dtype=np.float64)
     # Float32 in the picture: a few roundings of an exponent of at most 20.
-    assert np.abs(seen - tl.color.parse_color("#7b1e3a")).max() < 1e-5
+    assert np.abs(seen - parse_color("#7b1e3a")).max() < 1e-5
     asked = json.loads(run("#7b1e3a", f"{found['on']['mean_thickness']}m", "--on", "bear", "--json")[1])
-    assert asked["color"] == pytest.approx(tl.color.parse_color("#7b1e3a"), rel=1e-12)
+    assert asked["color"] == pytest.approx(parse_color("#7b1e3a"), rel=1e-12)
     assert np.abs(np.array(asked["on"]["average_color"]) - asked["color"]).max() > 1e-2
 
 

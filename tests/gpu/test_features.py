@@ -8,8 +8,9 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import DIAMOND, EMBER, FIRE, GLASS, MILK, NO_STORAGE, OPEN, WINE, body, scene, sheet
 from translucent.gpu.features import FrameFeatures
+from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.methods import Method
-from translucent.planning.plan import FALLBACK_SHEET, plan
+from translucent.planning.plan import plan
 from translucent.planning.render_plan import Borders, Capabilities
 
 FLAGS = (

@@ -46,7 +46,7 @@ def test_the_background_is_seen_through_the_body(
 ) -> None:
     medium = tl.Medium.from_color("#7b1e3a", distance=0.4)
     scene = tl.Scene([tl.Object(BOX.tessellate(), medium=medium)], camera, environment=environment)
-    inside = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE))
+    inside = tl.interior(tl.reference.hit_counts(scene, SIZE))
     _close(renderer.render(scene, SIZE), tl.reference.render(scene, SIZE), inside)
 
 
@@ -73,7 +73,7 @@ def test_optical_depths_of_different_media_add_up_in_any_order(renderer: tl.Rend
         scene = tl.Scene(order, CAMERA)
         frame = renderer.render(scene, SIZE)
         assert frame.plan.spectral
-        _close(frame, tl.reference.render(scene, SIZE), tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)))
+        _close(frame, tl.reference.render(scene, SIZE), tl.interior(tl.reference.hit_counts(scene, SIZE)))
         frames.append(frame)
     np.testing.assert_allclose(frames[0].optical_depth, frames[1].optical_depth, atol=16 * EPS)
 
@@ -100,7 +100,7 @@ def test_sheets_equal_the_reference(renderer: tl.Renderer, ior: float, declared:
     method = None if declared else tl.ThinLayer(thickness=2e-3)
     frame, truth = renderer.render(scene, SIZE, method), tl.reference.render(scene, SIZE, method)
     assert frame.valid.all()
-    facing = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)) & (truth.thickness < 0.05)
+    facing = tl.interior(tl.reference.hit_counts(scene, SIZE)) & (truth.thickness < 0.05)
     _equal_off_edges(frame.thickness[facing], truth.thickness[facing], 1e-4)
     _equal_off_edges(frame.transmittance[facing], truth.transmittance[facing], 1e-4)
 
@@ -117,7 +117,7 @@ def test_sheets_follow_rotated_nonuniform_and_mirrored_transforms(
     body = tl.Object(Sphere().tessellate(64), medium=tl.Medium(absorption=10.0), transform=matrix, sheet_thickness=2e-3)
     scene = tl.Scene([body], tl.Camera.look_at((1.5, 2.0, 7.0), (0.0, 0.0, 0.0), fov_y=50))
     frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
-    facing = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)) & truth.coverage & (truth.thickness < 0.02)
+    facing = tl.interior(tl.reference.hit_counts(scene, SIZE)) & truth.coverage & (truth.thickness < 0.02)
     assert facing.sum() > 100
     _equal_off_edges(frame.thickness[facing], truth.thickness[facing], 1e-3)
 
@@ -156,7 +156,7 @@ def test_a_sheet_and_a_solid_add_up_in_one_frame(renderer: tl.Renderer) -> None:
     )
     scene = tl.Scene([solid, sheet], CAMERA)
     frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
-    inside = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)) & (truth.thickness < 2.0)
+    inside = tl.interior(tl.reference.hit_counts(scene, SIZE)) & (truth.thickness < 2.0)
     _equal_off_edges(frame.optical_depth[inside], truth.optical_depth[inside], 1e-4)
 
 
@@ -183,7 +183,7 @@ def test_a_hole_marks_its_pixels_and_only_those(renderer: tl.Renderer, defect: d
     truth = tl.reference.render(scenes[0], SIZE)
     intact = tl.reference.render(scenes[1], SIZE)
     assert 0 < (~frame.valid).sum() < 0.1 * frame.coverage.sum()
-    inner = tl.metrics.interior(tl.reference.hit_counts(scenes[0], SIZE))
+    inner = tl.interior(tl.reference.hit_counts(scenes[0], SIZE))
     assert (frame.valid == truth.valid)[inner].all()
     assert np.isfinite(frame.thickness).all()
     kept = frame.valid & inner

@@ -141,7 +141,7 @@ def test_back_face_depth_marks_pixels_with_more_than_one_entry(renderer: tl.Rend
     counts = tl.reference.hit_counts(scene, SIZE)
     with pytest.warns(tl.TranslucentWarning, match="not convex"):
         frame = renderer.render(scene, SIZE, tl.BackFaceDepth())
-    inner = tl.metrics.interior(counts)
+    inner = tl.interior(counts)
     assert (frame.valid[inner] == (counts[inner] <= 2)).all()
     truth = tl.reference.render(scene, SIZE)
     kept = inner & frame.valid

@@ -111,7 +111,7 @@ def test_a_body_far_away_is_cut_where_the_picture_says(renderer: tl.Renderer) ->
     scene = tl.Scene([tl.Object(BOX, medium=MEDIUM)], camera)
     depth = np.full(SIZE[::-1], 1e4 - 0.1234567)  # the box ends 0.3 ahead of the origin
     frame = renderer.render(scene, SIZE, backdrop=tl.Backdrop(np.zeros((*SIZE[::-1], 3)), depth))
-    inside = tl.metrics.interior(tl.reference.hit_counts(scene, SIZE)) & frame.coverage
+    inside = tl.interior(tl.reference.hit_counts(scene, SIZE)) & frame.coverage
     assert inside.sum() > 100
     # A place is counted from the near side of the box, in float32.
     np.testing.assert_allclose(frame.thickness[inside], 0.3 - 0.1234567, atol=4 * EPS)

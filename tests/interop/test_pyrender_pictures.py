@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from translucent.assets import mesh_path
 from translucent.gpu.constants import CONSTANTS
 from translucent.interop.pyrender import backdrop_from_pyrender, render, render_scene, scene_from_pyrender, to_pyrender
 from translucent.reference.hits import line_hits, world_normals
@@ -81,7 +82,7 @@ def test_the_floor_ends_the_path_through_the_ball(renderer: tl.Renderer, studio:
     full = dataclasses.replace(ours, objects=[*ours.objects, *opaque])
     truth = tl.reference.render(full, SIZE)
     uncut = tl.reference.render(ours, SIZE)
-    inside = tl.metrics.interior(tl.reference.hit_counts(ours, SIZE))
+    inside = tl.interior(tl.reference.hit_counts(ours, SIZE))
     cut = inside & (truth.thickness < uncut.thickness - 0.01)
     assert cut.sum() > 100
     # A step of 24 bits at 5 m, along rays up to 4 times as long as their depth through the floor. In a pixel whose
@@ -129,7 +130,7 @@ def test_our_depth_of_opaque_objects_is_that_of_pyrender(
     pyrender: ModuleType, renderer: tl.Renderer, studio: Any, camera: str
 ) -> None:
     """Both at pixel centers; pyrender's own renderer does so when it draws segments."""
-    bear = tl.load_mesh(tl.assets.mesh_path("bear"))
+    bear = tl.load_mesh(mesh_path("bear"))
     pose = studio.pose
     view = tl.Camera(pose, 40.0) if camera == "perspective" else tl.Camera(pose, None, 2.2)
     grown = np.diag((50.0, 50.0, 50.0, 1.0))

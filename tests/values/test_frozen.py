@@ -14,7 +14,7 @@ import translucent as tl
 from tests.values.plan_scenes import BOX, CAMERA
 
 MEDIUM = tl.Medium(absorption=(1, 2, 3))
-TEXTURE = tl.texture.Texture(np.ones((2, 2, 3)))
+TEXTURE = tl.Texture(np.ones((2, 2, 3)))
 MESH = tl.Mesh(BOX.vertices, BOX.faces, np.zeros((len(BOX.vertices), 2)))
 SURFACE = tl.Surface(color=(0.1, 0.2, 0.3), color_texture=TEXTURE)
 DENSITY = tl.DensityGrid(np.ones((2, 2, 2)))

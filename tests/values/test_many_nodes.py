@@ -13,6 +13,7 @@ import translucent as tl
 from tests.values.gltf_writer import Writer, glass
 from tests.values.plan_scenes import BOX, CAMERA, DIAMOND, GLASS, OPEN, WINE, body
 from tests.work import calls
+from translucent.geometry import mesh as meshes
 from translucent.planning.plan import plan
 from translucent.planning.slots import medium_slots
 from translucent.scene import overlaps
@@ -136,15 +137,15 @@ def test_files_of_many_nodes_are_read_in_linear_time(shared: bool, tmp_path: Pat
 
 def test_a_mesh_that_nodes_share_is_looked_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
-    diagnose = tl.mesh.diagnose
-    monkeypatch.setattr(tl.mesh, "diagnose", lambda *arguments: found.append(1) or diagnose(*arguments))
+    diagnose = meshes.diagnose
+    monkeypatch.setattr(meshes, "diagnose", lambda *arguments: found.append(1) or diagnose(*arguments))
     scene = tl.load_scene(many_nodes(tmp_path / "shared.glb", 20, shared=True))
     plan(scene)
     plan(filled(scene, WINE))
     assert len(scene.objects) == 20
     assert len({item.mesh for item in scene.objects}) == len(found) == 1
     looked = []
-    monkeypatch.setattr(tl.mesh.np, "isfinite", lambda array: looked.append(1))
+    monkeypatch.setattr(meshes.np, "isfinite", lambda array: looked.append(1))
     scene.objects[0].mesh.require_finite()
     assert looked == []
 

@@ -13,6 +13,7 @@ import pytest
 
 import translucent as tl
 from tests.values.media import CLEAR, COLOR, GLOW, JADE, MILK, close
+from translucent.formulas.color import srgb_to_linear, to_hex
 from translucent.gltf.file import GltfFile
 from translucent.gltf.materials import materials_of
 from translucent.materials import TARGETS, load_medium, text_block
@@ -98,7 +99,7 @@ class TestMaterialX:
     def test_an_srgb_color_is_made_linear(self, surface: Any) -> None:
         write, read = surface
         text = write(JADE, 0.02).replace('"lin_rec709"', '"srgb_texture"')
-        np.testing.assert_allclose(read(text).transmittance(0.02), tl.color.srgb_to_linear(COLOR), rtol=1e-12)
+        np.testing.assert_allclose(read(text).transmittance(0.02), srgb_to_linear(COLOR), rtol=1e-12)
 
     @pytest.mark.parametrize(
         ("old", "new", "message"),
@@ -180,7 +181,7 @@ def test_unity_names_its_properties_and_its_formula_gives_our_extinction() -> No
         names = ("_TransmittanceColor", "_ATDistance", "_Ior")
         assert [re.findall(r'Set(Color|Float)\("(\w+)"', line)[0][1] for line in lines] == list(names)
         encoded = np.array([float(v) for v in re.findall(r"([\d.e-]+)f", lines[0])])
-        linear = tl.color.srgb_to_linear(encoded)
+        linear = srgb_to_linear(encoded)
         theirs = -np.log(linear + 2.0**-24) / 0.02
         # log(1 + e / t) <= e / t, and nine digits of the encoded color.
         assert (np.abs(theirs - medium.extinction) * 0.02 <= 2.0**-24 / linear + 1e-8).all()
@@ -261,7 +262,7 @@ def test_css_has_the_color_and_a_gradient() -> None:
     text = text_block("css", JADE, COLOR, 0.02)
     assert "color(srgb-linear 0.18 0.62 0.35)" in text
     assert re.search(r"linear-gradient\(to right, #ffffff, (#[0-9a-f]{6}, ){7}#[0-9a-f]{6}\)", text)
-    assert tl.color.to_hex(COLOR) in text
+    assert to_hex(COLOR) in text
 
 
 @pytest.mark.parametrize(

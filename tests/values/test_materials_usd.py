@@ -7,6 +7,7 @@ import pytest
 
 import translucent as tl
 from tests.values.media import CLEAR, COLOR, JADE, MILK, close
+from translucent.formulas.color import srgb_to_linear
 from translucent.materials import text_block
 from translucent.materials.usd import read_usda, usda_text
 
@@ -53,7 +54,7 @@ def test_usd_standard_surface_is_read_and_an_srgb_color_is_made_linear() -> None
     close(read_usda(text), JADE)
     for space in ("srgb_texture", "srgb_rec709_scene"):
         encoded = USD.replace("(0.18, 0.62, 0.35)", f'(0.18, 0.62, 0.35) (\n colorSpace = "{space}"\n)')
-        np.testing.assert_allclose(read_usda(encoded).transmittance(0.02), tl.color.srgb_to_linear(COLOR), rtol=1e-12)
+        np.testing.assert_allclose(read_usda(encoded).transmittance(0.02), srgb_to_linear(COLOR), rtol=1e-12)
 
 
 def test_usd_signs_in_strings_comments_and_paths_mean_nothing() -> None:

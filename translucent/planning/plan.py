@@ -18,8 +18,6 @@ from translucent.planning.render_plan import Borders, Capabilities, RenderPlan
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
-__all__ = ["plan", "plan_over_backdrop"]
-
 
 def plan(
     scene: Scene,
