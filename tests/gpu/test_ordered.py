@@ -13,6 +13,7 @@ import trimesh
 
 import translucent as tl
 from tests import references
+from tests.scans import scan
 from translucent.assets import mesh_path
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
@@ -70,7 +71,7 @@ def assert_equal_to_reference(renderer: tl.Renderer, scene: tl.Scene, size: tupl
 
 @pytest.mark.parametrize("name", ["bunny.obj", "armadillo.obj", "mengerSponge3.glb"])
 def test_scans_equal_the_reference(renderer: tl.Renderer, assets: Path, name: str, method: Any) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / name)
+    mesh = scan(assets / "meshes_clean" / name)
     size = (256, 256)
     scene = tl.Scene(
         [tl.Object(mesh, tl.Medium(absorption=1.0 / mesh.diagonal))], tl.Camera.framing(mesh.vertices, size)
@@ -95,7 +96,7 @@ def test_wine_in_a_goblet(renderer: tl.Renderer, method: Any, policy: Any) -> No
 
 
 def test_volumes_of_two_balls_that_overlap(renderer: tl.Renderer, assets: Path, method: Any) -> None:
-    balls = [tl.load_mesh(assets / "meshes_clean" / f"ball{letter}.off") for letter in "AB"]
+    balls = [scan(assets / "meshes_clean" / f"ball{letter}.off") for letter in "AB"]
     truth = json.loads((assets / "truth" / "boolean.json").read_text())
     volumes = {}
     size, height = (700, 700), 24.0
