@@ -25,9 +25,12 @@ def test_python_snippets_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, re
 
 @pytest.fixture
 def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A report of one scene besides the model: all of them take a minute."""
+    """A report of one scene besides the model: all of them take a minute. Pictures of no stated size are small."""
     from translucent.bench import run
 
+    for option in (option for command in cli.commands.values() for option in command.params):
+        if option.default == "1280x720":
+            monkeypatch.setattr(option, "default", "320x180")
     monkeypatch.setattr(run, "QUICK", run.Effort(0.0, 0.0, 0.3))
     monkeypatch.setattr(run, "CASES", run.CASES[:1])
     monkeypatch.setattr(run.ScalingRun, "ladders", lambda _: [])

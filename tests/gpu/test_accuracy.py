@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.scans import scan
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box
 
@@ -29,7 +30,7 @@ def _errors(renderer: tl.Renderer, scene: tl.Scene, size: tuple[int, int] = SIZE
 
 @pytest.mark.parametrize("name", SCANS)
 def test_thickness_equals_the_reference(renderer: tl.Renderer, assets: Path, name: str) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / name)
+    mesh = scan(assets / "meshes_clean" / name)
     errors = _errors(renderer, _scene(mesh, tl.Camera.framing(mesh.vertices, SIZE)))
     assert errors.median <= 1e-7 * mesh.diagonal
     assert errors.p999 <= 1e-5 * mesh.diagonal
@@ -39,7 +40,7 @@ def test_thickness_equals_the_reference(renderer: tl.Renderer, assets: Path, nam
 
 @pytest.mark.parametrize("name", SCANS)
 def test_thickness_survives_a_camera_10_000_diameters_away(renderer: tl.Renderer, assets: Path, name: str) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / name)
+    mesh = scan(assets / "meshes_clean" / name)
     direction = np.array([0.5, 0.4, 0.77])
     eye = mesh.center + direction / np.linalg.norm(direction) * 1e4 * mesh.diagonal
     camera = tl.Camera.look_at(eye, mesh.center, fov_y=float(np.degrees(1.1e-4)))
@@ -78,7 +79,7 @@ def test_a_thin_slab_10_000_diameters_away_keeps_five_digits_and_camera_distance
 @pytest.mark.parametrize("name", ["bunny.obj", "armadillo.obj", "nested_shell_Cray_left.obj", "ballA.off"])
 def test_an_eye_inside_sees_the_rest_of_the_body(renderer: tl.Renderer, assets: Path, name: str) -> None:
     path = next(assets.glob(f"meshes_*/{name}"))
-    mesh = tl.load_mesh(path)
+    mesh = scan(path)
     # A point just under some face is inside, whatever the shape.
     corners = mesh.vertices[mesh.faces[len(mesh.faces) // 3]]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
@@ -139,7 +140,7 @@ def _rotation(axis: tuple[float, float, float], angle: float) -> np.ndarray:
 def test_rotated_nonuniform_and_mirrored_transforms_equal_the_reference(
     renderer: tl.Renderer, assets: Path, scale: tuple[float, float, float]
 ) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / "armadillo.obj")
+    mesh = scan(assets / "meshes_clean" / "armadillo.obj")
     matrix = np.eye(4)
     matrix[:3, :3] = _rotation((1, 2, 3), 0.7) @ np.diag(scale) @ _rotation((3, -1, 2), 1.1)
     matrix[:3, 3] = (10.0, -20.0, 5.0)
@@ -168,7 +169,7 @@ def test_rotated_nonuniform_and_mirrored_transforms_equal_the_reference(
 def test_units_and_distance_from_the_origin_do_not_matter(
     renderer: tl.Renderer, assets: Path, unit: float, shift: float
 ) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / "rocker-arm.obj")
+    mesh = scan(assets / "meshes_clean" / "rocker-arm.obj")
     matrix = np.diag([unit, unit, unit, 1.0])
     matrix[:3, 3] = (shift, -0.5 * shift, 0.3 * shift)
     world = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
@@ -181,7 +182,7 @@ def test_units_and_distance_from_the_origin_do_not_matter(
 
 def test_vertices_far_from_the_origin_keep_their_detail(renderer: tl.Renderer, assets: Path) -> None:
     """The offset of Embree's watertightness test: float32 resolves 1.6 cm there, the mesh is 1 m."""
-    mesh = tl.load_mesh(assets / "meshes_clean" / "rocker-arm.obj")
+    mesh = scan(assets / "meshes_clean" / "rocker-arm.obj")
     moved = tl.Mesh(mesh.vertices + (148376.0, 1234.0, -223423.0), mesh.faces)
     errors = _errors(renderer, _scene(moved, tl.Camera.framing(moved.vertices, SIZE)))
     assert errors.median <= 1e-7 * mesh.diagonal
@@ -203,7 +204,7 @@ def _volume(renderer: tl.Renderer, mesh: tl.Mesh, size: int = 1024) -> tuple[flo
 
 @pytest.mark.parametrize("name", ["bunny.obj", "armadillo.obj", "torus.obj", "mengerSponge3.glb", "idler_riser.STL"])
 def test_thickness_times_pixel_area_sums_to_the_volume(renderer: tl.Renderer, assets: Path, name: str) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / name)
+    mesh = scan(assets / "meshes_clean" / name)
     volume, _ = _volume(renderer, mesh)
     # A sum over pixel centers errs by at most half a pixel times the sum of thickness steps along rows, and mostly
     # cancels; 1e-3 is a hundredth of one pixel along the silhouette of these shapes at 1024 pixels.
@@ -211,12 +212,12 @@ def test_thickness_times_pixel_area_sums_to_the_volume(renderer: tl.Renderer, as
 
 
 def test_the_tray_is_as_thick_as_its_plate_and_two_balls_add_up(renderer: tl.Renderer, assets: Path) -> None:
-    tray = tl.load_mesh(assets / "meshes_clean" / "1002_tray_bottom.STL")
+    tray = scan(assets / "meshes_clean" / "1002_tray_bottom.STL")
     camera = tl.Camera.orthographic(tray.center + (0.0, 500.0, 0.0), tray.center, up=(0, 0, 1), height=400.0)
     frame = renderer.render(_scene(tray, camera), SIZE)
     assert np.median(frame.thickness[frame.coverage]) == pytest.approx(3.175, rel=1e-6)
 
-    balls = [tl.load_mesh(assets / "meshes_clean" / f"ball{k}.off") for k in "AB"]
+    balls = [scan(assets / "meshes_clean" / f"ball{k}.off") for k in "AB"]
     points = np.concatenate([ball.vertices for ball in balls])
     center, height = points.mean(axis=0), 1.2 * float(np.linalg.norm(np.ptp(points, axis=0)))
     camera = tl.Camera.orthographic(center + (0.0, 0.0, 100.0), center, height=height)

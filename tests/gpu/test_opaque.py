@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests import references
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
 
@@ -60,12 +61,17 @@ PLACES = {
 }
 
 
+def thin(method: Any) -> tl.ThinLayer | None:
+    """The one method that changes what is true: all others are ways to the same."""
+    return method if isinstance(method, tl.ThinLayer) else None
+
+
 def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edges: float = 0.02) -> tl.Frame:
     """Equal to the reference but at most at the edges of opaque objects, which are not in the counts of layers."""
-    frame, truth = renderer.render(scene, SIZE, method), tl.reference.render(scene, SIZE, method)
+    frame, truth = renderer.render(scene, SIZE, method), references.render(scene, SIZE, thin(method))
     assert frame.valid.all()
     # Interior to both: no edge of a body, nor of the opaque object, within a pixel.
-    inside = interior(tl.reference.hit_counts(scene, SIZE))
+    inside = interior(references.hit_counts(scene, SIZE))
     for name in ("thickness", "transmittance", "radiance"):
         off = np.abs(getattr(frame, name) - getattr(truth, name))[inside]
         scale = max(1.0, float(np.abs(getattr(truth, name)).max()))
@@ -88,8 +94,8 @@ def test_coincident_with_the_body(renderer: tl.Renderer, method: Any) -> None:
     """The same mesh, once opaque: no path within it is left; sheets on it are seen."""
     scene = tl.Scene([tl.Object(BODY, WINE), opaque(BODY)], CAMERAS["perspective"], environment=SKY)
     frame = renderer.render(scene, SIZE, method)
-    truth = tl.reference.render(scene, SIZE, method)
-    alone = tl.reference.hit_counts(tl.Scene(scene.objects[:1], scene.camera), SIZE)
+    truth = references.render(scene, SIZE, thin(method))
+    alone = references.hit_counts(tl.Scene(scene.objects[:1], scene.camera), SIZE)
     inside = interior(alone)
     assert frame.valid.all()
     if isinstance(method, tl.ThinLayer):
@@ -136,7 +142,7 @@ def test_the_nearest_of_many_opaque_objects_is_seen(renderer: tl.Renderer) -> No
     floor = tl.Object(Box.slab((2000.0, 2000.0), 1.0).tessellate(), None, _lying((0, -1.5, 0)), color=(0.3, 0.6, 0.3))
     objects = [tl.Object(BODY, WINE), floor, *PLACES.values()]
     scene = tl.Scene(objects[:-1], CAMERAS["perspective"], lights=LIGHTS, environment=SKY)
-    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
+    frame, truth = renderer.render(scene, SIZE), references.render(scene, SIZE)
     off = np.abs(frame.radiance - truth.radiance).max(axis=-1)
     # Edges of opaque objects may be drawn a pixel apart.
     assert np.quantile(off, 0.95) <= 1e-5
@@ -182,7 +188,7 @@ def test_several_samples_smooth_the_edges_of_opaque_objects(renderer: tl.Rendere
 def test_of_coincident_opaque_objects_the_first_is_seen(renderer: tl.Renderer) -> None:
     objects = [tl.Object(BODY, None, color=color) for color in ((1, 0, 0), (0, 0, 1))]
     scene = tl.Scene([tl.Object(BALL, WINE, np.diag([0.5, 0.5, 0.5, 1])), *objects], CAMERAS["perspective"])
-    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
+    frame, truth = renderer.render(scene, SIZE), references.render(scene, SIZE)
     assert frame.radiance[..., 0][60, 80] > 0.5
     assert (np.abs(frame.radiance - truth.radiance) > 1e-3).mean() <= 0.02
 
@@ -199,7 +205,7 @@ def test_a_sheet_behind_an_orthographic_picture_is_not_seen(renderer: tl.Rendere
     bubble = tl.Object(BALL, WINE, matrix, sheet_thickness=0.01)
     camera = tl.Camera.orthographic((0.1, 0.2, 0.1), (0.1, 0.2, 5), height=3)
     scene = tl.Scene([bubble], camera)
-    frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE)
-    inside = interior(tl.reference.hit_counts(scene, SIZE))
+    frame, truth = renderer.render(scene, SIZE), references.render(scene, SIZE)
+    inside = interior(references.hit_counts(scene, SIZE))
     assert np.quantile(np.abs(frame.thickness - truth.thickness)[inside], 0.98) <= 1e-4
     assert frame.coverage.any() == (z == 0.0)

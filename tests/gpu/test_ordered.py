@@ -12,6 +12,8 @@ import pytest
 import trimesh
 
 import translucent as tl
+from tests import references
+from tests.scans import scan
 from translucent.assets import mesh_path
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
@@ -47,8 +49,8 @@ def moved(mesh: tl.Mesh, medium: tl.Medium | None, place: Any = (0, 0, 0), scale
 
 def assert_equal_to_reference(renderer: tl.Renderer, scene: tl.Scene, size: tuple[int, int], method: Any) -> tl.Frame:
     """Thickness p99.9 within 1e-5 of the diagonal, radiance within 1e-5, no invalid pixel, and the layers counted."""
-    frame, truth = renderer.render(scene, size, method), tl.reference.render(scene, size)
-    counts = tl.reference.hit_counts(scene, size)
+    frame, truth = renderer.render(scene, size, method), references.render(scene, size)
+    counts = references.hit_counts(scene, size)
     inside = interior(counts)
     errors = tl.compare(frame, truth, mask=inside)
     radiance = np.abs(frame.radiance - truth.radiance)[inside]
@@ -69,7 +71,7 @@ def assert_equal_to_reference(renderer: tl.Renderer, scene: tl.Scene, size: tupl
 
 @pytest.mark.parametrize("name", ["bunny.obj", "armadillo.obj", "mengerSponge3.glb"])
 def test_scans_equal_the_reference(renderer: tl.Renderer, assets: Path, name: str, method: Any) -> None:
-    mesh = tl.load_mesh(assets / "meshes_clean" / name)
+    mesh = scan(assets / "meshes_clean" / name)
     size = (256, 256)
     scene = tl.Scene(
         [tl.Object(mesh, tl.Medium(absorption=1.0 / mesh.diagonal))], tl.Camera.framing(mesh.vertices, size)
@@ -77,7 +79,7 @@ def test_scans_equal_the_reference(renderer: tl.Renderer, assets: Path, name: st
     frame = assert_equal_to_reference(renderer, scene, size, method)
     signed = renderer.render(scene, size)
     assert isinstance(signed.plan.method, tl.SignedDepth)
-    off = np.abs(frame.thickness - signed.thickness)[interior(tl.reference.hit_counts(scene, size))]
+    off = np.abs(frame.thickness - signed.thickness)[interior(references.hit_counts(scene, size))]
     assert np.quantile(off, 0.999) <= 1e-5 * mesh.diagonal
 
 
@@ -94,7 +96,7 @@ def test_wine_in_a_goblet(renderer: tl.Renderer, method: Any, policy: Any) -> No
 
 
 def test_volumes_of_two_balls_that_overlap(renderer: tl.Renderer, assets: Path, method: Any) -> None:
-    balls = [tl.load_mesh(assets / "meshes_clean" / f"ball{letter}.off") for letter in "AB"]
+    balls = [scan(assets / "meshes_clean" / f"ball{letter}.off") for letter in "AB"]
     truth = json.loads((assets / "truth" / "boolean.json").read_text())
     volumes = {}
     size, height = (700, 700), 24.0
@@ -157,7 +159,7 @@ def test_two_bodies_that_share_a_face_neither_leak_nor_flicker(renderer: tl.Rend
     frame = assert_equal_to_reference(renderer, scene, SIZE, method)
     one = tl.Scene([tl.Object(Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate(), AMBER, turn)], scene.camera)
     whole = renderer.render(one, SIZE)
-    same = interior(tl.reference.hit_counts(scene, SIZE))
+    same = interior(references.hit_counts(scene, SIZE))
     np.testing.assert_allclose(frame.thickness[same], whole.thickness[same], atol=20 * EPS * scene.diagonal)
 
 
@@ -213,8 +215,8 @@ def test_a_hundred_nested_shells(renderer: tl.Renderer) -> None:
 )
 def test_more_layers_than_asked_for_are_marked_not_wrong(renderer: tl.Renderer, method: Any) -> None:
     scene, size = shells(100), (96, 72)
-    counts = tl.reference.hit_counts(scene, size)
-    truth = tl.reference.render(scene, size)
+    counts = references.hit_counts(scene, size)
+    truth = references.render(scene, size)
     with pytest.warns(tl.TranslucentWarning, match="more than 8 surfaces are marked invalid"):
         frame = renderer.render(scene, size, method)
     inside = interior(counts)
@@ -253,7 +255,7 @@ def test_an_eye_on_the_surface(renderer: tl.Renderer, method: Any, where: str) -
         camera = tl.Camera.look_at(eye, target, fov_y=70)
         scene = tl.Scene([tl.Object(box.tessellate(), AMBER), inner], camera)
         frame = renderer.render(scene, (90, 60), method)
-        truth = tl.reference.render(scene, (90, 60))
+        truth = references.render(scene, (90, 60))
         assert frame.valid.all()
         off = np.abs(frame.thickness - truth.thickness)
         assert np.quantile(off, 0.99) <= 1e-5 * scene.diagonal
@@ -280,8 +282,8 @@ def test_many_media(renderer: tl.Renderer, method: Any, count: int) -> None:
     ]
     scene = tl.Scene(objects, tl.Camera.look_at((1, 2, 7), (0, 0, 0)))
     frame = renderer.render(scene, (96, 72), method)
-    truth = tl.reference.render(scene, (96, 72))
-    inside = interior(tl.reference.hit_counts(scene, (96, 72)))
+    truth = references.render(scene, (96, 72))
+    inside = interior(references.hit_counts(scene, (96, 72)))
     assert frame.valid.all()
     assert np.quantile(np.abs(frame.radiance - truth.radiance)[inside], 0.99) <= 1e-5 * float(truth.radiance.max())
 
@@ -294,8 +296,8 @@ def test_an_open_body_is_marked_where_its_hole_shows(renderer: tl.Renderer, meth
     )
     with pytest.warns(tl.TranslucentWarning, match="'open box'"):
         frame = renderer.render(scene, SIZE, method)
-    truth = tl.reference.render(scene, SIZE)
-    inside = interior(tl.reference.hit_counts(scene, SIZE))
+    truth = references.render(scene, SIZE)
+    inside = interior(references.hit_counts(scene, SIZE))
     np.testing.assert_array_equal(frame.valid[inside], truth.valid[inside])
     sound = inside & truth.valid
     np.testing.assert_allclose(frame.thickness[sound], truth.thickness[sound], atol=1e-5 * scene.diagonal)
@@ -310,8 +312,8 @@ def test_union_counts_the_medium_of_an_open_body_once(renderer: tl.Renderer, met
     scene = tl.Scene(objects, tl.Camera.look_at((1, 2, 5), (0, 0, 0)), overlap="union")
     with pytest.warns(tl.TranslucentWarning, match="'open box'"):
         frame = renderer.render(scene, SIZE, method)
-    truth = tl.reference.render(scene, SIZE)
-    sound = interior(tl.reference.hit_counts(scene, SIZE)) & truth.valid & frame.valid
+    truth = references.render(scene, SIZE)
+    sound = interior(references.hit_counts(scene, SIZE)) & truth.valid & frame.valid
     assert sound.sum() > 5000
     np.testing.assert_allclose(frame.optical_depth[sound], truth.optical_depth[sound], atol=5e-5)
 
@@ -324,8 +326,8 @@ def test_sheets_keep_thickness_and_transmittance_exact(renderer: tl.Renderer, me
         moved(pane, tl.Medium(absorption=(100.0, 50.0, 20.0)), (0, 0, 2), sheet_thickness=1e-3),
     ]
     scene = tl.Scene(objects, tl.Camera.look_at((0.5, 0.4, 6), (0, 0, 0)))
-    frame, truth = renderer.render(scene, SIZE, method), tl.reference.render(scene, SIZE)
-    inside = interior(tl.reference.hit_counts(scene, SIZE))
+    frame, truth = renderer.render(scene, SIZE, method), references.render(scene, SIZE)
+    inside = interior(references.hit_counts(scene, SIZE))
     for name in ("thickness", "transmittance"):
         off = np.abs(getattr(frame, name) - getattr(truth, name))[inside]
         assert np.quantile(off, 0.99) <= 1e-5, name

@@ -159,7 +159,7 @@ def test_a_camera_10_000_diameters_away_sees_the_same(renderer: tl.Renderer) -> 
 @pytest.mark.parametrize("light", ["far", "back"])
 def test_concave_bodies_equal_the_reference(renderer: tl.Renderer, name: str, light: str) -> None:
     mesh = tl.load_mesh(mesh_path(name))
-    d, size = mesh.diagonal, (24, 24)
+    d, size = mesh.diagonal, (18, 18)
     lights = {
         "far": tl.PointLight(mesh.center + np.array([5, 6, 3]) * d, (100 * d**2,) * 3),
         "back": tl.DirectionalLight((0.1, -0.2, 1), (1, 1, 1)),
@@ -179,7 +179,7 @@ def test_concave_bodies_equal_the_reference(renderer: tl.Renderer, name: str, li
 def test_overlapping_bodies_and_shadows_equal_the_reference(renderer: tl.Renderer, policy: Any) -> None:
     milk = tl.Medium(absorption=0.2, scattering=(2.0, 1.0, 0.5))
     tea = tl.Medium(absorption=(0.5, 1.0, 2.0), scattering=0.5, emission=(0.1, 0.0, 0.0))
-    box, ball, size = Box().tessellate(), Sphere().tessellate(64), (32, 24)
+    box, ball, size = Box().tessellate(), Sphere().tessellate(64), (24, 18)
     shade = tl.Object(Box.slab((0.5, 0.5), 0.05).tessellate(), None, _moved((0.2, 1.2, 0.1)), color=(0, 0, 0))
     objects = [tl.Object(ball, milk, _moved((-0.4, 0, 0)), priority=1), tl.Object(box, tea, _moved((0.5, 0, 0))), shade]
     lights = [tl.DirectionalLight((-0.2, -1, 0.1), (3, 3, 3)), tl.PointLight((2, 1, 2), (5, 5, 5))]

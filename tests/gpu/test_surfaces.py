@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+from tests import references
 from translucent.assets import mesh_path
 from translucent.formulas import interface, optics
 from translucent.geometry.solids import Box, Sphere
@@ -67,7 +68,7 @@ def test_rays_of_an_orthographic_picture_that_cuts_a_body_bend_where_they_leave(
     pose[2, 3] = 0.2
     camera = tl.Camera(pose, None, 0.8)  # as far as borders mirror little inside
     scene = tl.Scene([tl.Object(BALL, tl.Medium(ior=1.5))], camera, environment=tl.Environment.studio())
-    frame, truth = renderer.render(scene, (24, 24), method), tl.reference.render(scene, (24, 24), bounces=4)
+    frame, truth = renderer.render(scene, (24, 24), method), references.render(scene, (24, 24), bounces=4)
     assert frame.coverage.all()
     off = np.abs(frame.radiance - truth.radiance).max(axis=2)
     assert np.median(off) < 0.01  # 0.02 if they went straight

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from tests import references
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.geometry.solids import Box, Torus
@@ -46,7 +47,7 @@ def slab(light: Light | None = None, density: Density | None = None, medium: Med
 
 def errors(scene: Scene, size: tuple[int, int], **method: Any) -> Array:
     """RMS relative error of radiance for each number of steps."""
-    truth = render(scene, size, tolerance=1e-11).radiance
+    truth = references.render(scene, size, tolerance=1e-11).radiance
     frames = (march(scene, size, RayMarched(int(steps), **method)) for steps in STEPS)
     return np.array([np.sqrt(np.mean((frame.radiance / truth - 1.0) ** 2)) for frame in frames])
 
@@ -88,7 +89,7 @@ def test_order_of_jittered_steps(name: str) -> None:
 
 
 def test_jittered_steps_have_no_bias() -> None:
-    truth = render(SCENES["sun"], (12, 12), tolerance=1e-11).radiance
+    truth = references.render(SCENES["sun"], (12, 12), tolerance=1e-11).radiance
     frames = [march(SCENES["sun"], (12, 12), RayMarched(4, "jittered", seed=seed)) for seed in range(40)]
     relative = np.stack([frame.radiance / truth - 1.0 for frame in frames])
     mean, error = relative.mean(axis=0), relative.std(axis=0, ddof=1) / np.sqrt(len(frames))

@@ -82,21 +82,31 @@ def _rays(count: int, seed: int, distance: float = 3.0) -> tuple[Array, Array]:
     return target - distance * direction, direction
 
 
+def _sampled_length(inside: Inside, origins: Array, directions: Array, steps: Array) -> Array:
+    """Length within, of rays whose last step is outside: each change between two steps is halved down to rounding."""
+    state = np.array([inside(o + steps[:, None] * d) for o, d in zip(origins, directions, strict=True)])
+    assert not state[:, -1].any()
+    ray, step = np.nonzero(state[:, 1:] != state[:, :-1])
+    low, high, entered = steps[step], steps[step + 1], state[ray, step + 1]
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        beyond = inside(origins[ray] + middle[:, None] * directions[ray]) == entered
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.bincount(ray, np.where(entered, -low, low), len(origins)) - np.where(state[:, 0], steps[0], 0.0)
+
+
 @each_solid
 @pytest.mark.parametrize("distance", [3.0, 0.0])
 def test_chord_is_what_sampling_finds(name: str, distance: float) -> None:
     solid, inside = SOLIDS[name]
     origins, directions = _rays(300, seed=1, distance=distance)
-    steps = 40_000
-    length = 8.0
-    t = (np.arange(steps) + 0.5) * (length / steps)
-    sampled = np.array(
-        [inside(o + t[:, None] * d).sum() * (length / steps) for o, d in zip(origins, directions, strict=True)]
-    )
-    chord = solid.chord(origins, directions)
-    # At most two intervals: each of four ends is off by less than a step.
-    assert np.abs(chord - sampled).max() <= 4 * length / steps
-    assert (chord > 0).sum() > 20
+    steps = np.linspace(0.0, 8.0, 10_001)
+    off = np.abs(solid.chord(origins, directions) - _sampled_length(inside, origins, directions, steps))
+    # Where no step falls into an interval or a gap, it is missed: at most two, each shorter than a step.
+    assert off.max() <= 2 * steps[1]
+    # Ends are known to rounding, which near a tangent moves them by its square root.
+    assert np.quantile(off, 0.95) <= 1e-8
+    assert (solid.chord(origins, directions) > 0).sum() > 20
 
 
 @each_solid
