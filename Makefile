@@ -47,6 +47,7 @@ bench: ## measure speed and error of every method into out/report/, in ten minut
 
 docs: ## build the site of docs/ into out/docs/, with the pictures of examples/
 	$(BOOTSTRAP) --group docs
+	@rm -rf docs/generated
 	$(BIN)/python -m sphinx -W --keep-going -q docs out/docs
 
 meshes: ## regenerate the files in meshes/
