@@ -14,7 +14,7 @@ BIN = .venv/bin
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv demo test test-drivers lint bench meshes wheel clean
+.PHONY: help venv demo test test-drivers lint bench docs meshes wheel clean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -45,6 +45,11 @@ bench: ## measure speed and error of every method into out/report/, in ten minut
 	$(BOOTSTRAP) --group test
 	$(BIN)/translucent report -o out/report $(BENCH_ARGS)
 
+docs: ## build the site of docs/ into out/docs/, with the pictures of examples/
+	$(BOOTSTRAP) --group docs
+	@rm -rf docs/generated
+	$(BIN)/python -m sphinx -W --keep-going -q docs out/docs
+
 meshes: ## regenerate the files in meshes/
 	$(BOOTSTRAP) --group meshes
 	$(BIN)/python tools/make_meshes.py
@@ -54,5 +59,5 @@ wheel: ## build the wheel into dist/ and check it in an environment of its own
 	$(BIN)/python tools/check_wheel.py
 
 clean: ## remove all that these commands made: .venv, out/, dist/, caches
-	rm -rf .venv out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv out build dist docs/generated docs/gallery_of_examples .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find translucent tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,26 +1,45 @@
-"""What the README says works."""
+"""What the README and the pages of the site say works."""
 
 from __future__ import annotations
 
+import glob
 import re
 import shlex
 from pathlib import Path
 
 import pytest
 
+import translucent as tl
 from translucent.cli import cli, main
+from translucent.planning.methods import METHODS
 
 ROOT = Path(__file__).resolve().parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("docs/tutorials/*.md")))
+}
+SNIPPETS = {
+    page: found for page, text in PAGES.items() if (found := re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+}
 
 
-def test_python_snippets_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+def make_models() -> None:
+    """The files that pages speak of."""
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=2).export("model.glb")
+    trimesh.creation.icosphere(subdivisions=2).export("model.stl")
+
+
+@pytest.mark.parametrize("page", SNIPPETS)
+def test_python_snippets_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
     monkeypatch.chdir(tmp_path)
-    snippets = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    assert snippets
-    for snippet in snippets:
-        exec(compile(snippet, "README.md", "exec"), {})
-    assert (tmp_path / "knot.png").stat().st_size > 1000
+    make_models()
+    names = {"__name__": "__main__"}
+    for snippet in SNIPPETS[page]:
+        exec(compile(snippet, page, "exec"), names)
+        for saved in re.findall(r'\.save\("([^"]+)"', snippet):
+            assert (tmp_path / saved).stat().st_size > 1000, saved
 
 
 @pytest.fixture
@@ -37,25 +56,64 @@ def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "measure_hard_cases", lambda _: iter(()))
 
 
-COMMANDS = [line.removeprefix("$ translucent ") for line in README.splitlines() if line.startswith("$ translucent ")]
+def commands(text: str) -> list[str]:
+    return [line.removeprefix("$ translucent ") for line in text.splitlines() if line.startswith("$ translucent ")]
+
+
+#: Each once, whatever number of pages show it.
+COMMANDS = list(dict.fromkeys(command for text in PAGES.values() for command in commands(text)))
 
 #: Needs a display: its tests are in tests/preview.
 WINDOWED = "preview"
 
+#: Needs a scheduler: tests/bake has one.
+ON_A_FARM = "--dask"
+
+
+#: Of an option that is given twice, the last counts: the pages show pictures of a useful size, tests need none.
+SMALL = {"render": ["--size", "96x72", "--samples", "2"], "bake": ["--size", "64", "--rays", "16"]}
+
+
+def runs_here(command: str) -> bool:
+    return command.split()[0] != WINDOWED and ON_A_FARM not in command
+
 
 @pytest.mark.usefixtures("one_scene")
-@pytest.mark.parametrize("command", [command for command in COMMANDS if command.split()[0] != WINDOWED])
+@pytest.mark.parametrize("command", [command for command in COMMANDS if runs_here(command)])
 def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
     import trimesh
 
     monkeypatch.chdir(tmp_path)
-    trimesh.creation.icosphere(subdivisions=2).export("model.glb")
-    trimesh.creation.icosphere(subdivisions=2).export("model.stl")
-    assert main(shlex.split(command)) == 0
+    make_models()
+    trimesh.creation.icosphere(subdivisions=2).export("model.obj")
+    (tmp_path / "models").mkdir()
+    trimesh.creation.icosphere(subdivisions=1).export("models/ball.glb")
+    trimesh.creation.icosphere(subdivisions=1).export("out.glb")
+    # As a shell would.
+    arguments = [name for word in shlex.split(command) for name in ("*" in word and sorted(glob.glob(word))) or [word]]
+    assert main([*arguments, *SMALL.get(arguments[0], [])]) == 0
 
 
-def test_all_verbs_are_shown() -> None:
-    assert {command.split()[0] for command in COMMANDS} == set(cli.commands)
+@pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
+def test_all_verbs_are_shown(page: str) -> None:
+    assert {command.split()[0] for command in commands(PAGES[page])} == set(cli.commands)
+
+
+def test_all_methods_are_in_the_table() -> None:
+    rows = re.findall(r"^\| `(\w+)\(\w*\)` \|", PAGES["README.md"], re.MULTILINE)
+    assert sorted(rows) == sorted(method.__name__ for method in METHODS.values())
+
+
+def test_all_public_names_are_in_the_reference() -> None:
+    listed = set(re.findall(r"^   (\w+)(?:\.\w+)?$", PAGES["docs/api.md"], re.MULTILINE))
+    assert listed | {method.__name__ for method in METHODS.values()} == set(tl.__all__)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)\)", PAGES[page]):
+        if "://" not in target and not target.startswith("gallery_of_examples/"):
+            assert ((ROOT / page).parent / target).exists(), target
 
 
 @pytest.mark.usefixtures("one_scene")
