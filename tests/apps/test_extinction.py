@@ -20,8 +20,8 @@ from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
 from translucent.commands.extinction import TARGETS
 from translucent.commands.on_model import SIZE
-from translucent.formulas.color import parse_color
 from translucent.media.batch import MOST_SHOWN, convert_table
+from translucent.media.colors import parse_color
 
 
 @pytest.fixture
