@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.bench.row import ColorDifference, Row
-
-Array = npt.NDArray[np.float64]
 
 #: A difference of color in CIELAB 1976 that is just noticed, side by side (Mahy, Van Eycken & Oosterlinck 1994,
 #: "Evaluation of uniform color spaces developed after the adoption of CIELAB and CIELUV").

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.errors import RenderError
 from translucent.geometry.mesh import Mesh
 
 if TYPE_CHECKING:
     from embreex.rtcore_scene import EmbreeScene
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: How far behind a face the search for the next one begins, in radii of the mesh: nearer, float32 finds it again.
 STEP = 2e-6

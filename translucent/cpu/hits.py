@@ -12,6 +12,7 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.outline import Edges, Outline
 from translucent.cpu.picture import Band, Picture
@@ -20,10 +21,6 @@ from translucent.geometry.mesh import Mesh
 from translucent.reference.hits import Hits, from_eye
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

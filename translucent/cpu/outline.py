@@ -13,13 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.picture import Band
 from translucent.cpu.view import View, expand, slices
 from translucent.geometry.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Positions in the picture round by less than this share of their size, by far: doubt costs time, and errors surfaces.
 ROUNDING = 1e-11

@@ -6,14 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers
 from translucent.reference.hits import PictureGrid
 from translucent.reference.rays import Rays
 from translucent.scene.camera import Camera, check_size
-
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Pixels of a band: so many that Python's own time does not count, so few that the working arrays stay below 50 MB.
 BAND = 1 << 15

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Integers
 from translucent.cpu.view import slices
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
@@ -17,7 +18,6 @@ from translucent.reference import Hits, Rays, shade_hits, sheet_thicknesses
 from translucent.scene.scene import Scene
 
 Arrays = dict[str, npt.NDArray[Any]]
-Integers = npt.NDArray[np.int64]
 Sheets = tuple[float | None, ...]
 
 #: Surfaces, times objects, that are shaded at a time: the working arrays stay below 100 MB.

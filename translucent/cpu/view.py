@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.picture import Band, Picture
 from translucent.reference.hits import Hits, camera_vertices, cross_triangles, pixel_span, sorted_hits
 from translucent.scene.scene import Object
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 _Pairs = tuple[Integers, Integers]
 
 #: A vertex farther to the side of the eye than this many times its depth is too near to the eye's plane to project.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.gpu.balance import FaceCount
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.features import FrameFeatures
@@ -15,8 +15,6 @@ from translucent.gpu.layout import BODY
 from translucent.gpu.placement import NEAR_SURFACE, AxialRange, Placement, SampleView
 from translucent.media.medium import Medium
 from translucent.reference.sheets import SHEET_ON_OPAQUE
-
-Array = npt.NDArray[np.float64]
 
 #: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
 MAX_SCENE_OPTICAL_DEPTH = 1e30

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import DENSITY
 from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.scene import Object, Scene
-
-Array = npt.NDArray[np.float64]
 
 
 class GridTexture:

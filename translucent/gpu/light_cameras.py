@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Scene
-
-Array = npt.NDArray[np.float64]
 
 #: The frame of a view is larger than what must be in it by this factor: interpolation needs neighbors.
 _MARGIN = 1.02

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import MEDIA
 from translucent.gpu.light_cameras import media_sphere
@@ -16,8 +16,6 @@ from translucent.gpu.scene_view import SceneView
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightLookup, media_uniforms
 from translucent.scene.camera import Camera
-
-Array = npt.NDArray[np.float64]
 
 
 class LightView(SceneView):

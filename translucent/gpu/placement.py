@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
-
-Array = npt.NDArray[np.float64]
 
 #: An eye nearer to a surface than this share of the diagonal is on it; what is nearer than that ahead is clipped.
 NEAR_SURFACE = 1e-6

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
 from translucent.gpu.balance import Balance
@@ -34,8 +35,6 @@ from translucent.scene.environment import Environment
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
-
-Array = npt.NDArray[np.float64]
 
 
 def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear, to_hex
 from translucent.frames.appearance import average_color
 from translucent.media.color_distance import color_at
@@ -16,8 +17,6 @@ from translucent.media.medium import Medium
 from translucent.preview.document import Material, Triple
 from translucent.preview.scenes import medium_of
 from translucent.units import metres_per_unit
-
-Array = npt.NDArray[np.float64]
 
 #: The darkest linear channel that the color field gives: 0 has no extinction. See `translucent.media.conversion.CLAMP`.
 DARKEST = 1e-4

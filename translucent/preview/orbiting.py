@@ -9,12 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.preview.document import MAX_PITCH, Orbit
 from translucent.scene.camera import MAX_COORDINATE, Camera
 from translucent.scene.scene import Object
 from translucent.scene.showcase import framing
-
-Array = npt.NDArray[np.float64]
 
 #: An orthographic camera stands this many distances back, so that a model around the target is before it.
 _STEP_BACK = 4.0

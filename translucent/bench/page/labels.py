@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from translucent.arrays import Array
 
 #: Costs of a place for a label, in pixels of distance from its point that would be as bad.
 _OUTSIDE, _ON_LABEL, _ON_POINT, _ACROSS_LABEL = 1e5, 1e4, 400.0, 30.0
