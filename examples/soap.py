@@ -2,8 +2,8 @@
 Soap: a rough surface over a medium, lit from behind
 ====================================================
 
-Thin edges glow and the middle stays dark when the light comes from behind: this needs the thickness that each ray
-really crosses. The surface is rough, so it shows a soft highlight in place of a mirrored studio.
+How much light comes through from behind depends on the thickness that each ray really crosses: edges are lighter than
+the middle. The surface is rough, so it shows a soft highlight in place of a mirrored studio.
 """
 
 import os

@@ -28,8 +28,8 @@ away_from_edges = tl.interior(tl.reference.hit_counts(scene, size))
 print(tl.compare(frame, truth, mask=away_from_edges))
 
 # %%
-# Pictures of thickness, transmittance, validity and error, each of the latter with its own scale: the error is a
-# hundred-millionth of the knot's size.
+# Pictures of thickness, transmittance, validity and error. Thickness is a matter of centimetres, its error of
+# nanometres, so each of the two has a scale of its own.
 
 for path in frame.save_aovs(".", truth=truth):
     print(path)
