@@ -9,8 +9,9 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import DIAMOND, OPEN, ORDERED, TORUS, WINE, body, scene, sheet
 from translucent.planning.borders import ONE_BORDER
+from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
-from translucent.planning.render_plan import Borders
+from translucent.planning.render_plan import Borders, Capabilities
 
 
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), *ORDERED])
@@ -32,6 +33,24 @@ def test_one_border_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
 )
 def test_one_border_changes_nothing_where_nothing_bends(objects: list[tl.Object], method: Any) -> None:
     assert plan(scene(*objects), method, borders="front") == plan(scene(*objects), method)
+
+
+@pytest.mark.parametrize(
+    ("method", "capabilities", "told"),
+    [
+        (None, Capabilities(), False),
+        (None, Capabilities(shader_storage=False), True),
+        (tl.SignedDepth(), Capabilities(), True),
+        (tl.DepthPeeling(), Capabilities(), True),
+        (tl.KBuffer(), Capabilities(), False),
+        (tl.ThinLayer(), Capabilities(), False),
+    ],
+)
+def test_a_method_that_misses_where_rays_leave_touching_bodies_is_told(
+    method: Any, capabilities: Capabilities, told: bool
+) -> None:
+    found = plan(scene(body(DIAMOND), body(WINE, x=0.5)), method, capabilities)
+    assert found.says(NoteKind.TOUCHING_BORDERS) is told
 
 
 def test_one_border_needs_no_order_where_bodies_touch() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ, open_bodies, scatters, sheets_of, solids_of
-from translucent.planning.borders import border_passes
+from translucent.planning.borders import border_passes, touching_borders
 from translucent.planning.effects import unmodelled_effects
 from translucent.planning.layers import layer_passes
 from translucent.planning.limits import (
@@ -20,7 +20,7 @@ from translucent.planning.limits import (
 )
 from translucent.planning.methods import FragmentLists, Method, SignedDepth, ThinLayer
 from translucent.planning.methods.thin_layer import sheet_pass
-from translucent.planning.notes import Note
+from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.slots import MAX_SLOTS, medium_slots
@@ -59,7 +59,7 @@ def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities
         *layer_passes(scene, COSTS["layers"]),
     )
     lit = any(step.name is PassName.LIGHT_VIEWS for step in passes)
-    unmodelled = unmodelled_effects(scene, scattering=lit, borders=True)
+    unmodelled = (*unmodelled_effects(scene, scattering=lit, borders=True), *_touching(scene, method))
     return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled)
 
 
@@ -88,6 +88,14 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
             "let bodies share media and priorities, or close them",
         )
     method.check(scene)
+
+
+def _touching(scene: Scene, method: Method) -> tuple[Note, ...]:
+    """That a method which does not tell where a ray leaves all bodies bends it between those that touch."""
+    if method.finds_exits or method.makes_sheets or (touching := touching_borders(scene)) is None:
+        return ()
+    text = f"{touching}; {type(method).__name__} does not find it, and takes the border between them for the last"
+    return (Note(NoteKind.TOUCHING_BORDERS, text),)
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:

@@ -33,6 +33,7 @@ class NoteKind(StrEnum):
     UNUSED_LIGHTS = "unused lights"
     SHADOWS = "shadows"
     REFRACTION = "refraction"
+    TOUCHING_BORDERS = "touching borders"
     LATER_REFRACTION = "later refraction"
     ONE_BORDER = "one border"
     OPAQUE_SURFACES = "opaque surfaces"
