@@ -15,7 +15,7 @@ from translucent.cpu.throughput import throughput
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Solid, Sphere, Torus
-from translucent.planning.plan import FALLBACK_SHEET
+from translucent.planning.assembly import FALLBACK_SHEET
 
 SIZE = (48, 36)
 EPS = float(np.finfo(np.float32).eps)
