@@ -87,6 +87,8 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
             f"{count} winding numbers for each ray, one for each medium, priority and open body: more than {MAX_SLOTS}",
             "let bodies share media and priorities, or close them",
         )
+    if not method.tells_media_apart and media_differ(scene):
+        raise InputError(name, "bodies with different media", "use SignedDepth, which tells them apart")
     method.check(scene)
 
 

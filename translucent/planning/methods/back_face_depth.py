@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from translucent.errors import InputError
-from translucent.planning.bodies import media_differ, sheets_of, solids_of
+from translucent.planning.bodies import sheets_of, solids_of
 from translucent.planning.methods.base import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -23,9 +23,7 @@ class BackFaceDepth(Method):
     convex_only: ClassVar[bool] = True
 
     def check(self, scene: Scene) -> None:
-        """Refuse different media, and sheets."""
-        if media_differ(scene):
-            raise InputError("BackFaceDepth", "bodies with different media", "use SignedDepth, which tells them apart")
+        """Refuse sheets."""
         if sheets := [scene.objects[i] for i in sheets_of(scene)]:
             raise InputError(
                 "BackFaceDepth", f"{object_names(sheets)} declared a sheet", "use SignedDepth or ThinLayer"
