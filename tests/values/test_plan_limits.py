@@ -26,7 +26,7 @@ DOUBLED = tl.Mesh(BOX.vertices, [*BOX.faces, *BOX.faces[:, ::-1]], name="walls")
         ([body(MILK)], ["in-scattered light: scattering only removes light"]),
         ([body(DIAMOND)], ["refraction and reflection beyond the first interval"]),
         ([body(), body(None)], ["shadows: light reaches opaque objects through everything"]),
-        ([body(MILK), body(DIAMOND), body(None)], ["in-scattered light", "refraction", "shadows"]),
+        ([body(MILK), body(DIAMOND, x=9), body(None)], ["in-scattered light", "refraction", "shadows"]),
     ],
 )
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.ThinLayer(), *ORDERED])

@@ -9,8 +9,6 @@ from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 
-__all__ = ["Borders", "Capabilities", "PassSpec", "RenderPlan"]
-
 #: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
 Borders: TypeAlias = Literal["both", "front"]
 

@@ -8,7 +8,7 @@ from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import build_program
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 
 
 class BackFaceDepthPass:

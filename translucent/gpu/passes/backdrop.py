@@ -12,7 +12,7 @@ from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 from translucent.scene.backdrop import Backdrop
 
 #: Place of what is infinitely far: behind everything, and yet seen.

@@ -12,7 +12,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.planning.methods import DepthPeeling
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 
 _STATE = ("near_depth", "near_emitted", "layers", "far_depth", "far_emitted", "near_winding", "far_winding")
 

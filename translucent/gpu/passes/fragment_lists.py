@@ -13,7 +13,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.planning.methods import RayMarched
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 
 #: Bytes of a node: a word and the number of the next node.
 _NODE = 8

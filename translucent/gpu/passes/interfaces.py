@@ -11,7 +11,7 @@ from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import texture_units
 from translucent.planning.borders import picture_cuts
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Object
 from translucent.scene.surface import Surface
 

@@ -10,7 +10,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import set_uniform
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Object
 from translucent.scene.surface import LEAST_COVER
 

@@ -18,8 +18,7 @@ from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightLookup
-from translucent.planning.passes import PassName
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
 

@@ -10,7 +10,7 @@ from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.scene_view import SceneView
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 from translucent.scene.surface import Surface
 
 _MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table")

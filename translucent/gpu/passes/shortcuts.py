@@ -12,8 +12,7 @@ from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
-from translucent.planning.passes import PassName
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassName, PassSpec
 
 
 class Shortcut(Protocol):

@@ -6,7 +6,7 @@ import moderngl
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 
 
 class SignedDepthPass:

@@ -9,7 +9,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import surface_table
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 
 _SAMPLERS = (
     "emitted_radiance_sum",

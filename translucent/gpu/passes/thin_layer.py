@@ -7,7 +7,7 @@ import moderngl
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
-from translucent.planning.render_plan import PassSpec
+from translucent.planning.passes import PassSpec
 from translucent.scene.surface import LEAST_COVER
 
 
