@@ -19,8 +19,10 @@ NEGATIVE = 1e-5
 #: Pairs of a triangle and a line that are tested at a time: the working arrays stay below 100 MB.
 CHUNK = 1 << 20
 
-#: Directions of the lines (rows), off the axes and planes along which meshes tend to be built.
-_DIRECTIONS = np.linalg.qr(np.array([[0.9, 0.31, 0.17], [-0.23, 0.87, 0.41], [0.11, -0.37, 0.93]]))[0].T
+#: Axes (columns) off the axes and planes along which meshes tend to be built, and the same with each of them as the last,
+#: along which the lines run.
+_AXES = np.linalg.qr(np.array([[0.9, 0.31, 0.17], [-0.23, 0.87, 0.41], [0.11, -0.37, 0.93]]))[0]
+_TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
 
 
 def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
@@ -43,8 +45,8 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     unit = (vertices - (low / 2 + high / 2)) / diagonal
     lines = int(np.clip(2 * np.sqrt(len(faces)), *LINES))
     # One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
-    points = np.concatenate([unit @ np.roll(_DIRECTIONS, -k, axis=0).T for k in range(3)])
-    copies = np.concatenate([faces + k * len(unit) for k in range(3)])
+    points = (unit @ _TURNS).reshape(-1, 3)
+    copies = (faces + len(unit) * np.arange(3)[:, None, None]).reshape(-1, 3)
     found = list(_chunks(points, copies, lines, np.repeat(np.arange(3), len(faces))))
     if not found:
         return False  # no face is as large as a cell
@@ -84,8 +86,8 @@ def _span(coordinate: Array) -> tuple[Integers, Integers]:
 def _crossings(triangles: Array, heights: Array, cell: Integers, line: Integers) -> tuple[Integers, Array, Integers]:
     """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that the lines at the cells meet."""
     relative = triangles - cell[:, None, :]
-    a, b = np.roll(relative, -1, axis=1), np.roll(relative, -2, axis=1)
-    area = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    x, y = relative[..., 0], relative[..., 1]
+    area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]
     total = area.sum(axis=1)
     met = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
     weights = area[met] / total[met, None]
