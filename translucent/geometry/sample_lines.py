@@ -19,8 +19,8 @@ NEGATIVE = 1e-5
 #: Pairs of a triangle and a line that are tested at a time: the working arrays stay below 100 MB.
 CHUNK = 1 << 20
 
-#: Axes (columns) off the axes and planes along which meshes tend to be built, and the same with each of them as the last,
-#: along which the lines run.
+#: Axes (columns) off those along which meshes tend to be built; and the same with each of them as the last, along which
+#: the lines run.
 _AXES = np.linalg.qr(np.array([[0.9, 0.31, 0.17], [-0.23, 0.87, 0.41], [0.11, -0.37, 0.93]]))[0]
 _TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
 

@@ -22,9 +22,6 @@ COVERAGE_FLOOR = 2e-7
 #: so on, as far as float32 counts exactly. Beyond, they share the last weight.
 OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
 
-#: With weights up to this, a count's fraction still resolves how far the rasterizer may misplace a face.
-SHARING_WEIGHT = 256.0
-
 #: Share of the diagonal that a path may be below 0 by rounding; it then counts as 0. Steep faces have the largest
 #: errors, of some 1e-5.
 ROUNDING = 1e-5
@@ -43,7 +40,7 @@ class FaceCount:
     subpixel : float
         Step of the grid onto which the rasterizer moves vertices, in pixels; 0 where nothing is put down to it.
     snapping_share : float
-        The same over the scene's diagonal, in the fraction of the count; 0 where counts have no room for it.
+        The same over the scene's diagonal, in the fraction of the count.
     """
 
     weight: float
@@ -91,12 +88,12 @@ def count_weights(scene: Scene) -> list[float]:
 def face_counts(scene: Scene, subpixel_bits: int) -> list[FaceCount]:
     """What a face of each object adds to a pixel's count, with a rasterizer of this precision."""
     weights = count_weights(scene)
-    # Where a body is broken, paths below 0 are more likely to be real than swapped at a silhouette.
+    # Where a body is broken, paths below 0 are more likely to be real than swapped at a silhouette; and the weights of
+    # open bodies leave no room in the fraction of a count.
     sound = all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
     subpixel = 0.5**subpixel_bits if sound else 0.0
-    share = subpixel / scene.diagonal if max(weights) <= SHARING_WEIGHT else 0.0
     return [
-        FaceCount(weight, count_offset(body), subpixel, share)
+        FaceCount(weight, count_offset(body), subpixel, subpixel / scene.diagonal)
         for weight, body in zip(weights, scene.objects, strict=True)
     ]
 
