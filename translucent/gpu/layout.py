@@ -189,7 +189,7 @@ BODY = UniformBlock(
             "snapping_share",
             "f4",
             (),
-        ),  # the same, over the metres of a share of 1; 0 where counts have no room
+        ),  # the same, over the metres that a share of 1 stands for
         # The place of a point: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
         ("place_scale", "f4", ()),  # places per metre
         ("place_start", "f4", ()),  # place of the anchor
