@@ -79,7 +79,10 @@ def damaged_json(text: str, chance: random.Random) -> str:
                     return text
             case _:
                 holder[key] = _values(chance)
-    made = json.dumps(tree)
+    try:
+        made = json.dumps(tree)
+    except RecursionError:  # damage upon damage
+        return text
     if chance.random() < 0.1:
         digits = [i for i, c in enumerate(made) if c.isdigit()]
         at = chance.choice(digits) if digits else 0

@@ -78,7 +78,7 @@ def test_no_display_names_the_way_without_one(
     ("arguments", "message"),
     [
         (("--script", "none.toml"), "no such file"),
-        (("--session", "none.toml"), "cannot be read"),
+        (("--session", "none.toml"), "no such file"),
         (("--session", "none.toml", "goblet"), "goblet is given, too"),
         (("--screenshot", "a.jpg"), "no .png"),
         (("--scale", "9"), "not in 0.5 to 4"),

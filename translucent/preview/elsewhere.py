@@ -193,6 +193,7 @@ class _Running:
         self._process.terminate()
         self._process.join(patience)
         self._process.kill()
+        self._process.join()  # only then it lets go of the file that it has half written
         self._pipe.close()
 
     def _token(self, thing: object) -> int:
