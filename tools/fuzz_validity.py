@@ -240,7 +240,9 @@ def judge(renderer: tl.Renderer, scene: tl.Scene, method: tl.Method | None, soun
         return ""
     truth = tl.reference.render(scene, SIZE)
     hits = scene_hits(scene, SIZE)
-    inside = tl.interior(tl.reference.hit_counts(scene, SIZE)) & ~on_edges(scene, hits)
+    # With the surfaces behind the origins: an orthographic picture counts them, too.
+    counted = np.sum([np.bincount(line.pixel, minlength=SIZE[0] * SIZE[1]) for line in hits], axis=0)
+    inside = tl.interior(counted.reshape(SIZE[::-1])) & ~on_edges(scene, hits)
     kept = frame.valid & inside
     wrong = np.abs(frame.thickness - truth.thickness) > THICKNESS * scene.diagonal
     wrong |= (np.abs(frame.transmittance - truth.transmittance) > TRANSMITTANCE).any(axis=2)

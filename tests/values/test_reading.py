@@ -204,6 +204,18 @@ def test_an_exr_of_few_bytes_is_not_a_large_picture(tmp_path: Path) -> None:
         tl.Environment.image(tmp_path / "a.exr")
 
 
+def test_an_npz_that_claims_to_store_more_than_its_file_is_refused(tmp_path: Path) -> None:
+    """The size that is stored, four bytes of the directory at the end, would make room for itself."""
+    path = tmp_path / "a.npz"
+    np.savez(path, scale=np.array(1.0), offset=np.array(0.0), values=np.zeros((4, 4)))
+    data = bytearray(path.read_bytes())
+    entry = data.rindex(b"PK\1\2", 0, data.rindex(b"offset.npy"))
+    data[entry + 20 : entry + 24] = (2**30).to_bytes(4, "little")
+    path.write_bytes(data)
+    with pytest.raises(tl.InputError, match="would take 1 GiB; of so small a file at most 512 MiB are read"):
+        load_thickness_map(path)
+
+
 def test_an_npz_that_unpacks_into_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "FREE", 1000)
     np.savez_compressed(tmp_path / "a.npz", scale=np.array(1.0), offset=np.array(0.0), values=np.zeros((900, 900)))

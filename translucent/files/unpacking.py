@@ -66,11 +66,14 @@ def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> 
     """Arrays of a .npz file by their names; raises `InputError` if one is missing or broken."""
     found = {}
     with open_file(path, asked) as stream:
+        whole = os.fstat(stream.fileno()).st_size
         try:
             with zipfile.ZipFile(stream) as archive:
                 for name in names:
                     member = archive.getinfo(f"{name}.npy")
-                    require_room(asked, f"{name} would", member.file_size, member.compress_size, do)
+                    # What is said to be stored makes room for itself, too, whether it is there or not.
+                    size, stored = max(member.file_size, member.compress_size), min(member.compress_size, whole)
+                    require_room(asked, f"{name} would", size, stored, do)
                     found[name] = read_array(io.BytesIO(archive.read(member)), member.file_size, asked, do)
         except InputError:
             raise
