@@ -1,7 +1,7 @@
 """Whether frames got slower: two checkouts of the project draw the same frames in turns.
 
 ``python tools/compare_checkouts.py OLDER [NEWER]``; NEWER is this checkout unless given, and ``git worktree add`` makes
-others. Each draws in a process of its own an absorbing body without borders, lights or scattering; the times are
+others. Each draws in a process of its own an absorbing body without interfaces, lights or scattering; the times are
 processor time, which other programs hardly change.
 """
 

@@ -20,7 +20,7 @@ REPEATS = 3
 
 
 def cloud() -> tl.DensityGrid:
-    """Puffs that fade towards the border."""
+    """Puffs that fade towards the boundary."""
     x, y, z = 2.0 * (np.indices((VOXELS,) * 3) + 0.5) / VOXELS - 1.0
     puffs = 1.0 + 0.8 * np.sin(10 * x) * np.sin(11.5 * y + 1.0) * np.sin(8.5 * z)
     return tl.DensityGrid(2.0 * np.maximum(1.0 - x**2 - y**2 - z**2, 0.0) * puffs)

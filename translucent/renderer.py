@@ -17,11 +17,11 @@ from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
-from translucent.planning.borders import check_borders
+from translucent.planning.interfaces import check_interfaces
 from translucent.planning.methods import Method
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan, plan_over_backdrop
-from translucent.planning.render_plan import Borders, RenderPlan
+from translucent.planning.render_plan import Interfaces, RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.environment import Environment
@@ -106,16 +106,21 @@ class Renderer:
         }
 
     def plan(
-        self, scene: Scene, method: Method | None = None, *, over_backdrop: bool = False, borders: Borders = "both"
+        self,
+        scene: Scene,
+        method: Method | None = None,
+        *,
+        over_backdrop: bool = False,
+        interfaces: Interfaces = "both",
     ) -> RenderPlan:
         """The plan that `render` would run here, without a backdrop or with one."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
-        check_borders(borders)
+        check_interfaces(interfaces)
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, borders)) not in plans:
+        if (key := (method, over_backdrop, interfaces)) not in plans:
             make = plan_over_backdrop if over_backdrop else plan
-            plans[key] = make(scene, method, self._engine.capabilities, borders=borders)
+            plans[key] = make(scene, method, self._engine.capabilities, interfaces=interfaces)
         return plans[key]
 
     def render(
@@ -127,7 +132,7 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None = None,
         *,
         transparent: bool = False,
-        borders: Borders = "both",
+        interfaces: Interfaces = "both",
     ) -> Frame:
         """Render a scene.
 
@@ -147,7 +152,7 @@ class Renderer:
             Leave out the environment as far as it is seen behind everything, and give the frame an `alpha`; it still
             lights, and is mirrored. Costs a second rendering: alpha is one minus the difference between frames before
             white and before black (Smith & Blinn 1996).
-        borders : {"both", "front"}
+        interfaces : {"both", "front"}
             Where rays bend that cross a body: where they enter and where they leave it, or only where they enter, as
             viewers of glTF do. That is quicker, and wrong for curved bodies; absorption is that of the straight ray.
 
@@ -161,7 +166,7 @@ class Renderer:
         ------
         InputError
             If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
-            scene has opaque objects besides it; if rays start inside a body that has only a front border.
+            scene has opaque objects besides it; if rays start inside a body that has only a front interface.
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
@@ -170,7 +175,7 @@ class Renderer:
         self._require_open()
         size = check_size(size)
         try:
-            frame = self._render(scene, size, method, samples, backdrop, transparent=transparent, borders=borders)
+            frame = self._render(scene, size, method, samples, backdrop, transparent=transparent, interfaces=interfaces)
         except BaseException as error:
             self._note_interruption(error)
             raise
@@ -187,14 +192,16 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None,
         *,
         transparent: bool,
-        borders: Borders,
+        interfaces: Interfaces,
     ) -> Frame:
         if transparent:
-            return self._render_transparent(scene, size, self.plan(scene, method, borders=borders), samples, backdrop)
+            return self._render_transparent(
+                scene, size, self.plan(scene, method, interfaces=interfaces), samples, backdrop
+            )
         if backdrop is None:
-            return self._engine.render(scene, size, self.plan(scene, method, borders=borders), samples)
+            return self._engine.render(scene, size, self.plan(scene, method, interfaces=interfaces), samples)
         _check_backdrop(backdrop, size)
-        chosen = self.plan(scene, method, over_backdrop=True, borders=borders)
+        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces)
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _render_transparent(
@@ -224,7 +231,7 @@ class Renderer:
         exposure: float = 0.0,
         tone: str = "none",
         *,
-        borders: Borders = "both",
+        interfaces: Interfaces = "both",
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -238,7 +245,7 @@ class Renderer:
             Stops brighter.
         tone : {"none", "neutral", "agx"}
             Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
-        borders : {"both", "front"}
+        interfaces : {"both", "front"}
             As for `render`.
 
         Raises
@@ -251,7 +258,7 @@ class Renderer:
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)
-        chosen = self.plan(scene, method, borders=borders)
+        chosen = self.plan(scene, method, interfaces=interfaces)
         try:
             self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
         except BaseException as error:

@@ -17,7 +17,7 @@ void main() {
     for (uint link = list; link != END_OF_LIST; link = next_link(link)) {
         cross_surface(walk, word_at(link), 1, false, metres_per_step);
         layers += 1.0;
-#if BORDERS
+#if INTERFACES
         note_exit(walk);
 #endif
     }

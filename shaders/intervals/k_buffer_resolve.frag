@@ -23,7 +23,7 @@ void main() {
     Walk walk = walk_from_start(excess, misplaced_metres(texelFetch(steepest, ivec2(gl_FragCoord.xy), 0).r, advance));
     for (uint i = 1u; i <= kept; ++i) {
         cross_surface(walk, words[base + i], 1, false, metres_per_step);
-#if BORDERS
+#if INTERFACES
         note_exit(walk);
 #endif
     }

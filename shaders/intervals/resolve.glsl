@@ -11,7 +11,7 @@ layout(location = 0) out vec4 out_optical_depth;  // alpha: 1 where the walk end
 layout(location = 1) out vec4 out_emitted;        // alpha: thickness
 layout(location = 2) out vec4 out_layers;         // counted, kept, metres with a negative winding number, first exit
 
-#if BORDERS
+#if INTERFACES
 // Where the ray first leaves all bodies; bodies that touch are one here.
 float first_exit = NOTHING;
 float maybe_exit = NOTHING;
@@ -36,7 +36,7 @@ float ray_advance() {
 void write_walk(Walk walk, bool sound, float counted, float kept) {
     out_optical_depth = vec4(walk.optical_depth, sound ? 1.0 : 0.0);
     out_emitted = vec4(walk.emitted, walk.thickness);
-#if BORDERS
+#if INTERFACES
     out_layers = vec4(counted, kept, walk.inside_out, min(first_exit, maybe_exit));
 #else
     out_layers = vec4(counted, kept, walk.inside_out, 0.0);

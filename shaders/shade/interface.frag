@@ -1,4 +1,4 @@
-// The border of a body where a ray first enters it, or first leaves one: its normal, place and material.
+// The interface of a body where a ray first enters it, or first leaves one: its normal, place and material.
 // BACK: where it leaves; BEYOND: farther than what has been entered, or else ahead of the eye; EXITS: where the intervals
 // say that it leaves all bodies. HOLES: of a sheet whose alpha makes some.
 
@@ -67,7 +67,7 @@ void main() {
     gl_FragDepth = clamp(place, 0.0, 1.0);
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
-    // Interpolated normals may look away from the eye where the faces do not: then the border is seen edge-on.
+    // Interpolated normals may look away from the eye where the faces do not: then the interface is seen edge-on.
     normal = (gl_FrontFacing ? normal : -normal);
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;

@@ -1,5 +1,5 @@
 // A layer that covers a share of what is behind it, and shows what an opaque object would (Porter & Duff 1984, `over`);
-// or GLOW: light that the border of a body adds where a ray first enters it. Painted object by object, far ones first.
+// or GLOW: light that the interface of a body adds where a ray first enters it. Painted object by object, far ones first.
 // What is behind the first body on a ray is kept apart; BODIES: there are some.
 
 #include <constants>
@@ -13,7 +13,7 @@
 #include "intervals/last_axial.glsl"
 #endif
 #if GLOW
-uniform sampler2D entered;  // w: place of the border where a ray first enters a body
+uniform sampler2D entered;  // w: place of the interface where a ray first enters a body
 #elif BODIES
 uniform sampler2D fronts;   // place where a ray first meets one
 #endif

@@ -1,11 +1,11 @@
-// Light along rays that bend at the border of a body: through its first interval, and out into what is behind.
+// Light along rays that bend at the interface of a body: through its first interval, and out into what is behind.
 // Positions count from the center of the media, so that float32 resolves them. Needs <View>, <Surfaces> and background.glsl.
 // After Wyman 2005, "An approximate image-space approach for interactive refraction", whose guess of the path's length a
 // search along the bent ray replaces.
 
-uniform sampler2D entered;      // border towards the eye: normal, place
-#if !ONE_BORDER
-uniform sampler2D left;         // first border away from it beyond
+uniform sampler2D entered;      // interface towards the eye: normal, place
+#if !ONE_INTERFACE
+uniform sampler2D left;         // first interface away from it beyond
 #endif
 
 const int EXIT_STEPS = 16;
@@ -46,8 +46,8 @@ ivec2 stored(ivec2 texel) {
     return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
 }
 
-#if !ONE_BORDER
-// Place where the first interval of a pixel ends: on the far border, or on an opaque surface inside.
+#if !ONE_INTERFACE
+// Place where the first interval of a pixel ends: on the far interface, or on an opaque surface inside.
 float end_of_interval(ivec2 texel) {
     float last = texelFetch(left, texel, 0).w;
 #if OPAQUE
@@ -74,7 +74,7 @@ struct Exit {
 };
 
 // Where a ray inside the body leaves it: the first of equal steps outside, halved down, then where the ray meets the
-// plane of the border seen there.
+// plane of the interface seen there.
 Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal) {
     float inside = 0.0;
     float outside = longest;
@@ -93,20 +93,20 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
     }
     vec3 seen = seen_at(origin + inside * direction);
     ivec2 texel = texel_of(seen.xy);
-    vec4 border = texelFetch(left, stored(texel), 0);
+    vec4 exit = texelFetch(left, stored(texel), 0);
     Exit result = Exit(0.5 * (inside + outside), fallback_normal, false, vec3(0.0));
 #if OPAQUE
-    result.stopped = in_picture(seen.xy) && end_of_interval(stored(texel)) < border.w;
+    result.stopped = in_picture(seen.xy) && end_of_interval(stored(texel)) < exit.w;
     if (result.stopped) {
         result.stop = texelFetch(opaque_radiance, stored(texel), 0).rgb;
         return result;
     }
 #endif
-    if (!in_picture(seen.xy) || border.w >= NOTHING) { return result; }
-    result.normal = dot(border.xyz, direction) > 0.0 ? -border.xyz : border.xyz;
-    vec3 on_border = point_at(vec2(texel) + 0.5 + frame_size.zw, border.w);
-    float path = dot(on_border - origin, border.xyz) / min(dot(direction, result.normal), -1e-3)
-        * sign(dot(border.xyz, result.normal));
+    if (!in_picture(seen.xy) || exit.w >= NOTHING) { return result; }
+    result.normal = dot(exit.xyz, direction) > 0.0 ? -exit.xyz : exit.xyz;
+    vec3 on_interface = point_at(vec2(texel) + 0.5 + frame_size.zw, exit.w);
+    float path = dot(on_interface - origin, exit.xyz) / min(dot(direction, result.normal), -1e-3)
+        * sign(dot(exit.xyz, result.normal));
     if (abs(path - inside) < margin && path > 0.0) { result.path = path; }
     return result;
 }

@@ -1,6 +1,6 @@
-// Light at the borders of bodies: what they reflect, what enters and bends, and what paint and many scattering events
+// Light at the interfaces of bodies: what they reflect, what enters and bends, and what paint and many scattering events
 // give back. What the media absorb and emit on straight rays has been found; the first interval of a bent ray is as long
-// as it is bent. Row 0 of the output is the top row. ONE_BORDER: rays bend where they enter, and leave without bending.
+// as it is bent. Row 0 of the output is the top row. ONE_INTERFACE: rays bend where they enter, and leave without bending.
 
 #include <constants>
 #include <View>
@@ -23,7 +23,7 @@ uniform sampler2D straight_optical_depth;
 uniform sampler2D straight_thickness;
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
-#if !ONE_BORDER
+#if !ONE_INTERFACE
 uniform sampler2D left_finish;       // object of what is left
 #endif
 uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
@@ -55,8 +55,8 @@ Finish finish_of(vec4 surface) {
         row.painted_share, row.stream_absorption, row.stream_scattering, row.longest, surface.y, surface.z, vec3(1.0), 1.0);
 }
 
-// Reflectance of a rough border: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
-float border_reflectance(float cosine, float ior, float roughness) {
+// Reflectance of a rough interface: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
+float interface_reflectance(float cosine, float ior, float roughness) {
     float polished = fresnel_dielectric(cosine, ior);
     if (roughness == 0.0 || polished >= 1.0) { return polished; }
     float facing = fresnel_dielectric(1.0, ior);
@@ -65,8 +65,8 @@ float border_reflectance(float cosine, float ior, float roughness) {
     return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
 }
 
-// A border that turns microfacets by small angles turns reflections by twice these, and refracted light by (ior - 1)
-// times them at each of two borders.
+// An interface that turns microfacets by small angles turns reflections by twice these, and refracted light by (ior - 1)
+// times them at each of two interfaces.
 float refraction_roughness(float roughness, float ior) {
     return roughness * sqrt(min(abs(ior - 1.0) * 0.70710678, 1.0));
 }
@@ -147,7 +147,7 @@ struct Straight {
     float first_interval; // negative where it has no end
 };
 
-#if ONE_BORDER
+#if ONE_INTERFACE
 // Light that bends where it enters and nowhere else. How far on the body ends changes nothing of its way, and what is
 // absorbed is what the straight ray's path absorbs. A microfacet turns it by (1 - 1 / ior) times its angle, a reflection
 // by twice that angle.
@@ -171,9 +171,9 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
         return result;
     }
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
-    float kept = border_reflectance(cosine, 1.0 / ior, 0.0);
+    float kept = interface_reflectance(cosine, 1.0 / ior, 0.0);
     float blur = refraction_roughness(finish.roughness, ior);
-    // What the far border keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
+    // What the far interface keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
     // where it is mirrored to. Light that scatters on the way comes out all the same where media give it back.
     vec3 again = finish.scatters_much ? vec3(1.0) : result.passed;
     result.light = kept * again * environment_light(reflected_direction(inside, leaving.normal), blur);
@@ -212,7 +212,7 @@ void main() {
     vec4 front = texelFetch(entered, texel, 0);
     out_transmittance = vec4(through, 1.0);
 
-#if ONE_BORDER
+#if ONE_INTERFACE
     const bool starts_inside = false;
 #else
     vec4 back = texelFetch(left, texel, 0);
@@ -222,7 +222,7 @@ void main() {
         out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
         return;
     }
-#if ONE_BORDER
+#if ONE_INTERFACE
     vec4 surface = texelFetch(surface_finish, texel, 0);
 #else
     vec4 surface = starts_inside ? texelFetch(left_finish, texel, 0) : texelFetch(surface_finish, texel, 0);
@@ -238,7 +238,7 @@ void main() {
     float place = starts_inside ? surface_eye_place : front.w;
     vec3 point = point_at(pixel, place);
     float cosine = clamp(-dot(normal, ray), 0.0, 1.0);
-    float reflectance = starts_inside ? 0.0 : border_reflectance(cosine, finish.ior, finish.roughness);
+    float reflectance = starts_inside ? 0.0 : interface_reflectance(cosine, finish.ior, finish.roughness);
     vec3 mirrored_share = vec3(reflectance);
     vec3 entered_share = vec3(1.0 - reflectance);
     if (finish.is_sheet) {
@@ -256,7 +256,7 @@ void main() {
 
     vec3 light = vec3(0.0);
     if (finish.transmission > 0.0) {
-#if ONE_BORDER
+#if ONE_INTERFACE
         const float first_interval = 0.0; // nothing asks how long it is
 #else
         float first_interval = back.w < NOTHING ? (end_of_interval(texel) - place) * surface_ahead.y * advance : -1.0;

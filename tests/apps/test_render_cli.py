@@ -85,7 +85,10 @@ BAD_RENDER_OPTIONS = [
     (["--samples", "some"], "Invalid value for '--samples'"),
     (["--camera", "0"], "cube.ply is no glTF file and has no cameras; use --eye"),
     (["--camera", "first"], "Invalid value for '--camera'"),
-    (["--borders", "front", "--opaque-with", "pyrender"], "--borders front; --opaque-with, where rays bend at both"),
+    (
+        ["--interfaces", "front", "--opaque-with", "pyrender"],
+        "--interfaces front; --opaque-with, where rays bend at both",
+    ),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]
 
@@ -183,16 +186,16 @@ class TestRendering:
             assert arrays["thickness"][0, 0] == 0.0
             assert arrays["valid"].all()
 
-    def test_render_bends_rays_at_one_border_or_both(self, run: Run, tmp_path: Path) -> None:
+    def test_render_bends_rays_at_one_interface_or_both(self, run: Run, tmp_path: Path) -> None:
         glass = {"extensions": GLASS | {"KHR_materials_ior": {"ior": 1.5}}}
         model, frames = write_scene(tmp_path / "scene.glb", glass), {}
-        for borders in ("both", "front"):
-            output = tmp_path / f"{borders}.npz"
-            result = run("render", model, "-o", output, "--size", "9x5", "--samples", "1", "--borders", borders)
+        for interfaces in ("both", "front"):
+            output = tmp_path / f"{interfaces}.npz"
+            result = run("render", model, "-o", output, "--size", "9x5", "--samples", "1", "--interfaces", interfaces)
             assert (result.code, result.err) == (0, "")
-            assert ("leaves without bending" in result.out) == (borders == "front")
+            assert ("leaves without bending" in result.out) == (interfaces == "front")
             with np.load(output) as arrays:
-                frames[borders] = arrays["radiance"], arrays["thickness"]
+                frames[interfaces] = arrays["radiance"], arrays["thickness"]
         assert (frames["both"][0] != frames["front"][0]).any()
         assert (frames["both"][1] == frames["front"][1]).all()
 
@@ -267,8 +270,8 @@ class TestRendering:
             with np.load(tmp_path / "two.npz") as arrays:
                 covered = arrays["coverage"]
             assert covered.any()
-            border = np.concatenate([covered[0], covered[-1], covered[:, 0], covered[:, -1]])
-            assert not border.any()
+            edge = np.concatenate([covered[0], covered[-1], covered[:, 0], covered[:, -1]])
+            assert not edge.any()
 
     @pytest.mark.filterwarnings("ignore:scene 'AttenuationTest.glb'")
     def test_the_attenuation_test_has_equal_columns_before_its_opaque_backdrop(

@@ -126,8 +126,8 @@ class TestRendering:
         assert all(view.shape == (24, 32, 3) for view in views)
         assert all(np.abs(view - other).max() > 20 for view, other in pairwise(views))
         for view in views:  # no side of the frame cuts the model
-            border = np.concatenate([view[0], view[-1], view[:, 0], view[:, -1]])
-            assert np.ptp(border, axis=1).max() < 20
+            edge = np.concatenate([view[0], view[-1], view[:, 0], view[:, -1]])
+            assert np.ptp(edge, axis=1).max() < 20
 
     def test_quantities_are_written_as_pictures(self, run: Run, tmp_path: Path) -> None:
         result = run("render", "bear", "-o", tmp_path / "bear.png", *SMALL, "--aov", tmp_path / "aovs")

@@ -44,7 +44,7 @@ def test_every_texel_that_a_triangle_touches(rng: np.random.Generator) -> None:
     assert (covered & ~touched).sum() <= 0.02 * covered.sum()
 
 
-def test_no_texel_beside_a_chart_that_ends_on_its_border() -> None:
+def test_no_texel_beside_a_chart_that_ends_on_its_edge() -> None:
     covered = coverage(atlas(np.array(SQUARE) * 0.5, 8))
     assert covered[4:, :4].all()
     assert covered.sum() == 16

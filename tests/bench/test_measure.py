@@ -267,27 +267,27 @@ def test_methods_are_chosen_by_name_or_family() -> None:
     }
 
 
-def test_one_border_lies_between_two_and_straight_rays_in_passes_and_is_not_exact(studio: Studio) -> None:
+def test_one_interface_lies_between_two_and_straight_rays_in_passes_and_is_not_exact(studio: Studio) -> None:
     case = next(case for case in CASES if case.name == "glass")
-    made = measured(studio, case, "SignedDepth", "one border", "straight rays", size=(64, 64))
+    made = measured(studio, case, "SignedDepth", "one interface", "straight rays", size=(64, 64))
     rows = {row.method: row for row in made.rows}
-    two, one, none = (rows[name] for name in ("SignedDepth", "one border", "straight rays"))
+    two, one, none = (rows[name] for name in ("SignedDepth", "one interface", "straight rays"))
     assert not any(row.exact for row in (two, one, none))
     assert two.promise.startswith("refraction and reflection beyond the first interval")
-    assert none.promise == "none: borders are left out"
+    assert none.promise == "none: interfaces are left out"
     assert [row.passes for row in (two, one, none)] == [3, 2, 1]
-    assert one.parameters == 'SignedDepth(anchored=True), borders="front"'
+    assert one.parameters == 'SignedDepth(anchored=True), interfaces="front"'
     assert "rays leave curved bodies in wrong directions" in one.promise
     # The root mean square of all of them is that of reflections inside, which none follows on.
     assert one.radiance.median > 3 * two.radiance.median  # type: ignore[union-attr]
-    assert {"SignedDepth", "one border", "straight rays"} <= {picture.method for picture in made.pictures}
+    assert {"SignedDepth", "one interface", "straight rays"} <= {picture.method for picture in made.pictures}
 
 
 def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
     case = next(case for case in CASES if case.name == "thin wall")
-    made = measured(studio, case, "SignedDepth", "one border", "straight rays", size=(96, 96))
+    made = measured(studio, case, "SignedDepth", "one interface", "straight rays", size=(96, 96))
     rows = {row.method: row for row in made.rows}
-    assert rows["one border"].refusal == "sheets have one border, at which nothing bends"
+    assert rows["one interface"].refusal == "sheets have one interface, at which nothing bends"
     wall, none = rows["SignedDepth"].radiance, rows["straight rays"].radiance
     assert wall is not None
     assert none is not None

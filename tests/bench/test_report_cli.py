@@ -202,8 +202,8 @@ def test_a_medium_for_the_model_says_what_would_be_seen_in_it(run: Run, tmp_path
     made = Report.from_json((tmp_path / "report.json").read_text())
     rows = {row.method: row for row in made.cases[0].rows}
     assert made.cases[0].quantity == "thickness"
-    # Borders, of ior 1.33, would cost the same on top of each method.
-    assert made.cases[0].why == "a model of yours" + (", without its borders" if "merlot" in medium else "")
+    # Interfaces, of ior 1.33, would cost the same on top of each method.
+    assert made.cases[0].why == "a model of yours" + (", without its interfaces" if "merlot" in medium else "")
     assert rows["SignedDepth"].passes == 1
     assert all(word in made.provenance.command.split() for word in medium)
     assert rows["SignedDepth"].color_difference is not None

@@ -121,7 +121,7 @@ def _cell_arguments() -> list[np.ndarray]:
     return [values.astype(np.float32) for values in (low, high, share)]
 
 
-#: Within the box, on its border, and what rounding puts outside.
+#: Within the box, on its boundary, and what rounding puts outside.
 ALONG = np.concatenate([np.linspace(0, 1, 13), [-1e-6, 1 + 1e-6, 1e-30, 1 - 1e-7]])
 
 ARGUMENTS = {

@@ -9,7 +9,7 @@ import pytest
 import translucent as tl
 from translucent.errors import RenderError
 from translucent.geometry.solids import Sphere
-from translucent.gpu.drivers import require_borders
+from translucent.gpu.drivers import require_interfaces
 
 LAVAPIPE = {
     "GL_RENDERER": "zink (llvmpipe (LLVM 15.0.6, 256 bits))",
@@ -24,17 +24,17 @@ def test_only_the_driver_at_fault_is_refused(other: dict[str, str]) -> None:
     with pytest.raises(
         RenderError, match=r"lavapipe; this driver.*Mesa 22.3.6, ends the process.*without ior and surface$"
     ):
-        require_borders(LAVAPIPE)
-    require_borders(LAVAPIPE | other)
+        require_interfaces(LAVAPIPE)
+    require_interfaces(LAVAPIPE | other)
 
 
-def test_a_renderer_that_refuses_borders_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_renderer_that_refuses_interfaces_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.gpu.passes import surfaces
 
     def refuse(_: Any) -> None:
-        require_borders(LAVAPIPE)
+        require_interfaces(LAVAPIPE)
 
-    monkeypatch.setattr(surfaces, "require_borders", refuse)
+    monkeypatch.setattr(surfaces, "require_interfaces", refuse)
     ball, camera = Sphere().tessellate(16), tl.Camera.look_at((1, 2, 3), (0, 0, 0))
     glass, dye = (tl.Scene([tl.Object(ball, tl.Medium(absorption=1.0, ior=ior))], camera) for ior in (1.5, 1.0))
     with tl.Renderer() as renderer:

@@ -11,7 +11,7 @@ from translucent.gpu.features import FrameFeatures
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.methods import Method
 from translucent.planning.plan import plan
-from translucent.planning.render_plan import Borders, Capabilities
+from translucent.planning.render_plan import Capabilities, Interfaces
 
 FLAGS = (
     "has_opaque",
@@ -21,7 +21,7 @@ FLAGS = (
     "has_fallback",
     "has_unlit",
     "scatters",
-    "one_border",
+    "one_interface",
     "finds_exits",
     "marches",
     "emits",
@@ -35,9 +35,9 @@ def features(
     found: tl.Scene,
     method: Method | None = None,
     capabilities: Capabilities | None = None,
-    borders: Borders = "both",
+    interfaces: Interfaces = "both",
 ) -> FrameFeatures:
-    return FrameFeatures(found, plan(found, method, capabilities or Capabilities(), borders=borders))
+    return FrameFeatures(found, plan(found, method, capabilities or Capabilities(), interfaces=interfaces))
 
 
 def flags(found: FrameFeatures) -> set[str]:
@@ -51,18 +51,18 @@ CASES: dict[str, tuple[FrameFeatures, set[str], str]] = {
     "emitters": (features(scene(body(FIRE), body(EMBER))), {"emits"}, "transmittance"),
     "with a sheet": (features(scene(body(FIRE), body(EMBER), sheet(x=3.0))), {"accumulates", "emits"}, "transmittance"),
     "open": (features(scene(body(mesh=OPEN))), {"accumulates", "has_fallback"}, "transmittance"),
-    "borders": (features(scene(body(DIAMOND))), {"accumulates", "has_surfaces"}, "surfaces"),
-    "one border": (
-        features(scene(body(DIAMOND)), borders="front"),
-        {"accumulates", "has_surfaces", "one_border"},
+    "interfaces": (features(scene(body(DIAMOND))), {"accumulates", "has_surfaces"}, "surfaces"),
+    "one interface": (
+        features(scene(body(DIAMOND)), interfaces="front"),
+        {"accumulates", "has_surfaces", "one_interface"},
         "surfaces",
     ),
-    "borders in order": (
+    "interfaces in order": (
         features(scene(body(DIAMOND)), tl.FragmentLists()),
         {"has_surfaces", "finds_exits"},
         "surfaces",
     ),
-    "borders peeled": (features(scene(body(DIAMOND)), tl.DepthPeeling()), {"has_surfaces"}, "surfaces"),
+    "interfaces peeled": (features(scene(body(DIAMOND)), tl.DepthPeeling()), {"has_surfaces"}, "surfaces"),
     "lit": (features(scene(body(MILK), lights=[LIGHT])), {"scatters"}, "transmittance"),
     "unlit": (
         features(scene(body(MILK), lights=[LIGHT]), capabilities=NO_STORAGE),

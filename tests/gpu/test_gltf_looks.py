@@ -38,7 +38,7 @@ def test_the_attenuation_test_has_one_shade_in_every_column(
 ) -> None:
     """Thin walls, modelled thickness, one mesh, scaled nodes, attenuation distances: alike to 2/255 when shown.
 
-    Within a column all five have the same borders, so reflections are the same, too. Thickness is that of the meshes,
+    Within a column all five have the same interfaces, and so the same reflections. Thickness is that of the meshes,
     so that the 8 bits of the file's thickness texture do not matter.
     """
     scene = loaded(assets, "AttenuationTest")
@@ -74,7 +74,7 @@ def test_the_transmission_test_blurs_more_with_roughness_and_with_the_index(
     for ior in (1.33, 1.5, 2.42):
         assert contrast[ior, 8] < 0.1 < contrast[ior, 0], contrast
         assert contrast[ior, 8] < contrast[ior, 4] < contrast[ior, 0], contrast
-    assert contrast[1.0, 8] == pytest.approx(contrast[1.0, 0], rel=0.5)  # without a border nothing is blurred
+    assert contrast[1.0, 8] == pytest.approx(contrast[1.0, 0], rel=0.5)  # without an interface nothing is blurred
 
 
 def test_the_candle_holder_is_of_blue_glass_on_polished_metal(renderer: tl.Renderer, assets: Path) -> None:

@@ -37,12 +37,12 @@ def values(name: str) -> dict[str, int]:
     return {key: int(key == "SLOTS") for key in switches(name)}
 
 
-# Of each kind of shader one: sums, lists with lights, peeling, and borders before an opaque body.
+# Of each kind of shader one: sums, lists with lights, peeling, and interfaces before an opaque body.
 SCENES: Mapping[str, tuple[tl.Scene, tl.SignedDepth | tl.DepthPeeling | None]] = {
     "sum": (tl.Scene([tl.Object(BALL, WINE), tl.Object(BOX, RUBY, moved(0.7))], CAMERA), tl.SignedDepth()),
     "lists": (tl.Scene([tl.Object(BALL, MIST), tl.Object(BOX, WINE)], CAMERA, [LAMP], overlap="union"), None),
     "peeling": (tl.Scene([tl.Object(BALL, GLOW), tl.Object(BOX, WINE, moved(0.5))], CAMERA), tl.DepthPeeling()),
-    "borders": (tl.Scene([tl.Object(BALL, GLASS), tl.Object(BOX, color=(0.9, 0.5, 0.1))], CAMERA, [LAMP]), None),
+    "interfaces": (tl.Scene([tl.Object(BALL, GLASS), tl.Object(BOX, color=(0.9, 0.5, 0.1))], CAMERA, [LAMP]), None),
 }
 
 

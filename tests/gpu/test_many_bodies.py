@@ -15,7 +15,7 @@ FEW = 20
 
 
 def scene(count: int, overlap: str) -> tl.Scene:
-    """Bodies with borders and without, sheets, and opaque objects, one after the other."""
+    """Bodies with interfaces and without, sheets, and opaque objects, one after the other."""
     kinds = [(GLASS, None), (WINE, None), (GLASS, 1e-3), (None, None)]
     objects = []
     for i in range(count):

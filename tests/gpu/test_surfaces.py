@@ -1,4 +1,4 @@
-"""Borders of bodies on the GPU: energy, closed forms, and that they cost nothing where nothing happens at them."""
+"""Interfaces of bodies on the GPU: energy, closed forms, and that they cost nothing where nothing happens at them."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_rays_of_an_orthographic_picture_that_cuts_a_body_bend_where_they_leave(
 ) -> None:
     pose = np.eye(4)
     pose[2, 3] = 0.2
-    camera = tl.Camera(pose, None, 0.8)  # as far as borders mirror little inside
+    camera = tl.Camera(pose, None, 0.8)  # as far as interfaces mirror little inside
     scene = tl.Scene([tl.Object(BALL, tl.Medium(ior=1.5))], camera, environment=tl.Environment.studio())
     frame, truth = renderer.render(scene, (24, 24), method), references.render(scene, (24, 24), bounces=4)
     assert frame.coverage.all()
@@ -75,10 +75,10 @@ def test_rays_of_an_orthographic_picture_that_cuts_a_body_bend_where_they_leave(
 
 
 @pytest.mark.parametrize("kind", LOSSLESS)
-def test_white_furnace_of_one_border(renderer: tl.Renderer, kind: str) -> None:
+def test_white_furnace_of_one_interface(renderer: tl.Renderer, kind: str) -> None:
     medium, surface = LOSSLESS[kind]
     scene = shown(tl.load_mesh(mesh_path("knot")), medium, WHITE, surface=surface)
-    frame = renderer.render(scene, SIZE, borders="front")
+    frame = renderer.render(scene, SIZE, interfaces="front")
     assert frame.coverage.sum() > 1000
     np.testing.assert_allclose(frame.radiance, 1.0, atol=1e-5)
 
@@ -95,7 +95,7 @@ def rays(camera: tl.Camera) -> Array:
 
 
 def ball_radiance(scene: tl.Scene, sigma: Array, ior: float) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """What a ball of radius 1 shows: both borders, and what the far one keeps seen where it is mirrored to."""
+    """What a ball of radius 1 shows: both interfaces, and what the far one keeps seen where it is mirrored to."""
     eye, ray = scene.camera.eye, rays(scene.camera)
     along = -ray @ eye
     closest = eye + along[..., None] * ray
@@ -154,13 +154,13 @@ def test_a_pane_shifts_light_and_does_not_turn_it(renderer: tl.Renderer) -> None
 
 
 @pytest.mark.parametrize("ior", [1.2, 1.5, 2.4])
-def test_a_pane_with_one_border_turns_light_once(renderer: tl.Renderer, ior: float) -> None:
+def test_a_pane_with_one_interface_turns_light_once(renderer: tl.Renderer, ior: float) -> None:
     """The ray goes on as it goes inside, and its path is that of the straight one: d / cos of the angle outside."""
     sigma = 2.0
     pane = tl.Object(Box((-4.0, -4.0, -0.2), (4.0, 4.0, 0.2)).tessellate(), tl.Medium(absorption=sigma, ior=ior))
     camera = tl.Camera.look_at((2.0, 1.0, 3.0), (0, 0, 0), fov_y=10)
     scene = tl.Scene([pane], camera, environment=SKY)
-    frame = renderer.render(scene, SIZE, borders="front")
+    frame = renderer.render(scene, SIZE, interfaces="front")
     ray = rays(camera)
     cosine = -ray[..., 2]
     share = optics.fresnel_dielectric(cosine, ior)[..., None]
@@ -173,7 +173,7 @@ def test_a_pane_with_one_border_turns_light_once(renderer: tl.Renderer, ior: flo
     np.testing.assert_allclose(frame.transmittance, np.broadcast_to(passed, (*passed.shape[:2], 3)), rtol=2e-5)
 
 
-def test_one_border_without_a_step_in_index_is_not_there(renderer: tl.Renderer) -> None:
+def test_one_interface_without_a_step_in_index_is_not_there(renderer: tl.Renderer) -> None:
     """Rays through a tinted ball go straight, to what is behind and to what is inside."""
     color, medium = (1.0, 0.5, 0.25), tl.Medium(absorption=(0.5, 0.1, 0.9))
     camera = tl.Camera.look_at((2.0, 1.5, 4.0), (0, 0, 0), fov_y=30.0)
@@ -183,25 +183,25 @@ def test_one_border_without_a_step_in_index_is_not_there(renderer: tl.Renderer) 
         plain = tl.Scene([tl.Object(BALL, medium), *opaque], camera, environment=SKY)
         tinted = tl.Scene([tl.Object(BALL, medium, surface=tl.Surface(color=color)), *opaque], camera, environment=SKY)
         straight = renderer.render(plain, SIZE)
-        found = renderer.render(tinted, SIZE, borders="front").radiance[straight.coverage]
+        found = renderer.render(tinted, SIZE, interfaces="front").radiance[straight.coverage]
         error = np.abs(found / (straight.radiance[straight.coverage] * color) - 1).max(axis=-1)
         assert error.size > 3000
         # Opaque surfaces are found at whole pixels: all is well but for the edge of the core.
         assert np.quantile(error, 0.97 if core in opaque else 1.0) < 1e-4
 
 
-def test_one_border_leaves_out_the_draw_of_the_other(renderer: tl.Renderer) -> None:
+def test_one_interface_leaves_out_the_draw_of_the_other(renderer: tl.Renderer) -> None:
     scene = shown(BALL, tl.Medium(absorption=1.0, ior=1.5), SKY)
-    both, front = renderer.render(scene, SIZE), renderer.render(scene, SIZE, borders="front")
+    both, front = renderer.render(scene, SIZE), renderer.render(scene, SIZE, interfaces="front")
     assert both.plan.geometry_passes == front.plan.geometry_passes + 1
-    assert (both.plan.borders, front.plan.borders) == ("both", "front")
+    assert (both.plan.interfaces, front.plan.interfaces) == ("both", "front")
     for name in ("thickness", "optical_depth", "transmittance", "coverage", "valid", "normals"):
         np.testing.assert_array_equal(getattr(both, name), getattr(front, name))
     assert np.abs(both.radiance - front.radiance).max() > 0.1
-    # What has been drawn with one border leaves nothing behind.
+    # What has been drawn with one interface leaves nothing behind.
     np.testing.assert_array_equal(renderer.render(scene, SIZE).radiance, both.radiance)
     # Averages and frames with alpha have it, too.
-    averaged = renderer.render(scene, SIZE, samples=2, transparent=True, borders="front")
+    averaged = renderer.render(scene, SIZE, samples=2, transparent=True, interfaces="front")
     assert averaged.plan == front.plan
     assert averaged.alpha is not None
 
@@ -248,7 +248,7 @@ def test_straight_quantities_do_not_bend(renderer: tl.Renderer) -> None:
 
 
 def test_wine_in_a_glass_is_left_at_the_outside_of_the_glass(renderer: tl.Renderer) -> None:
-    """With the same index on both sides their common border is not there: a ball in a shell is one ball."""
+    """With the same index on both sides their common interface is not there: a ball in a shell is one ball."""
     outer, inner = Sphere(radius=1.0).tessellate(200), Sphere(radius=0.6).tessellate(200)
     shell = tl.Mesh(
         np.concatenate([outer.vertices, inner.vertices]),
@@ -268,14 +268,14 @@ def test_wine_in_a_glass_is_left_at_the_outside_of_the_glass(renderer: tl.Render
 # Model only what a scene needs
 
 
-def test_matched_borders_add_no_pass() -> None:
+def test_matched_interfaces_add_no_pass() -> None:
     scene = shown(BALL, tl.Medium(absorption=1.0), SKY, surface=tl.Surface(roughness=0.7))
     assert tl.plan(scene).passes == tl.plan(shown(BALL, tl.Medium(absorption=1.0), SKY)).passes
     assert "surfaces" not in {step.name for step in tl.plan(scene).passes}
     assert "surfaces" in {step.name for step in tl.plan(shown(BALL, tl.Medium(ior=1.2), SKY)).passes}
 
 
-def test_normals_are_those_of_the_borders(renderer: tl.Renderer) -> None:
+def test_normals_are_those_of_the_interfaces(renderer: tl.Renderer) -> None:
     scene = shown(BALL, tl.Medium(ior=1.5), SKY)
     frame = renderer.render(scene, SIZE)
     assert frame.normals is not None

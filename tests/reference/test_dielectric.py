@@ -83,7 +83,7 @@ def test_squares_behind_a_slab_stay_where_they_are(perspective: bool) -> None:
     straight = render(Scene(bodies, camera, environment=environment), size, refraction=False).radiance
     expected = 0.96**2 * straight + (1 - 0.96**2) * 0.5
     apart = np.abs(seen - expected).max(axis=2) > 3 * FAINTEST
-    # From 3.5 m to 3.17 m in sight of the far wall: the squares grow by a tenth, and their borders move so.
+    # From 3.5 m to 3.17 m in sight of the far wall: the squares grow by a tenth, and their edges move so.
     assert apart.mean() < (0.35 if perspective else 1e-9)
     assert perspective == bool(apart.any())
 
@@ -160,7 +160,7 @@ def test_a_prism_of_little_index_lets_light_through() -> None:
     turn = math.radians(outside - inside)
     ahead = AXES.lighting([-math.sin(turn), math.cos(turn), 0.0])
     r, f = reflectance(math.sin(math.radians(outside)), 1.2), (0.2 / 2.2) ** 2
-    # All other light is below what the two borders reflect.
+    # All other light is below what the two interfaces reflect.
     assert found[0] == pytest.approx((1 - f) * (1 - r) * ahead[0], abs=f + r)
     assert found[0] > 0.9, "sideways is darker"
 
@@ -210,7 +210,7 @@ def test_all_light_is_accounted_for(name: str, roughness: float) -> None:
 
 def test_light_that_is_dropped_is_told() -> None:
     scene = Scene([Object(slab(-0.5, 0.5), Medium(ior=1.5))], oblique(0), environment=WHITE)
-    # After one border, the refracted ray is dropped; after two, what is reflected inside.
+    # After one interface, the refracted ray is dropped; after two, what is reflected inside.
     for bounces, kept in ((0, 0.0), (1, 0.04), (2, 0.04 + 0.96**2)):
         frame = render(scene, (1, 1), bounces=bounces)
         assert frame.radiance[0, 0, 0] == pytest.approx(kept, abs=1e-14)

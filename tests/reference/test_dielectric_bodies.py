@@ -22,8 +22,8 @@ from translucent.scene.scene import Object, Scene
 # What rays are in
 
 
-def test_walls_at_one_place_are_one_border() -> None:
-    """Two slabs of one glass that touch are one; of two glasses, there is one border of their relative index."""
+def test_walls_at_one_place_are_one_interface() -> None:
+    """Two slabs of one glass that touch are one; of two glasses, there is one interface of their relative index."""
     both = [Object(slab(0.0, 0.5), GLASS), Object(slab(-0.5, 0.0), GLASS)]
     one = [Object(slab(-0.5, 0.5), GLASS)]
     a, b = (pixel(Scene(bodies, oblique(50), environment=UP_AND_DOWN)) for bodies in (both, one))
@@ -31,7 +31,7 @@ def test_walls_at_one_place_are_one_border() -> None:
     apart = [Object(slab(0.0, 0.5), Medium(ior=1.5)), Object(slab(-0.5, 0.0), Medium(ior=2.0))]
     found, _ = bent_light(Scene(apart, oblique(0), environment=WHITE), (1, 1), bounces=2)
     r = [reflectance(0, 1.5), reflectance(0, 2 / 1.5)]
-    # Two borders on the way: first light back from them is r0 and (1 - r0)^2 r1, of which the second needs a third.
+    # Two interfaces on the way: first light back from them is r0 and (1 - r0)^2 r1, of which the second needs a third.
     assert found.radiance[0, 0] == pytest.approx(r[0], abs=1e-14)
     assert found.residual[0, 0] == pytest.approx(1 - r[0], abs=1e-14)
 

@@ -1,4 +1,4 @@
-"""Surfaces of bodies whose borders bend light: dispersion, thin walls, tint, paint."""
+"""Surfaces of bodies whose interfaces bend light: dispersion, thin walls, tint, paint."""
 
 from __future__ import annotations
 

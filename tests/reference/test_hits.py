@@ -89,7 +89,7 @@ def test_grid_cube_with_all_its_vertices_on_pixel_centers(pixels: int, shift: tu
     count, thickness = signed_sums(camera_hits(mesh, IDENTITY, camera, (pixels, pixels)), (pixels, pixels))
     assert not count.any()
     at = camera.rays((pixels, pixels))[0]
-    # The ray moves right and up: the cube has its left and lower border, not its right and upper one.
+    # The ray moves right and up: the cube has its left and lower edge, not its right and upper one.
     covered = ((at >= low) & (at < low + 1))[..., :2].all(axis=-1)
     np.testing.assert_array_equal(thickness, np.where(covered, 1.0, 0.0))
 
@@ -203,8 +203,8 @@ def moller_trumbore(
     u = np.einsum("rfi,rfi->rf", s, p) / determinant
     v = np.einsum("ri,rfi->rf", directions, q) / determinant
     t = np.einsum("fi,rfi->rf", e2, q) / determinant
-    border = np.min([u, v, 1 - u - v], axis=0)
-    return (border > 0) & (t > 0), (np.abs(border) < 1e-9) | (np.abs(t) < 1e-9), t
+    edge = np.min([u, v, 1 - u - v], axis=0)
+    return (edge > 0) & (t > 0), (np.abs(edge) < 1e-9) | (np.abs(t) < 1e-9), t
 
 
 @settings(max_examples=60, deadline=None)

@@ -84,7 +84,7 @@ def facts(found: Diagnosis) -> dict[str, object]:
     return {name: value.count if isinstance(value, Finding) else value for name, value in values.items()}
 
 
-# A slit: two opposite walls at one place, joined along their border.
+# A slit: two opposite walls at one place, joined along their boundary.
 DOUBLED = np.vstack([CUBE[:2], CUBE[:2, ::-1]])
 
 

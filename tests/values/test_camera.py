@@ -47,7 +47,7 @@ def test_a_ray_of_a_right_angled_view(size: tuple[int, int], row: int, column: i
 
 
 @pytest.mark.parametrize("fov_y", [1.0, 45.0, 90.0, 150.0])
-def test_the_upper_border_is_half_the_angle_of_view_above_the_middle(fov_y: float) -> None:
+def test_the_upper_edge_is_half_the_angle_of_view_above_the_middle(fov_y: float) -> None:
     camera = Camera.look_at((0, 0, 5), (0, 0, 0), fov_y=fov_y)
     _, directions = camera.rays((1, 1), offset=(0.0, -0.5))
     angle = math.degrees(math.acos(float(directions[0, 0] @ camera.forward)))

@@ -35,13 +35,13 @@ def test_srgb_curve_by_hand(encoded: float, linear: float) -> None:
 
 @given(st.floats(-4, 4, allow_subnormal=False).filter(lambda v: v == 0 or abs(v) > 1e-300))
 def test_srgb_round_trip(value: float) -> None:
-    # The standard's rounded constants leave the two branches 1e-8 apart at their border, and nowhere else.
+    # The standard's rounded constants leave the two branches 1e-8 apart where they meet, and nowhere else.
     assert color.linear_to_srgb(color.srgb_to_linear(value)) == pytest.approx(value, rel=8 * EPS, abs=4 * EPS)
 
 
-def test_srgb_curve_rises_across_its_border() -> None:
-    for curve, border in ((color.srgb_to_linear, 0.04045), (color.linear_to_srgb, 0.0031308)):
-        values = curve(np.linspace(0.9 * border, 1.1 * border, 1001))
+def test_srgb_curve_rises_where_its_branches_meet() -> None:
+    for curve, limit in ((color.srgb_to_linear, 0.04045), (color.linear_to_srgb, 0.0031308)):
+        values = curve(np.linspace(0.9 * limit, 1.1 * limit, 1001))
         # The branches meet within 1e-7 of each other (IEC 61966-2-1 rounds its constants).
         assert (np.diff(values) > -1e-7).all()
         assert values[-1] > values[0]

@@ -81,7 +81,7 @@ def test_few_pairs_of_boxes_are_compared(shape: tuple[int, int, int]) -> None:
 SCENES: dict[str, Callable[[int], tl.Scene]] = {
     "one medium": lambda n: tl.Scene([body(x=2.0 * i) for i in range(n)], CAMERA),
     "media": lambda n: tl.Scene([body((GLASS, WINE)[i % 2], x=2.0 * i) for i in range(n)], CAMERA),
-    "bodies with borders": lambda n: tl.Scene([body(DIAMOND, x=2.0 * i) for i in range(n)], CAMERA),
+    "bodies with interfaces": lambda n: tl.Scene([body(DIAMOND, x=2.0 * i) for i in range(n)], CAMERA),
     "open bodies": lambda n: tl.Scene([body(mesh=OPEN, x=2.0 * i) for i in range(n)], CAMERA),
     "union": lambda n: tl.Scene([body(x=2.0 * i) for i in range(n)], CAMERA, overlap="union"),
     "priority": lambda n: tl.Scene(

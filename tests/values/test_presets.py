@@ -271,7 +271,7 @@ def medium(absorption: float, scattering: float, g: float = 0.0) -> Preset:
         (0, 0, 0, "absorbing"),
     ],
 )
-def test_the_borders_of_the_regimes(absorption: float, scattering: float, g: float, regime: str) -> None:
+def test_the_limits_of_the_regimes(absorption: float, scattering: float, g: float, regime: str) -> None:
     assert medium(absorption, scattering, g).regime == regime
 
 

@@ -71,7 +71,7 @@ def test_row_0_is_the_top_and_texels_are_met_at_their_centers() -> None:
 
 
 @pytest.mark.parametrize("wrap", ["repeat", "clamp"])
-def test_beyond_the_picture_it_is_repeated_or_its_border_goes_on(wrap: Any) -> None:
+def test_beyond_the_picture_it_is_repeated_or_its_edge_goes_on(wrap: Any) -> None:
     texture = tl.Texture(PICTURE, wrap=(wrap, wrap))
     expected = PICTURE[0, 1] if wrap == "repeat" else PICTURE[0, 3]
     np.testing.assert_allclose(texture.sample([1.375, 0.75]), expected, atol=1e-7)

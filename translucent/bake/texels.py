@@ -86,7 +86,7 @@ class Atlas:
             a, b = start[:, i], start[:, (i + 1) % 3]
             rise = b[:, 1] - a[:, 1]
             level = rise == 0
-            # Where the edge meets the upper and lower border of the row, as a share of its length.
+            # Where the edge meets the upper and lower edge of the row, as a share of its length.
             with np.errstate(over="ignore", under="ignore"):
                 ends = (row[:, None] + (0.0, 1.0) - a[:, 1:]) / np.where(level, 1.0, rise)[:, None]
             ends = np.where(level[:, None], (0.0, 1.0), np.clip(ends, 0.0, 1.0))
@@ -137,7 +137,7 @@ class Atlas:
 
 
 def _cells(low: Array, high: Array) -> tuple[Integers, Integers]:
-    """First cell, and last + 1, of closed ranges; those that end on a border do not touch the cell behind it."""
+    """First cell, and last + 1, of closed ranges; those that end on a boundary do not touch the cell behind it."""
     first = np.floor(low).astype(np.int64)
     return first, np.maximum(np.ceil(high).astype(np.int64), first + 1)
 

@@ -160,8 +160,8 @@ def _density(size: Size) -> Scene:
     return Scene([cloud], framing([cloud], size), environment=DUSK)
 
 
-#: Cases of borders, which take long: all but one are left out by ``--quick``.
-_BORDERED = partial(Case, effect="borders", quick=False)
+#: Cases of interfaces, which take long: all but one are left out by ``--quick``.
+_WITH_INTERFACES = partial(Case, effect="interfaces", quick=False)
 
 CASES: tuple[Case, ...] = (
     Case("sphere", "Sphere", "convex: two surfaces on every ray", partial(_shown, lambda: Sphere().tessellate(316))),
@@ -223,36 +223,36 @@ CASES: tuple[Case, ...] = (
         compared=80,
         tolerance=3e-4,
     ),
-    _BORDERED(
+    _WITH_INTERFACES(
         "glass",
         "Glass ball",
-        "borders that mirror, and bend rays twice",
+        "interfaces that mirror, and bend rays twice",
         partial(_glass, _ball, Surface()),
         quick=True,
         compared=160,
     ),
-    _BORDERED(
+    _WITH_INTERFACES(
         "glass knot",
         "Glass knot",
         "the same where rays leave and enter again",
         partial(_glass, partial(_toolkit, "knot"), Surface()),
         compared=96,
     ),
-    _BORDERED(
+    _WITH_INTERFACES(
         "frosted",
         "Frosted glass ball",
-        "rough borders, that blur what they mirror and what is behind",
+        "rough interfaces, that blur what they mirror and what is behind",
         partial(_glass, _ball, Surface(roughness=0.4)),
         compared=40,
     ),
-    _BORDERED(
+    _WITH_INTERFACES(
         "dispersion",
         "Ball of heavy flint",
         "each channel bends on its own",
         partial(_glass, _ball, Surface(dispersion=1.0)),
         compared=128,
     ),
-    _BORDERED(
+    _WITH_INTERFACES(
         "thin wall",
         "Sheet of glass",
         "a thin wall: both of its faces mirror, and rays that pass go straight on",

@@ -22,19 +22,19 @@ from translucent.planning.methods import (
 )
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.planning.methods.ray_marched import Quadrature
-from translucent.planning.render_plan import Borders
+from translucent.planning.render_plan import Interfaces
 from translucent.scene.scene import Scene
 
 #: How a contender is drawn: by the plan for its method, by a shortcut of the bench, or without OpenGL.
 Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march"]
 
 #: What a scene has that makes some contenders worth a row, or no contest at all.
-Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "borders"]
+Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces"]
 
 #: Refraction index of the thin layers that bend rays.
 REFRACTED_IOR = 1.5
 
-_ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect != "borders")
+_ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect != "interfaces")
 _STEPS = (8, 16, 32, 64, 128, 256, 512)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 
@@ -64,7 +64,7 @@ class Contender:
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
-    borders : {"both", "front"}
+    interfaces : {"both", "front"}
         Where rays bend, as `translucent.Renderer.render` has it.
     """
 
@@ -77,7 +77,7 @@ class Contender:
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
-    borders: Borders = "both"
+    interfaces: Interfaces = "both"
 
     @property
     def fitted(self) -> bool:
@@ -90,8 +90,8 @@ class Contender:
             return "the shortcuts are drawn without opaque objects"
         if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
             return "signed distances of a sheet mean nothing"
-        if self.borders == "front" and all(body.sheet_thickness is not None for body in scene.bodies):
-            return "sheets have one border, at which nothing bends"
+        if self.interfaces == "front" and all(body.sheet_thickness is not None for body in scene.bodies):
+            return "sheets have one interface, at which nothing bends"
         return None
 
 
@@ -107,7 +107,7 @@ def _ordered() -> Iterable[Contender]:
     yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
     for k in (2, 4, 8):
         yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), quick=k == 8)
-    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), effects=(*_ALL, "borders"), pictured=_SOURCES)
+    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), effects=(*_ALL, "interfaces"), pictured=_SOURCES)
 
 
 def _light_points() -> Iterable[Contender]:
@@ -168,22 +168,24 @@ CONTENDERS: tuple[Contender, ...] = (
         "counter-example",
         pictured=("absorption", "emission"),
     ),
-    Contender("SignedDepth", "SignedDepth", SignedDepth(), effects=(*_ALL, "borders"), pictured=(*_ALL, "borders")),
     Contender(
-        "one border",
-        "one border",
+        "SignedDepth", "SignedDepth", SignedDepth(), effects=(*_ALL, "interfaces"), pictured=(*_ALL, "interfaces")
+    ),
+    Contender(
+        "one interface",
+        "one interface",
         SignedDepth(),
-        effects=("borders",),
-        pictured=("borders",),
-        borders="front",
+        effects=("interfaces",),
+        pictured=("interfaces",),
+        interfaces="front",
     ),
     Contender(
         "straight rays",
         "straight rays",
         SignedDepth(),
         kind="counter-example",
-        effects=("borders",),
-        pictured=("borders",),
+        effects=("interfaces",),
+        pictured=("interfaces",),
         ior="matched",
     ),
     Contender(

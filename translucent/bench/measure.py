@@ -33,7 +33,7 @@ QUANTITY: dict[str, Quantity] = {
     "emission": "radiance",
     "scattering": "radiance",
     "density": "radiance",
-    "borders": "radiance",
+    "interfaces": "radiance",
 }
 
 
@@ -219,7 +219,8 @@ def _parameters(contender: Contender) -> str:
         "half": "SignedDepth(anchored=True) into float16",
         "cpu": 'Renderer(backend="cpu")',
         "march": f"reference.march with {contender.method}",
-        "plan": str(contender.method) + ("" if contender.borders == "both" else f', borders="{contender.borders}"'),
+        "plan": str(contender.method)
+        + ("" if contender.interfaces == "both" else f', interfaces="{contender.interfaces}"'),
     }[contender.technique]
 
 

@@ -23,29 +23,30 @@ LOOK: Size = (64, 64)
 def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
     """A case for the scene of each model, by the name that the user gave.
 
-    What is judged is what methods do differently: borders, which cost the same on top of each and have scenes of their
-    own, are left out, and so is light that is scattered many times, which no method and no reference follows here.
-    A case is called by the file's name, or by all of its path where several files have the same. One that no method can
-    treat as solid raises `InputError` when its scene is made, so that it is a row of the report like all that fails.
+    What is judged is what methods do differently: interfaces, which cost the same on top of each and have scenes of
+    their own, are left out, and so is light that is scattered many times, which no method and no reference follows
+    here. A case is called by the file's name, or by all of its path where several files have the same. One that no
+    method can treat as solid raises `InputError` when its scene is made, so that it is a row of the report like all
+    that fails.
     """
     shared = Counter(Path(model).name for model in scenes)
     return [
         Case(
             f"model {title}",
             title,
-            "a model of yours" if judged is scene else "a model of yours, without its borders",
+            "a model of yours" if judged is scene else "a model of yours, without its interfaces",
             partial(_solid, title, judged),
             effect_of(judged),
         )
         for model, scene in scenes.items()
-        for judged in [without_borders(scene)]
+        for judged in [without_interfaces(scene)]
         for title in [model if shared[Path(model).name] > 1 else Path(model).name]
     ]
 
 
-def without_borders(scene: Scene) -> Scene:
+def without_interfaces(scene: Scene) -> Scene:
     """The scene with media that neither bend light nor have a surface; itself, if it has no others."""
-    if not any(_has_border(item) for item in scene.bodies):
+    if not any(_has_interface(item) for item in scene.bodies):
         return scene
 
     def bare(item: Object) -> Object:
@@ -56,7 +57,7 @@ def without_borders(scene: Scene) -> Scene:
     return dataclasses.replace(scene, objects=[bare(item) for item in scene.objects])
 
 
-def _has_border(item: Object) -> bool:
+def _has_interface(item: Object) -> bool:
     return item.surface is not None or (item.medium is not None and item.medium.ior > 1)
 
 

@@ -38,7 +38,7 @@ def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Q
         points = contender.method.light_points
         return f"{points} points of an interval look at the lights; {'; '.join(plan.limits)}".rstrip("; "), False
     if contender.kind == "counter-example" and contender.ior == "matched":
-        return "none: borders are left out", False
+        return "none: interfaces are left out", False
     beside = _BESIDE_THICKNESS if quantity == "thickness" else _LIT
     missing = [effect for effect in plan.unmodelled if effect.kind not in beside]
     limits = [*plan.limits, *missing]

@@ -66,5 +66,5 @@ def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | 
             raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
         return cpu.plan(scene)
     if contender.technique == "plan":
-        return studio.renderer.plan(scene, contender.method, borders=contender.borders)
+        return studio.renderer.plan(scene, contender.method, interfaces=contender.interfaces)
     return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())

@@ -23,7 +23,7 @@ from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
 from translucent.scene.scene import Scene
 
-#: Reflections that the reference follows where borders bend rays; what it leaves then is below the errors shown.
+#: Reflections that the reference follows where interfaces bend rays; what it leaves then is below the errors shown.
 BOUNCES = 12
 
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.

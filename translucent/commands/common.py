@@ -129,10 +129,10 @@ def outside_option(command: F) -> F:
     )(command)
 
 
-def borders_option(command: F) -> F:
+def interfaces_option(command: F) -> F:
     """Option for where rays bend."""
     return click.option(
-        "--borders",
+        "--interfaces",
         type=click.Choice(["both", "front"]),
         default="both",
         show_default=True,
@@ -218,7 +218,7 @@ def look_options(command: F) -> F:
         "--roughness",
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
-        help="Of the borders of media, 0 (polished) to 1. Default: 0, or that of the file's materials.",
+        help="Of the interfaces of media, 0 (polished) to 1. Default: 0, or that of the file's materials.",
     )(command)
     command = click.option(
         "--tone",

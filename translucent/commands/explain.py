@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.common import (
-    borders_option,
     common_options,
+    interfaces_option,
     medium_options,
     outside_option,
     read_medium,
@@ -21,7 +21,7 @@ from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
-    from translucent.planning.render_plan import Borders, RenderPlan
+    from translucent.planning.render_plan import Interfaces, RenderPlan
     from translucent.scene.scene import Object, Scene
 
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @unit_option
 @outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
-@borders_option
+@interfaces_option
 @common_options
 def explain(
     model: str,
@@ -42,7 +42,7 @@ def explain(
     unit: str,
     allow_outside: bool,
     method_name: str | None,
-    borders: Borders,
+    interfaces: Interfaces,
     as_json: bool,
 ) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
@@ -54,7 +54,7 @@ def explain(
     medium = read_medium(color, distance, preset_name, clamp)
     scene = read_scene(model, unit, medium, allow_outside=allow_outside)
     method = read_method(method_name, None)
-    chosen = plan(scene, method, borders=borders) if scene.bodies else None
+    chosen = plan(scene, method, interfaces=interfaces) if scene.bodies else None
     if as_json:
         echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from translucent.commands.common import (
-    borders_option,
     common_options,
+    interfaces_option,
     look_options,
     medium_options,
     method_option,
@@ -39,7 +39,7 @@ from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
-    from translucent.planning.render_plan import Borders
+    from translucent.planning.render_plan import Interfaces
 
 
 @click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 @click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
 @look_options
 @method_option
-@borders_option
+@interfaces_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -94,7 +94,7 @@ def render(
     tone: str,
     roughness: float | None,
     method_name: str | None,
-    borders: Borders,
+    interfaces: Interfaces,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -116,8 +116,8 @@ def render(
     if transparent and (opaque_with is not None or output.suffix.lower() == ".mp4"):
         other = "--opaque-with, which draws what is behind" if opaque_with else "a film, which holds no alpha"
         raise InputError("--transparent", other, "leave out one of the two")
-    if borders == "front" and opaque_with is not None:
-        raise InputError("--borders front", "--opaque-with, where rays bend at both", "leave out one of the two")
+    if interfaces == "front" and opaque_with is not None:
+        raise InputError("--interfaces front", "--opaque-with, where rays bend at both", "leave out one of the two")
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     refuse_overwriting(output, model, environment, background)
@@ -132,7 +132,7 @@ def render(
         scene = framed_all_around(scene, pixels)
     with tl.Renderer(backend) as renderer:
         draw = partial(
-            renderer.render, size=pixels, method=method, samples=samples, transparent=transparent, borders=borders
+            renderer.render, size=pixels, method=method, samples=samples, transparent=transparent, interfaces=interfaces
         )
         if opaque_with is not None:
             from translucent.interop.pyrender import render_scene

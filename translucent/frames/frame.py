@@ -25,7 +25,7 @@ ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage",
 #: More of them, that frames of ordered methods have.
 LAYER_ARRAYS = ("layers", "truncated")
 
-#: What frames without a background have, and those of bodies with borders.
+#: What frames without a background have, and those of bodies with interfaces.
 MATTE_ARRAYS = ("alpha", "normals")
 
 #: Stops beyond which radiance would leave what float64 can hold, or be black for sure.
@@ -61,8 +61,8 @@ class Frame:
         Of a frame rendered without the environment behind: share of what is behind that it hides, the mean of the
         channels. The radiance is then that of the frame alone: an associated (premultiplied) color.
     normals : (h, w, 3) float, optional
-        Unit normals, in world axes, of the borders where rays enter bodies; 0 where there is none. Only of frames whose
-        plan has borders.
+        Unit normals, in world axes, of the interfaces where rays enter bodies; 0 where there is none. Only of frames
+        whose plan has interfaces.
     """
 
     radiance: npt.NDArray[Any]
@@ -162,8 +162,8 @@ class Frame:
         """Write the quantities as pictures to look at, into a folder that is made if need be.
 
         ``thickness.png`` in false colors with a scale, ``transmittance.png`` (sRGB-encoded), and ``validity.png`` with
-        counts; ``normals.png`` of bodies with borders; and ``error.png``, by how much the thickness is off, where there
-        is a `truth` of the same size, such as the reference's. For numbers, `save` an ``.exr`` or ``.npz``.
+        counts; ``normals.png`` of bodies with interfaces; and ``error.png``, by how much the thickness is off, where
+        there is a `truth` of the same size, such as the reference's. For numbers, `save` an ``.exr`` or ``.npz``.
 
         Returns
         -------

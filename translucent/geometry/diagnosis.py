@@ -55,7 +55,7 @@ class Diagnosis:
     duplicate_faces : Finding
         Faces whose three corners another, earlier face has too, whatever its winding.
     open_edges : Finding
-        Edges with an odd number of faces: the border of a hole.
+        Edges with an odd number of faces: the boundary of a hole.
     mixed_edges : Finding
         Edges whose faces disagree about the winding.
     nonmanifold_edges : Finding

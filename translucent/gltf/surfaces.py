@@ -78,7 +78,7 @@ class Finish:
     wall_ior : float or None
         Index of refraction of a thin wall; None if it is none.
     surface : Surface or None
-        What its border does to light; None for an object without a material.
+        What its interface does to light; None for an object without a material.
     hidden : bool
         Whether its alpha makes it one hole.
     blends : bool

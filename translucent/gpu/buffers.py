@@ -25,7 +25,7 @@ class MeshBuffers:
         self.offsets = gl.buffer((mesh.vertices - mesh.center).astype(np.float32))
         self.indices = gl.buffer(mesh.faces)
         self._flat: moderngl.Buffer | None = None
-        self._border: moderngl.Buffer | None = None
+        self._smooth: moderngl.Buffer | None = None
         self._looks: dict[str, moderngl.Buffer] = {}
         self._arrays: dict[int, moderngl.VertexArray] = {}
 
@@ -75,19 +75,19 @@ class MeshBuffers:
 
     def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Each face with vertices of its own, which carry smooth normals and texture coordinates."""
-        if self._border is None:
+        if self._smooth is None:
             before_making(self._gl)
             content = np.zeros((*mesh.faces.shape, 8), dtype=np.float32)
             content[..., :3] = (mesh.vertices - mesh.center).astype(np.float32)[mesh.faces]
             content[..., 3:6] = drawn_normals(mesh)
             if mesh.uv is not None:
                 content[..., 6:] = mesh.uv[mesh.faces]
-            self._border = self._gl.buffer(content)
-        return self._border
+            self._smooth = self._gl.buffer(content)
+        return self._smooth
 
     def release(self) -> None:
         """Free the OpenGL objects now."""
-        for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat, self._border):
+        for resource in (*self._arrays.values(), self.offsets, self.indices, self._flat, self._smooth):
             if resource is not None:
                 resource.release()
         for buffer in self._looks.values():

@@ -81,7 +81,7 @@ CONSTANTS: dict[str, str] = {
     "AGX_SHOULDER": repr(AGX_SHOULDER),
     "AGX_SLOPE": repr(AGX_SLOPE),
     "AGX_DISPLAY": repr(AGX_DISPLAY),
-    "TOUCHING": "1e-6",  # places between surfaces that count as one border
+    "TOUCHING": "1e-6",  # places between surfaces that count as one interface
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored

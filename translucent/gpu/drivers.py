@@ -12,14 +12,14 @@ class DriverFaultError(RenderError):
     """What was asked for would end the process, through no fault of its own."""
 
 
-def require_borders(info: Mapping[str, Any]) -> None:
-    """Raise `DriverFaultError` where the driver crashes on what the borders of bodies do to light.
+def require_interfaces(info: Mapping[str, Any]) -> None:
+    """Raise `DriverFaultError` where the driver crashes on what the interfaces of bodies do to light.
 
     Lavapipe 22 reads before the first of its constant buffers where it inlines uniforms into that shader.
     """
     if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
         raise DriverFaultError(
-            "borders of bodies with zink over lavapipe",
+            "interfaces of bodies with zink over lavapipe",
             f"this driver, {info['GL_VERSION']}, ends the process on them",
             "use another driver, a newer Mesa, or media without ior and surface",
         )

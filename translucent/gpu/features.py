@@ -35,12 +35,12 @@ class FrameFeatures:
 
     @property
     def has_surfaces(self) -> bool:
-        """Whether light changes at the border of a body."""
+        """Whether light changes at the interface of a body."""
         return self.plan.has(PassName.SURFACES)
 
     @property
     def has_layers(self) -> bool:
-        """Whether layers are painted over the picture, or borders glow."""
+        """Whether layers are painted over the picture, or interfaces glow."""
         return self.plan.has(PassName.LAYERS)
 
     @property
@@ -69,13 +69,13 @@ class FrameFeatures:
         return self.plan.passes[-1].name
 
     @property
-    def one_border(self) -> bool:
-        """Whether rays bend at the border where they enter a body, and not at the one where they leave it."""
-        return self.plan.borders == "front"
+    def one_interface(self) -> bool:
+        """Whether rays bend at the interface where they enter a body, and not at the one where they leave it."""
+        return self.plan.interfaces == "front"
 
     @property
     def finds_exits(self) -> bool:
-        """Whether the intervals tell where each ray first leaves all bodies: borders need it where bodies touch."""
+        """Whether the intervals tell where each ray first leaves all bodies: interfaces need it where bodies touch."""
         return self.has_surfaces and self.plan.method.finds_exits
 
     @property

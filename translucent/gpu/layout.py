@@ -245,7 +245,7 @@ ENVIRONMENT = UniformBlock(
     ),
 )
 
-#: Per frame: where the borders of bodies are. Positions count from the center of the media.
+#: Per frame: where the interfaces of bodies are. Positions count from the center of the media.
 SURFACES = UniformBlock(
     "Surfaces",
     8,

@@ -268,8 +268,8 @@ def _read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components:
     return array
 
 
-def _read_normals(borders: moderngl.Framebuffer) -> npt.NDArray[np.float32]:
-    """(h, w, 3): of the borders that the interfaces pass has found, 0 where there is none."""
-    found = _read_floats(borders, 0, 4)[::-1]
+def _read_normals(interfaces: moderngl.Framebuffer) -> npt.NDArray[np.float32]:
+    """(h, w, 3): of the interfaces that the interfaces pass has found, 0 where there is none."""
+    found = _read_floats(interfaces, 0, 4)[::-1]
     there = found[..., 3:] < float(CONSTANTS["NOTHING"])
     return np.ascontiguousarray(np.where(there, found[..., :3], np.float32(0.0)))

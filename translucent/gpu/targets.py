@@ -38,15 +38,15 @@ class Targets:
         return self._get("opaque", (1, 4), with_depth=True)
 
     def entered(self) -> moderngl.Framebuffer:
-        """RGBA32F border where a ray first enters a body: normal and place, finish, color; with a depth buffer."""
+        """RGBA32F interface where a ray first enters a body: normal and place, finish, color; with a depth buffer."""
         return self._get("entered", (4, 4, 4), with_depth=True)
 
     def left(self) -> moderngl.Framebuffer:
-        """RGBA32F border where a ray first leaves one beyond that: normal and place, finish; with a depth buffer."""
+        """RGBA32F interface where a ray first leaves one beyond that: normal and place, finish; with a depth buffer."""
         return self._get("left", (4, 4), with_depth=True)
 
     def surfaced(self) -> moderngl.Framebuffer:
-        """RGBA32F radiance with what borders do to it, and transmittance."""
+        """RGBA32F radiance with what interfaces do to it, and transmittance."""
         return self._get("surfaced", (4, 4))
 
     def ordered(self) -> moderngl.Framebuffer:

@@ -32,7 +32,7 @@ _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 @dataclass(frozen=True, eq=False)
 class DensityGrid(Frozen):
-    """Density from samples: trilinear between the centers of the voxels, constant from there to the border.
+    """Density from samples: trilinear between the centers of the voxels, constant from there to the boundary.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> 
 
 
 def _along(points: npt.ArrayLike, axis: int) -> Array:
-    """Positions on one axis of the unit box; what rounding puts outside is on the border."""
+    """Positions on one axis of the unit box; what rounding puts outside is on the boundary."""
     return np.clip(np.asarray(points, dtype=np.float64)[..., axis], 0.0, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""What any plan has beside the passes of its method: sheets, fallbacks, lights, opaque objects, borders, shading."""
+"""What any plan has beside the passes of its method: sheets, fallbacks, lights, opaque objects, interfaces, shading."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ, open_bodies, scatters, sheets_of, solids_of
-from translucent.planning.borders import border_passes, touching_borders
 from translucent.planning.effects import unmodelled_effects
+from translucent.planning.interfaces import interface_passes, touching_interfaces
 from translucent.planning.layers import layer_passes
 from translucent.planning.limits import (
     MAX_SCATTER_LIGHTS,
@@ -36,7 +36,7 @@ COSTS = {"opaque": 2.8, "resolve": 0.4, "interfaces": 4.0, "surfaces": 8.0, "lay
 
 
 def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities) -> RenderPlan:
-    """The plan of a method, which was chosen for the reason `why`, with OpenGL and both borders of bodies.
+    """The plan of a method, which was chosen for the reason `why`, with OpenGL and both interfaces of bodies.
 
     Raises
     ------
@@ -49,17 +49,17 @@ def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities
     beside = () if method.makes_sheets else (*_declared_sheets(scene), *_fallback_passes(scene, spectral))
     # Sheets go first where intervals are in order: their sums are read where the intervals are resolved.
     passes = (*beside, *_light_views(scene, method), *own) if method.ordered else (*own, *beside)
-    borders = border_passes(scene, method, COSTS["interfaces"], COSTS["surfaces"])
+    interfaces = interface_passes(scene, method, COSTS["interfaces"], COSTS["surfaces"])
     passes = (
         *_opaque_passes(scene),
         *passes,
-        *borders[:1],
+        *interfaces[:1],
         PassSpec(PassName.TRANSMITTANCE, _shading(scene, method), cost=COSTS["resolve"]),
-        *borders[1:],
+        *interfaces[1:],
         *layer_passes(scene, COSTS["layers"]),
     )
     lit = any(step.name is PassName.LIGHT_VIEWS for step in passes)
-    unmodelled = (*unmodelled_effects(scene, scattering=lit, borders=True), *_touching(scene, method))
+    unmodelled = (*unmodelled_effects(scene, scattering=lit, interfaces=True), *_touching(scene, method))
     return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled)
 
 
@@ -94,10 +94,10 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
 
 def _touching(scene: Scene, method: Method) -> tuple[Note, ...]:
     """That a method which does not tell where a ray leaves all bodies bends it between those that touch."""
-    if method.finds_exits or method.makes_sheets or (touching := touching_borders(scene)) is None:
+    if method.finds_exits or method.makes_sheets or (touching := touching_interfaces(scene)) is None:
         return ()
-    text = f"{touching}; {type(method).__name__} does not find it, and takes the border between them for the last"
-    return (Note(NoteKind.TOUCHING_BORDERS, text),)
+    text = f"{touching}; {type(method).__name__} does not find it, and takes the interface between them for the last"
+    return (Note(NoteKind.TOUCHING_INTERFACES, text),)
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:

@@ -13,7 +13,7 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Object, Scene, object_names
 
 
-def unmodelled_effects(scene: Scene, *, scattering: bool, borders: bool = False) -> tuple[Note, ...]:
+def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: bool = False) -> tuple[Note, ...]:
     """What the scene asks for and a plan does not render.
 
     Parameters
@@ -21,17 +21,19 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, borders: bool = False)
     scene : Scene
     scattering : bool
         The plan has light scattered into the rays.
-    borders : bool
-        The plan has what the borders of bodies and the surfaces of opaque objects do to light.
+    interfaces : bool
+        The plan has what the interfaces of bodies and the surfaces of opaque objects do to light.
     """
-    effects = _scattering_effects(scene, followed=scattering, borders=borders) + _refraction_effects(scene, borders)
+    effects = _scattering_effects(scene, followed=scattering, interfaces=interfaces) + _refraction_effects(
+        scene, interfaces
+    )
     if clear := [body for body in scene.bodies if _is_invisible(body)]:
         text = f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits"
         effects.append(Note(NoteKind.INVISIBLE, text))
-    if not borders and (finished := [item for item in scene.opaque if item.surface is not None]):
+    if not interfaces and (finished := [item for item in scene.opaque if item.surface is not None]):
         text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
-    effects += layer_effects(scene, borders=borders)
+    effects += layer_effects(scene, interfaces=interfaces)
     if scene.opaque:
         effects.append(Note(NoteKind.SHADOWS, "shadows: light reaches opaque objects through everything"))
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
@@ -52,9 +54,9 @@ def with_ambient_told(plan: RenderPlan) -> RenderPlan:
     return replace(plan, passes=passes, unmodelled=(*effects, way))
 
 
-def _scattering_effects(scene: Scene, *, followed: bool, borders: bool) -> list[Note]:
+def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
     """What is left out of the light that media scatter."""
-    if borders and any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
+    if interfaces and any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
         text = (
             "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
             "path of the ray, which edges and folds are not"
@@ -80,16 +82,16 @@ def _scattering_effects(scene: Scene, *, followed: bool, borders: bool) -> list[
     return []
 
 
-def _refraction_effects(scene: Scene, borders: bool) -> list[Note]:
-    """What is left out of the light that borders bend and mirror."""
+def _refraction_effects(scene: Scene, interfaces: bool) -> list[Note]:
+    """What is left out of the light that interfaces bend and mirror."""
     if not any(body.has_interface for body in scene.bodies):
         return []
-    if not borders:
-        text = "refraction and reflection: rays go straight, though borders bend and mirror them"
+    if not interfaces:
+        text = "refraction and reflection: rays go straight, though interfaces bend and mirror them"
         return [Note(NoteKind.REFRACTION, text)]
     text = (
         "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
-        "and borders mirror the environment only"
+        "and interfaces mirror the environment only"
     )
     return [Note(NoteKind.LATER_REFRACTION, text)]
 

@@ -11,7 +11,7 @@ from translucent.scene.scene import Object, Scene
 
 
 def layer_passes(scene: Scene, cost: float) -> tuple[PassSpec, ...]:
-    """The pass that paints layers, and what borders of bodies glow; none where nothing covers or glows."""
+    """The pass that paints layers, and what interfaces of bodies glow; none where nothing covers or glows."""
     layers, glowing = (indices(scene, keep) for keep in (_covers, _glows))
     if not layers and not glowing:
         return ()
@@ -25,19 +25,19 @@ def layer_passes(scene: Scene, cost: float) -> tuple[PassSpec, ...]:
     return (PassSpec(PassName.LAYERS, "; ".join(reasons), tuple(sorted((*layers, *glowing))), 1, cost=cost),)
 
 
-def layer_effects(scene: Scene, *, borders: bool) -> list[Note]:
-    """What is not rendered of them; `borders` as for `unmodelled_effects`."""
+def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
+    """What is not rendered of them; `interfaces` as for `unmodelled_effects`."""
     effects = []
     if layers := _names(scene, indices(scene, _covers)):
         text = (
             f"{layers}: layers cast no shadows, rays that bend do not meet them, all media on a ray dim those behind "
             "its first body, and they are painted object by object, far ones first, also where they cross"
-            if borders
+            if interfaces
             else f"what layers mirror: {layers} show diffuse light alone"
         )
         effects.append(Note(NoteKind.LAYERS, text))
     if glowing := _names(scene, indices(scene, _glows)):
-        what = "add it where a ray first enters a body, and nowhere behind" if borders else "not at all"
+        what = "add it where a ray first enters a body, and nowhere behind" if interfaces else "not at all"
         effects.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {glowing} {what}"))
     if cut := _names(scene, indices(scene, _wants_holes)):
         text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"

@@ -7,14 +7,14 @@ import dataclasses
 from translucent.errors import InputError
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
-from translucent.planning.borders import check_borders, with_one_border
 from translucent.planning.effects import unmodelled_effects, with_ambient_told
+from translucent.planning.interfaces import check_interfaces, with_one_interface
 from translucent.planning.limits import marching_method, mesh_limits, open_limits
 from translucent.planning.methods import DepthPeeling, FragmentLists, Method, SignedDepth, ThinLayer
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
-from translucent.planning.render_plan import Borders, Capabilities, RenderPlan
+from translucent.planning.render_plan import Capabilities, Interfaces, RenderPlan
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
@@ -24,7 +24,7 @@ def plan(
     method: Method | None = None,
     capabilities: Capabilities | None = None,
     *,
-    borders: Borders = "both",
+    interfaces: Interfaces = "both",
 ) -> RenderPlan:
     """Choose the passes for a scene.
 
@@ -35,21 +35,21 @@ def plan(
         How to find thickness; None picks the cheapest way that is exact.
     capabilities : Capabilities, optional
         Of the machine; default: all.
-    borders : {"both", "front"}
-        Where rays bend: at the border where they enter a body and at the one where they leave it, or only at the first,
-        which saves finding the second and is wrong for curved bodies.
+    interfaces : {"both", "front"}
+        Where rays bend: at the interface where they enter a body and at the one where they leave it, or only at the
+        first, which saves finding the second and is wrong for curved bodies.
 
     Raises
     ------
     InputError
-        If no available method can render the scene, or the camera is inside a body that has only a front border.
+        If no available method can render the scene, or the camera is inside a body that has only a front interface.
     """
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
-    check_borders(borders)
+    check_interfaces(interfaces)
     capabilities = capabilities or Capabilities()
     if scene.scatters_ambient:
-        return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities, borders=borders))
+        return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities, interfaces=interfaces))
     if not scene.bodies:
         raise InputError(
             f"rendering {object_names(scene.objects)}",
@@ -60,19 +60,21 @@ def plan(
         require_clear_priorities(scene)
     if not capabilities.opengl:
         return _plan_traced(scene, method, capabilities)
-    chosen = assembled(scene, *_choice(scene, method, capabilities, borders), capabilities)
+    chosen = assembled(scene, *_choice(scene, method, capabilities, interfaces), capabilities)
     if scatters(scene) and not capabilities.shader_storage:
         chosen = with_unlit_marked(scene, chosen)
-    return chosen if borders == "both" else with_one_border(scene, chosen)
+    return chosen if interfaces == "both" else with_one_interface(scene, chosen)
 
 
-def _choice(scene: Scene, method: Method | None, capabilities: Capabilities, borders: Borders) -> tuple[Method, str]:
+def _choice(
+    scene: Scene, method: Method | None, capabilities: Capabilities, interfaces: Interfaces
+) -> tuple[Method, str]:
     """The method of a renderer with OpenGL, and why it is that one; refuses what was asked for if it cannot do."""
     if scene.varies:
         return marching_method(scene, method, capabilities), "the density varies from place to place"
     if method is not None and method.ordered:
         return method, "asked for"
-    if (why := why_order_matters(scene, method, borders)) is not None:
+    if (why := why_order_matters(scene, method, interfaces)) is not None:
         return _ordered_method(scene, method, capabilities, why), why
     if method is not None:
         return method, "asked for"
@@ -111,7 +113,7 @@ def plan_over_backdrop(
     method: Method | None = None,
     capabilities: Capabilities | None = None,
     *,
-    borders: Borders = "both",
+    interfaces: Interfaces = "both",
 ) -> RenderPlan:
     """The plan for a scene before a `Backdrop`, which somebody else has drawn.
 
@@ -126,7 +128,7 @@ def plan_over_backdrop(
             f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
             "leave them out, or to whoever draws the backdrop",
         )
-    chosen = plan(scene, method, capabilities, borders=borders)
+    chosen = plan(scene, method, capabilities, interfaces=interfaces)
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
     return dataclasses.replace(
         chosen,

@@ -10,7 +10,7 @@ from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 
 #: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
-Borders: TypeAlias = Literal["both", "front"]
+Interfaces: TypeAlias = Literal["both", "front"]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class RenderPlan:
         Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
     unmodelled : tuple of Note
         What the scene asks for and no pass renders.
-    borders : {"both", "front"}
+    interfaces : {"both", "front"}
         Where rays bend, if anything in the scene bends them.
     traced : bool
         Rays are traced on the processors, which finds all surfaces on each. Of the `method` only one thing counts
@@ -61,7 +61,7 @@ class RenderPlan:
     spectral: bool = False
     limits: tuple[Note, ...] = ()
     unmodelled: tuple[Note, ...] = ()
-    borders: Borders = "both"
+    interfaces: Interfaces = "both"
     traced: bool = False
 
     @property
@@ -106,7 +106,7 @@ class RenderPlan:
         return {
             "method": self.runs,
             "exact": self.exact,
-            "borders": self.borders,
+            "interfaces": self.interfaces,
             "cost": round(self.cost, 2),
             "passes": [
                 {

@@ -91,7 +91,7 @@ def overlapping_pair(
     bodies: Sequence[Object],
     matters: Callable[[npt.NDArray[np.intp], npt.NDArray[np.intp]], npt.NDArray[np.bool_]] | None = None,
 ) -> tuple[int, int] | None:
-    """Places of two bodies whose bounds share more than their border; bodies that touch there share no volume.
+    """Places of two bodies whose bounds share more than their boundary; bodies that touch there share no volume.
 
     `matters` gets the places of many pairs, and says which of them count; default: all.
     """

@@ -42,7 +42,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Material:
-    """What fills the bodies, and what their border does. Names of glTF where it has one.
+    """What fills the bodies, and what their surface does. Names of glTF where it has one.
 
     Attributes
     ----------

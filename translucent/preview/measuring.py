@@ -37,7 +37,7 @@ LIT_HEIGHT = 30
 #: Shares of the viewport's size at which the split's reference is drawn, one after the other.
 LEVELS = (8, 4, 2, 1)
 
-#: Bodies with a border are followed through refraction in the reference: 20 times the work for a pixel.
+#: Bodies with an interface are followed through refraction in the reference: 20 times the work for a pixel.
 BENT_LEVELS = (16, 8)
 
 
@@ -72,7 +72,7 @@ class Measured(Compared):
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The reference of a whole picture, at a share of its size; of straight rays, or of those that borders bend."""
+    """The reference of a whole picture, at a share of its size; of straight rays, or of those that interfaces bend."""
 
     scene: Scene
     method: Method | None
@@ -139,7 +139,7 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
 
 
 def straight(scene: Scene) -> Scene:
-    """The scene without what borders do to light, so that every method and the reference see the same rays."""
+    """The scene without what interfaces do to light, so that every method and the reference see the same rays."""
     return dataclasses.replace(scene, objects=[_index_matched(item) for item in scene.objects])
 
 

@@ -1,8 +1,8 @@
-"""Radiance along rays that bend and split at the borders of media: exact Fresnel and Snell, in float64.
+"""Radiance along rays that bend and split at the interfaces of media: exact Fresnel and Snell, in float64.
 
-At every border a ray becomes two, reflected and refracted, until they carry less than `FAINTEST` or have met as many
-borders as asked for; what is dropped is counted. With rough borders one of the two is chosen by chance, so that the
-radiance has noise. Between borders media absorb and emit as they do along straight rays.
+At every interface a ray becomes two, reflected and refracted, until they carry less than `FAINTEST` or have met as many
+interfaces as asked for; what is dropped is counted. With rough interfaces one of the two is chosen by chance, so that
+the radiance has noise. Between interfaces media absorb and emit as they do along straight rays.
 
 All radiance is basic radiance L / n^2, which does not change where light enters a denser medium; emission counts as it
 would in a medium that is index-matched.
@@ -17,11 +17,11 @@ import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
-from translucent.reference.borders import Borders, Optics
 from translucent.reference.boxes import Lines
 from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits
+from translucent.reference.interfaces import Interfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge, unbalanced
 from translucent.reference.legs import Legs, joined
 from translucent.reference.light_paths import LightPaths
@@ -63,7 +63,7 @@ class BentLight:
 
 
 class BentRays:
-    """Rays of the scene's camera that bend at borders.
+    """Rays of the scene's camera that bend at interfaces.
 
     Parameters
     ----------
@@ -74,11 +74,11 @@ class BentRays:
     aspect : float
         Width of the picture divided by its height.
     bounces : int
-        Borders that a ray may meet.
+        Interfaces that a ray may meet.
     paths : LightPaths, optional
         To add light that media scatter once, to `tolerance`. Lights reach into media straight on.
     rng : Generator, optional
-        Chooses between reflection and refraction. Without it both are followed, and all borders are polished.
+        Chooses between reflection and refraction. Without it both are followed, and all interfaces are polished.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class BentRays:
 
 
 class _Tree:
-    """Follows rays from border to border, for light of which all has the same indices of refraction."""
+    """Follows rays from interface to interface, for light of which all has the same indices of refraction."""
 
     def __init__(self, bent: BentRays, own: Optics, found: BentLight) -> None:
         self.bent, self.own, self.found, self.scene = bent, own, found, bent.scene
@@ -137,10 +137,10 @@ class _Tree:
         inside = self.own.at_origins(behind, len(rays))
         legs = Legs(rays, owner, np.tile(carried, (len(rays), 1)), inside, never, never)
         for level in range(self.bent.bounces + 1):
-            legs, borders = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
+            legs, interfaces = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
             if not len(legs):
                 return
-            outcome = Meetings(self.own, legs, borders, self.bent.rng).outcome()
+            outcome = Meetings(self.own, legs, interfaces, self.bent.rng).outcome()
             self._add(legs, outcome.radiance)
             legs = joined(outcome.branches)
             lost = np.asarray((legs.throughput < FAINTEST).all(axis=1) | ~legs.rays.directions.any(axis=1))
@@ -155,26 +155,26 @@ class _Tree:
         with np.errstate(under="ignore"):
             np.add.at(self.found.radiance, legs.owner, legs.throughput * radiance)
 
-    def _fly(self, legs: Legs, start: float) -> tuple[Legs, Borders]:
-        """Add what legs see on their way and at its end. Those that end at borders instead, there, and these."""
+    def _fly(self, legs: Legs, start: float) -> tuple[Legs, Interfaces]:
+        """Add what legs see on their way and at its end. Those that end at interfaces instead, there, and these."""
         rays = legs.rays
         reach = np.full(len(legs), start), np.full(len(legs), np.inf)
         hits = self.bent.tracer.hits(Lines(rays.origins, rays.directions, *reach))
         wall = nearest_opaque(self.scene, hits, len(legs))
-        borders = self.own.first_borders([line.before(wall.distance) for line in hits], legs.inside)
-        legs = self._through_media(legs, hits, borders.distance, wall.distance)
-        ends = np.isinf(borders.distance)
+        interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], legs.inside)
+        legs = self._through_media(legs, hits, interfaces.distance, wall.distance)
+        ends = np.isinf(interfaces.distance)
         self._add(legs.where(ends), self._at_end(legs.where(ends), wall, np.flatnonzero(ends)))
         met = np.flatnonzero(~ends)
-        borders, legs = borders.where(met), legs.where(met)
+        interfaces, legs = interfaces.where(met), legs.where(met)
         with np.errstate(under="ignore"):
-            points = legs.rays.origins + borders.distance[:, None] * legs.rays.directions
-        return replace(legs, rays=replace(legs.rays, origins=points)), borders
+            points = legs.rays.origins + interfaces.distance[:, None] * legs.rays.directions
+        return replace(legs, rays=replace(legs.rays, origins=points)), interfaces
 
-    def _through_media(self, legs: Legs, hits: Sequence[Hits], border: Array, wall: Array) -> Legs:
+    def _through_media(self, legs: Legs, hits: Sequence[Hits], interface: Array, wall: Array) -> Legs:
         """Legs with what media leave of them where they end; adds what these emit and scatter."""
         scene, volume, rays = self.scene, self.bent.volume, legs.rays
-        end = np.minimum(border, wall)
+        end = np.minimum(interface, wall)
         none = np.empty(0, np.int64)
         parts = [Intervals(none, np.empty(0), np.empty(0), none, none)]
         for i in self.own.solids:
@@ -182,8 +182,8 @@ class _Tree:
             parts.append(body_intervals(ahead, origin, end, i))
             self.found.valid[legs.owner[unbalanced(ahead, origin, end)]] = False
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.bent.sheets)]
-        # A sheet that lies on a border is met on one side of it only.
-        until = np.where(border < wall, border - SHEET_ON_OPAQUE * scene.diagonal, wall)
+        # A sheet that lies on an interface is met on one side of it only.
+        until = np.where(interface < wall, interface - SHEET_ON_OPAQUE * scene.diagonal, wall)
         crossings = scene_crossings(scene, rays, hits, sheets, until)
         segments, filling = volume_segments(scene, volume, rays, merge(parts), crossings)
         segments = emission_of_mixtures(volume, rays, segments, filling)

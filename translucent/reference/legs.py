@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.reference.borders import Inside
+from translucent.reference.interfaces import Inside
 from translucent.reference.rays import Rays
 
 
@@ -27,9 +27,9 @@ class Legs:
     inside : Inside
         What it begins in.
     bent : (k,) bool
-        Whether it has met a border.
+        Whether it has met an interface.
     reflected : (k,) bool
-        Whether a border has reflected it.
+        Whether an interface has reflected it.
     """
 
     rays: Rays

@@ -1,4 +1,4 @@
-"""What becomes of light at borders: how much is reflected and refracted, where to, and what paint sends back."""
+"""What becomes of light at interfaces: how much is reflected and refracted, where to, and what paint sends back."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from translucent.formulas.interface import (
     slab_reflectance,
     slab_transmittance,
 )
-from translucent.reference.borders import Borders, Optics, border_normals
+from translucent.reference.interfaces import Interfaces, Optics, interface_normals
 from translucent.reference.legs import Legs
-from translucent.reference.microfacets import scattered_at_border
+from translucent.reference.microfacets import scattered_at_interface
 from translucent.reference.opaque import irradiance_at, seen_from
 from translucent.scene.lights import PointLight
 
@@ -28,14 +28,14 @@ MOST_PASSAGES = 64
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What comes of light at borders.
+    """What comes of light at interfaces.
 
     Attributes
     ----------
     branches : tuple of Legs
         In which it goes on.
     radiance : (k, 3) float64
-        That the borders add themselves.
+        That the interfaces add themselves.
     """
 
     branches: tuple[Legs, ...]
@@ -43,25 +43,25 @@ class Outcome:
 
 
 class Meetings:
-    """Legs that end at borders, and go on from there.
+    """Legs that end at interfaces, and go on from there.
 
     Parameters
     ----------
     own : Optics
     legs : Legs
-        With their origins moved to the borders.
-    borders : Borders
+        With their origins moved to the interfaces.
+    interfaces : Interfaces
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     """
 
-    def __init__(self, own: Optics, legs: Legs, borders: Borders, rng: np.random.Generator | None) -> None:
-        self.own, self.legs, self.borders, self.rng = own, legs, borders, rng
-        self.normals, self.faces = border_normals(own, borders, legs.rays.directions)
+    def __init__(self, own: Optics, legs: Legs, interfaces: Interfaces, rng: np.random.Generator | None) -> None:
+        self.own, self.legs, self.interfaces, self.rng = own, legs, interfaces, rng
+        self.normals, self.faces = interface_normals(own, interfaces, legs.rays.directions)
         self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
-        self.is_sheet = borders.before == borders.after
-        beyond = np.where(self.is_sheet, borders.item, borders.after)
-        self.ior = own.iors[beyond] / own.iors[borders.before]
+        self.is_sheet = interfaces.before == interfaces.after
+        beyond = np.where(self.is_sheet, interfaces.item, interfaces.after)
+        self.ior = own.iors[beyond] / own.iors[interfaces.before]
         self.alpha = self._table("roughness") ** 2
         self.transmission = self._table("transmission")[:, None]
         self.color = self._table("color")
@@ -71,7 +71,7 @@ class Meetings:
         """What comes of all of them."""
         rough = (self.alpha > 0) & (self.ior != 1.0)
         ways = (
-            (~self.is_sheet & (~rough if self.rng is None else np.ones_like(rough)), self._at_borders),
+            (~self.is_sheet & (~rough if self.rng is None else np.ones_like(rough)), self._at_interfaces),
             (self.is_sheet & ~rough, self._at_sheets),
             (self.is_sheet & rough, self._at_rough_sheets),
         )
@@ -87,16 +87,18 @@ class Meetings:
         return Outcome(tuple(branches), self.radiance)
 
     def _table(self, name: str) -> Array:
-        return np.array([getattr(surface, name) for surface in self.own.surfaces], dtype=np.float64)[self.borders.item]
+        return np.array([getattr(surface, name) for surface in self.own.surfaces], dtype=np.float64)[
+            self.interfaces.item
+        ]
 
     def _passing(self, chosen: Integers) -> Array:
-        """(k, 3): share of the light past the border that goes on through it: the color tints what enters a body."""
-        enters = self.is_sheet[chosen] | (self.borders.item[chosen] == self.borders.after[chosen])
+        """(k, 3): share of the light past the interface that goes on through it: the color tints what enters a body."""
+        enters = self.is_sheet[chosen] | (self.interfaces.item[chosen] == self.interfaces.after[chosen])
         return self.transmission[chosen] * np.where(enters[:, None], self.color[chosen], 1.0)
 
-    def _at_borders(self, chosen: Integers) -> tuple[list[Legs], Array]:
+    def _at_interfaces(self, chosen: Integers) -> tuple[list[Legs], Array]:
         """Branches, and the share (k, 1) of the light that passes."""
-        legs, here, there = self.legs.where(chosen), self.borders.here, self.borders.there
+        legs, here, there = self.legs.where(chosen), self.interfaces.here, self.interfaces.there
         directions, normals = legs.rays.directions, self.normals[chosen]
         back_way = reflected_direction(directions, normals)
         on_way = refracted_direction(directions, normals, self.ior[chosen])
@@ -105,7 +107,7 @@ class Meetings:
         if self.rng is not None:
             passed = self.rng.random(len(chosen)) >= share_back[:, 0]
             rough = np.flatnonzero((self.alpha[chosen] > 0) & (self.ior[chosen] != 1.0))
-            back_way[rough], passed[rough] = scattered_at_border(
+            back_way[rough], passed[rough] = scattered_at_interface(
                 directions[rough], normals[rough], self.ior[chosen[rough]], self.alpha[chosen[rough]], self.rng
             )
             on_way[rough] = back_way[rough]
@@ -121,8 +123,8 @@ class Meetings:
         return [reflected, refracted], share_on
 
     def _at_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """As `_at_borders`, for polished sheets: both sides of each at once."""
-        legs, inside = self.legs.where(chosen), self.borders.here.where(chosen)
+        """As `_at_interfaces`, for polished sheets: both sides of each at once."""
+        legs, inside = self.legs.where(chosen), self.interfaces.here.where(chosen)
         metres, extinction, emission = self._matter(chosen)
         share, ior = self.reflectance[chosen], self.ior[chosen]
         path = optics.thin_layer_thickness(metres, self.cosine[chosen], ior)[:, None]
@@ -141,12 +143,12 @@ class Meetings:
         return branches, on
 
     def _at_rough_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """As `_at_borders`, for rough sheets: light goes from one side to the other until it leaves."""
+        """As `_at_interfaces`, for rough sheets: light goes from one side to the other until it leaves."""
         assert self.rng is not None
-        legs, inside, normals = self.legs.where(chosen), self.borders.here.where(chosen), self.normals[chosen]
+        legs, inside, normals = self.legs.where(chosen), self.interfaces.here.where(chosen), self.normals[chosen]
         metres, extinction, emission = self._matter(chosen)
         ior, alpha = self.ior[chosen], self.alpha[chosen]
-        way, entered = scattered_at_border(legs.rays.directions, normals, ior, alpha, self.rng)
+        way, entered = scattered_at_interface(legs.rays.directions, normals, ior, alpha, self.rng)
         weight, emitted = np.ones((len(chosen), 3)), np.zeros((len(chosen), 3))
         within = np.flatnonzero(entered)
         for _ in range(MOST_PASSAGES):
@@ -158,7 +160,9 @@ class Meetings:
                 emitted[within] += weight[within] * optics.emitted_radiance(emission[within], extinction[within], path)
                 weight[within] *= optics.transmittance(extinction[within] * path)
             facing = np.where(across[:, None] < 0, normals[within], -normals[within])
-            way[within], leaves = scattered_at_border(way[within], facing, 1.0 / ior[within], alpha[within], self.rng)
+            way[within], leaves = scattered_at_interface(
+                way[within], facing, 1.0 / ior[within], alpha[within], self.rng
+            )
             within = within[~leaves & way[within].any(axis=1)]
         way[within] = 0.0
         self.radiance[chosen] += emitted
@@ -170,7 +174,7 @@ class Meetings:
 
     def _matter(self, chosen: Integers) -> tuple[Array, Array, Array]:
         """Thickness (k,) in metres, extinction and emission (k, 3) of sheets."""
-        own, item = self.own, self.borders.item[chosen]
+        own, item = self.own, self.interfaces.item[chosen]
         media = [body.medium for body in own.scene.objects]
         metres = np.array([thickness or 0.0 for thickness in own.sheets])
         rows = np.array([(m.extinction, m.emission) if m is not None else np.zeros((2, 3)) for m in media])
@@ -191,7 +195,7 @@ class Meetings:
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Point and directional lights in rough borders, reflected by one microfacet; nothing shadows them."""
+        """Point and directional lights in rough interfaces, reflected by one microfacet; nothing shadows them."""
         scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
         to_eye = -self.legs.rays.directions[rough]
         for light in scene.lights if rough.size else ():

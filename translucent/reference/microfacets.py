@@ -1,4 +1,4 @@
-"""Rough borders: light that wanders among the microfacets of a GGX surface until it leaves them (Heitz et al. 2016).
+"""Rough interfaces: light that wanders among the microfacets of a GGX surface until it leaves them (Heitz et al. 2016).
 
 "Multiple-scattering microfacet BSDFs with the Smith model": heights of the microfacets are not correlated, each one
 reflects or refracts by Fresnel and Snell, and no light is lost. Normals as they are visible are sampled as in Heitz
@@ -20,10 +20,10 @@ MOST_MEETINGS = 100
 LEVEL = 1e-6
 
 
-def scattered_at_border(
+def scattered_at_interface(
     directions: Array, normals: Array, ior: Array, alpha: Array, rng: np.random.Generator
 ) -> tuple[Array, Mask]:
-    """Directions (n, 3) in which light leaves a rough border, and whether it has passed it (n,).
+    """Directions (n, 3) in which light leaves a rough interface, and whether it has passed it (n,).
 
     Parameters
     ----------

@@ -50,9 +50,9 @@ def even_steps(variable: Variable, offset: Array) -> Steps:
         Place of each sample in its step, 0 to 1.
     """
     count = offset.shape[1]
-    borders, _ = variable(np.broadcast_to(np.arange(count + 1) / count, (len(offset), count + 1)))
+    edges, _ = variable(np.broadcast_to(np.arange(count + 1) / count, (len(offset), count + 1)))
     at, stretch = variable((np.arange(count) + offset) / count)
-    begin, end = borders[:, :-1], borders[:, 1:]
+    begin, end = edges[:, :-1], edges[:, 1:]
     return Steps(begin, end, at, stretch / count)
 
 
@@ -63,11 +63,11 @@ def gauss_steps(start: Array, end: Array, count: int) -> Steps:
     steps, put one after the other, hold one point each.
     """
     points, weights = np.polynomial.legendre.leggauss(count)
-    borders = np.concatenate([[0.0], np.cumsum(weights)]) / weights.sum()
+    edges = np.concatenate([[0.0], np.cumsum(weights)]) / weights.sum()
     length = (end - start)[:, None]
     at = start[:, None] + length * (0.5 + 0.5 * points)
-    borders = start[:, None] + length * borders
-    return Steps(borders[:, :-1], borders[:, 1:], at, length * (0.5 * weights))
+    edges = start[:, None] + length * edges
+    return Steps(edges[:, :-1], edges[:, 1:], at, length * (0.5 * weights))
 
 
 def hashed(column: Integers, row: Integers, number: Integers, seed: int) -> Array:

@@ -1,4 +1,4 @@
-"""Pictures along bent rays: all pixels of `BentRays`, and where borders are rough, many rays for each."""
+"""Pictures along bent rays: all pixels of `BentRays`, and where interfaces are rough, many rays for each."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.volume import Volume
 from translucent.scene.scene import Scene
 
-#: Borders that a ray may meet, unless told otherwise.
+#: Interfaces that a ray may meet, unless told otherwise.
 BOUNCES = 8
 
-#: Rays of each pixel before rough borders, unless told otherwise.
+#: Rays of each pixel before rough interfaces, unless told otherwise.
 PATHS = 64
 
 #: Rays that are averaged together: the working arrays stay below 500 MB.
@@ -25,7 +25,7 @@ BATCH = 1 << 16
 
 
 def bends(scene: Scene) -> bool:
-    """Whether light changes at some border of the scene, so that its rays are not all straight."""
+    """Whether light changes at some interface of the scene, so that its rays are not all straight."""
     return any(body.has_interface for body in scene.bodies)
 
 
@@ -50,9 +50,9 @@ def bent_light(
     tolerance : float
         Relative error of light that media scatter once.
     bounces : int
-        Borders that a ray may meet, from 0.
+        Interfaces that a ray may meet, from 0.
     paths : int
-        Rays of each pixel, from 2, if some border is rough; else one sees all.
+        Rays of each pixel, from 2, if some interface is rough; else one sees all.
     seed : int
         Of the random numbers.
 
@@ -60,7 +60,7 @@ def bent_light(
     -------
     light : BentLight
     standard_error : (n, 3) float64
-        Of the radiance; 0 if all borders are polished.
+        Of the radiance; 0 if all interfaces are polished.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
     if bounces < 0:
         raise InputError(f"{bounces} bounces", "below 0", "use for example 8")
     if paths < 2:
-        raise InputError(f"{paths} paths through rough borders", "no spread without two", "use for example 64")
+        raise InputError(f"{paths} paths through rough interfaces", "no spread without two", "use for example 64")
     for body in scene.bodies:
         if body.covers or not body.has_interface:
             continue

@@ -59,8 +59,8 @@ def render(
     what is scattered twice (`path_trace` has it all).
     Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
 
-    Where light changes at the borders of bodies (`Object.has_interface`), radiance is that of rays that bend and split
-    there; see `translucent.reference.bent`. All else is that of the straight rays, also then. Lights reach media
+    Where light changes at the interfaces of bodies (`Object.has_interface`), radiance is that of rays that bend and
+    split there; see `translucent.reference.bent`. All else is that of the straight rays, also then. Lights reach media
     straight on. Of `Surface`, multiple scattering is left to `path_trace`, and bodies do not glow. Layers
     (`Surface.opacity`) have their place in the order, and what they show is matt.
 
@@ -77,9 +77,9 @@ def render(
     refraction : bool, optional
         Whether rays bend. Default: if some object has an interface.
     bounces : int
-        Borders that a bent ray may meet.
+        Interfaces that a bent ray may meet.
     paths : int
-        Rays of each pixel if a border is rough; the error falls with their square root.
+        Rays of each pixel if an interface is rough; the error falls with their square root.
     seed : int
         Of the random numbers for these.
 

@@ -49,7 +49,7 @@ class Crossings:
 
 
 def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float | None, ...]:
-    """Thickness in metres of the sheet that each of `Scene.objects` is; None for the border of a solid.
+    """Thickness in metres of the sheet that each of `Scene.objects` is; None for the boundary of a solid.
 
     `ThinLayer` makes a sheet of every mesh that declares no thickness of its own. Opaque objects are never sheets.
     """

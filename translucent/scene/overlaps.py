@@ -18,7 +18,7 @@ MOST_PAIRS = 1 << 20
 def first_overlap(
     boxes: Array, matters: Callable[[Indices, Indices], npt.NDArray[np.bool_]] | None = None
 ) -> tuple[int, int] | None:
-    """Two boxes that share more than their border, the earlier one first; None if there are none.
+    """Two boxes that share more than their boundary, the earlier one first; None if there are none.
 
     Of few boxes, the pair whose later box comes first. The time grows as n log n and with the pairs that overlap along
     the axis where the fewest do.

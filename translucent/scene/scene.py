@@ -47,14 +47,14 @@ class Object(Frozen):
     priority : int
         With ``overlap="priority"`` the higher one displaces the lower.
     sheet_thickness : float, optional
-        Declares the mesh a thin sheet of this thickness in metres, not the border of a solid.
+        Declares the mesh a thin sheet of this thickness in metres, not the boundary of a solid.
     color : str or array_like (3,)
         What an opaque object without a surface diffusely reflects, 0 to 1: a color as text, or linear RGB.
     density : DensityGrid, LinearDensity or ExponentialDensity, optional
         Scales absorption, scattering and emission of the medium from place to place, over the bounds of the mesh in
         object space. Default: homogeneous.
     surface : Surface, optional
-        What the border does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
+        What the interface does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
         opaque object reflects diffusely.
     """
 
@@ -124,7 +124,7 @@ class Object(Frozen):
 
     @property
     def has_interface(self) -> bool:
-        """Whether light changes where it crosses the border of the medium: is bent, mirrored, tinted or spread."""
+        """Whether light changes where it crosses the interface of the medium: is bent, mirrored, tinted or spread."""
         return (
             self.medium is not None
             and not self.covers

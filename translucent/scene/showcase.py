@@ -106,7 +106,7 @@ def framing(
 
 
 def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
-    """The scene with borders as a picture needs them.
+    """The scene with interfaces as a picture needs them.
 
     Media that scatter give back, and let through, what they scatter many times: without that milk would be black. A
     roughness replaces that of all surfaces of media.

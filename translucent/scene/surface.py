@@ -1,4 +1,4 @@
-"""What the border of a body, or an opaque object, does to light: how rough it is, how it tints, what enters."""
+"""What the interface of a body, or an opaque object, does to light: how rough it is, how it tints, what enters."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ TEXTURE_FIELDS = (
 
 @dataclass(frozen=True, eq=False)
 class Surface(Frozen):
-    """The border between a medium and the air around it; or what an opaque object shows instead of a plain grey.
+    """The interface between a medium and the air around it; or what an opaque object shows instead of a plain grey.
 
-    What does not pass the border by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
+    What does not pass the interface by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
     paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission and
     _dispersion).
 
@@ -91,7 +91,7 @@ class Surface(Frozen):
     opacity : float, optional
         Makes of a thin sheet a layer that covers this share of what is behind it, 0 to 1, whatever the angle, times the
         opacity of `color_texture` and of the vertices. It shows what an opaque object with this surface would, painted
-        over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its borders bend nothing.
+        over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its interfaces bend nothing.
     double_sided : bool
         Whether an opaque object is seen from the inside, too.
 

@@ -29,7 +29,7 @@ class Texture(Frozen):
     rotation : float
         Degrees, counterclockwise as v counts upwards.
     wrap : ({"repeat", "clamp"}, {"repeat", "clamp"})
-        What is beyond 0 to 1 in u and in v: the picture again, or its border.
+        What is beyond 0 to 1 in u and in v: the picture again, or its edge.
 
     Raises
     ------

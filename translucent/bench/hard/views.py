@@ -121,10 +121,10 @@ def _on_pixels(checks: Checks) -> None:
     i, j = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
     a = (i * n + j).ravel()
     quads = np.stack([a, a + n, a + n + 1, a + 1], axis=1)
-    border = np.concatenate(
+    edge = np.concatenate(
         [np.arange(n) * n, (n - 1) * n + np.arange(n), (np.arange(n) * n + n - 1)[::-1], np.arange(n)[::-1]]
     )
-    rim = border[np.concatenate([[True], np.diff(border) != 0])][:-1]
+    rim = edge[np.concatenate([[True], np.diff(edge) != 0])][:-1]
     following = np.roll(rim, -1)
     sides = np.stack([rim, rim + n * n, following + n * n, following], axis=1)
     squares = np.concatenate([quads, quads[:, ::-1] + n * n, sides])

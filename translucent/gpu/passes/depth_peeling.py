@@ -139,7 +139,7 @@ class DepthPeelingPass:
             **walk_switches(job.features),
             "SCATTER": False,
             "MARCH": False,
-            "BORDERS": False,
+            "INTERFACES": False,
             **ends,
             "BEGIN": folds == 0,
             "END": last,

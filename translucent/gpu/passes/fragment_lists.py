@@ -104,7 +104,7 @@ class FragmentListsPass:
         job.bind_opaque(0)
         job.bind_grids(1)
         job.targets.steepest().color_attachments[0].use(2)
-        switches = {"OPAQUE": job.features.has_opaque, "BORDERS": job.features.finds_exits}
+        switches = {"OPAQUE": job.features.has_opaque, "INTERFACES": job.features.finds_exits}
         program = self._resolve.program(**walk_switches(job.features), GRADIENT=0, **switches)
         if job.features.marches:
             method = cast(RayMarched, job.plan.method)

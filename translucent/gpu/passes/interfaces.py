@@ -1,4 +1,4 @@
-"""Borders of bodies: where each ray first enters one, and unless it leaves unbent, where it first leaves one beyond."""
+"""Interfaces of bodies: where each ray first enters one and, unless it leaves unbent, where it first leaves another."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import texture_units
-from translucent.planning.borders import picture_cuts
+from translucent.planning.interfaces import picture_cuts
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Object
 from translucent.scene.surface import Surface
@@ -20,19 +20,19 @@ _UNITS = {"opaque_place": 0, "entered": 1, "ordered_layers": 2} | texture_units(
 
 
 class InterfacesPass:
-    """Nearest border towards the eye, then the nearest away from it; see ``shaders/shade/interface.frag``."""
+    """Nearest interface towards the eye, then the nearest away from it; see ``shaders/shade/interface.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/border.vert", "shade/interface.frag", **_UNITS)
+        self._variants = Variants(gl, "geometry/interface.vert", "shade/interface.frag", **_UNITS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Draw the bodies for each border, with the depth test on; sheets have one, seen from either side."""
+        """Draw the bodies for each interface, with the depth test on; sheets have one, seen from either side."""
         nothing = float(CONSTANTS["NOTHING"])
         thin = job.features.sheets
         sheets = tuple(i for i in spec.objects if i in thin)
         solids = tuple(i for i in spec.objects if i not in thin)
         starts_inside = job.placed.starts_inside or any(picture_cuts(job.scene, job.scene.objects[i]) for i in solids)
-        for back in (False,) if job.features.one_border else (False, True):
+        for back in (False,) if job.features.one_interface else (False, True):
             framebuffer = job.targets.left() if back else job.targets.entered()
             framebuffer.use()
             framebuffer.clear(0.0, 0.0, 0.0, nothing, depth=1.0)

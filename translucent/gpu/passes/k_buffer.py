@@ -48,7 +48,7 @@ class KBufferPass:
         job.targets.ordered().use()
         steepest.color_attachments[0].use(1)
         program = self._resolve.program(
-            **walk_switches(job.features), OPAQUE=job.features.has_opaque, BORDERS=job.features.finds_exits
+            **walk_switches(job.features), OPAQUE=job.features.has_opaque, INTERFACES=job.features.finds_exits
         )
         set_uniform(program, "k", k)
         self._resolve.draw_fullscreen(program)

@@ -1,4 +1,4 @@
-"""Layers that cover a share of what is behind them, and light that borders of bodies add."""
+"""Layers that cover a share of what is behind them, and light that interfaces of bodies add."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class LayersPass:
     def __init__(self, gl: moderngl.Context) -> None:
         units = FINISH_UNITS | {name: len(FINISH_UNITS) + i for i, name in enumerate(_OWN)}
         self._units = units
-        self._painted = Variants(gl, "geometry/border.vert", "shade/layer.frag", **units)
+        self._painted = Variants(gl, "geometry/interface.vert", "shade/layer.frag", **units)
         self._fronts = Variants(gl, "geometry/body.vert", "shade/fronts.frag")
         over = {name: unit for unit, name in enumerate(_SAMPLERS)}
         self._over = Variants(gl, "geometry/fullscreen.vert", "shade/layers_over.frag", **over)

@@ -24,7 +24,7 @@ class OpaquePass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", **FINISH_UNITS)
-        self._finished = Variants(gl, "geometry/border.vert", "shade/opaque.frag", **FINISH_UNITS)
+        self._finished = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", **FINISH_UNITS)
         self._maps = FinishMaps(gl)
 
     def run(self, view: SceneView, spec: PassSpec) -> None:

@@ -1,10 +1,10 @@
-"""Light at the borders of bodies, over the whole picture."""
+"""Light at the interfaces of bodies, over the whole picture."""
 
 from __future__ import annotations
 
 import moderngl
 
-from translucent.gpu.drivers import require_borders
+from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
@@ -43,7 +43,7 @@ class SurfacesPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
         gl, environment = job.gl, job.scene.environment
-        require_borders(gl.info)
+        require_interfaces(gl.info)
         sums = job.sums_after(spec.name)
         (job.targets.average() if sums else job.targets.surfaced()).use()
         gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
@@ -52,7 +52,7 @@ class SurfacesPass:
         seen_map = environment.seen.kind == "image"
         seen_lights = seen_map and environment.seen is environment
         textures = [*job.targets.result().color_attachments[:4], *job.targets.entered().color_attachments]
-        if not job.features.one_border:
+        if not job.features.one_interface:
             textures += job.targets.left().color_attachments
         for unit, texture in enumerate(textures):
             texture.use(unit)
@@ -79,7 +79,7 @@ class SurfacesPass:
         if seen_map:
             job.resources.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
         program = self._variants.program(
-            ONE_BORDER=job.features.one_border,
+            ONE_INTERFACE=job.features.one_interface,
             OPAQUE=job.features.has_opaque,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_lights,

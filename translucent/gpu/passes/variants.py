@@ -67,7 +67,7 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
 
 
 def look_switches(body: Object) -> dict[str, bool]:
-    """Switches of ``geometry/border.vert`` and ``shade/surface_textures.glsl``: what few objects have."""
+    """Switches of ``geometry/interface.vert`` and ``shade/surface_textures.glsl``: what few objects have."""
     occluded = body.surface is not None and body.surface.occlusion_texture is not None
     return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
 

@@ -1,4 +1,4 @@
-// Vertices of a body's border: as in body.vert, with what its surface needs.
+// Vertices of a body's interface: as in body.vert, with what its surface needs.
 
 #include <Body>
 

@@ -1,4 +1,4 @@
-"""Rough borders: microfacets against closed forms, reciprocity, highlights, noise."""
+"""Rough interfaces: microfacets against closed forms, reciprocity, highlights, noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.reference.dielectrics import BLACK, UP_AND_DOWN, Array, oblique, slab
 from translucent.formulas import interface, optics
 from translucent.media.medium import Medium
 from translucent.reference import bent_light, microfacets
-from translucent.reference.microfacets import scattered_at_border
+from translucent.reference.microfacets import scattered_at_interface
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
@@ -28,7 +28,7 @@ def test_light_reflected_by_one_microfacet(
     # The second look at the height lets light leave; nothing is met again.
     monkeypatch.setattr(microfacets, "MOST_MEETINGS", 2)
     every = np.ones(count)
-    found, passed = scattered_at_border(
+    found, passed = scattered_at_interface(
         np.tile(direction, (count, 1)), np.tile([0.0, 0.0, 1.0], (count, 1)), ior * every, alpha * every, rng
     )
     once = found * (~passed)[:, None]
@@ -58,7 +58,7 @@ def test_light_passed_by_one_microfacet(rng: np.random.Generator, monkeypatch: p
     hidden = 0.5 * (1 / cosine - 1)  # Lambda at alpha = 1
     every, way = np.ones(count), [math.sqrt(1 - cosine**2), 0.0, -cosine]
     # Equal media, almost: light goes straight on, and is reflected by none in a million.
-    found, _ = scattered_at_border(
+    found, _ = scattered_at_interface(
         np.tile(way, (count, 1)), np.tile([0.0, 0.0, 1.0], (count, 1)), 1.0001 * every, every, rng
     )
     expected = (1 + hidden) * math.gamma(1 + hidden) ** 2 / math.gamma(2 + 2 * hidden)
@@ -66,7 +66,7 @@ def test_light_passed_by_one_microfacet(rng: np.random.Generator, monkeypatch: p
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.7])
-def test_a_rough_border_is_reciprocal(alpha: float, rng: np.random.Generator) -> None:
+def test_a_rough_interface_is_reciprocal(alpha: float, rng: np.random.Generator) -> None:
     """Of diffuse light, n^2 times as much is reflected less from inside: n^2 (1 - R_in) = 1 - R_out."""
     count, ior = 200_000, 1.5
 
@@ -74,7 +74,7 @@ def test_a_rough_border_is_reciprocal(alpha: float, rng: np.random.Generator) ->
         cosine = np.sqrt(rng.random(count))
         directions = np.stack([np.sqrt(1 - cosine**2), np.zeros(count), -cosine], axis=1)
         every = np.ones(count)
-        return scattered_at_border(
+        return scattered_at_interface(
             directions, np.tile([0.0, 0.0, 1.0], (count, 1)), relative * every, alpha * every, rng
         )[1]
 
@@ -98,7 +98,7 @@ def test_a_nearly_polished_slab_is_a_polished_one(sheet: float | None) -> None:
     assert (np.abs(rough - polished) <= 4 * error + 1e-3).all()
 
 
-def test_highlights_of_lights_in_rough_borders() -> None:
+def test_highlights_of_lights_in_rough_interfaces() -> None:
     light = DirectionalLight((-0.5, -1.0, 0.1), (2.0, 1.0, 0.5))
     black = Medium(absorption=1e4, ior=1.5)
     body = Object(slab(-0.5, 0.5), black, surface=Surface(roughness=0.5))

@@ -1,8 +1,8 @@
-"""Where light is bent or reflected: the first border on each ray at which what it is in changes.
+"""Where light is bent or reflected: the first interface on each ray at which what it is in changes.
 
 Of several bodies at one place, the one of the highest priority decides what light is in; of equal ones, the one that
 the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries a record of
-the bodies that it is in, so that the walls of two bodies at one place are one border.
+the bodies that it is in, so that the walls of two bodies at one place are one interface.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from translucent.scene.surface import Surface
 #: Walls closer together than this share of the scene's diagonal are at one place.
 TOGETHER = 1e-9
 
-#: Least cosine between a border's normal and a ray that meets it.
+#: Least cosine between an interface's normal and a ray that meets it.
 EDGE_ON = 1e-3
 
 #: Of what is in no body.
@@ -52,15 +52,15 @@ class Inside:
 
 
 @dataclass(frozen=True, eq=False)
-class Borders:
-    """The first border on each ray; all arrays (n,).
+class Interfaces:
+    """The first interface on each ray; all arrays (n,).
 
     Attributes
     ----------
     distance : float64
         In metres along the ray; inf where there is none.
     item : int64
-        Of `Scene.objects`, whose border it is; of no meaning without one.
+        Of `Scene.objects`, whose interface it is; of no meaning without one.
     face : int64
         Of its mesh.
     barycentric : (n, 3) float64
@@ -79,9 +79,9 @@ class Borders:
     here: Inside
     there: Inside
 
-    def where(self, chosen: Integers) -> Borders:
+    def where(self, chosen: Integers) -> Interfaces:
         """Those of the rays that indices choose."""
-        return Borders(
+        return Interfaces(
             self.distance[chosen],
             self.item[chosen],
             self.face[chosen],
@@ -94,7 +94,7 @@ class Borders:
 
 
 class Optics:
-    """What light meets at the borders of a scene, for one color of light or for all alike.
+    """What light meets at the interfaces of a scene, for one color of light or for all alike.
 
     Parameters
     ----------
@@ -156,9 +156,9 @@ class Optics:
         behind = [line.where(line.distance < 0) for line in hits]
         return _Walk(self, behind, self.outside(count)).through()
 
-    def first_borders(self, hits: Sequence[Hits], inside: Inside) -> Borders:
-        """The first borders among surfaces ahead, those of each object, on rays that start `inside` bodies."""
-        return _Walk(self, hits, inside).to_borders()
+    def first_interfaces(self, hits: Sequence[Hits], inside: Inside) -> Interfaces:
+        """The first interfaces among surfaces ahead, those of each object, on rays that start `inside` bodies."""
+        return _Walk(self, hits, inside).to_interfaces()
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,8 +206,8 @@ class _Walk:
             self._cross(self.crossings.where(layer))
         return self.inside
 
-    def to_borders(self) -> Borders:
-        """The first border of each ray."""
+    def to_interfaces(self) -> Interfaces:
+        """The first interface of each ray."""
         count = len(self.time)
         self.here = Inside(self.inside.windings.copy(), self.inside.since.copy())
         self.before = self.optics.dominant(self.inside)
@@ -227,7 +227,7 @@ class _Walk:
             self._cross(crossings.where(np.flatnonzero(~sheet)))
             self._meet_sheet(crossings.where(np.flatnonzero(sheet)))
             stopped[crossings.pixel[sheet]] = True
-        return self._borders()
+        return self._interfaces()
 
     def _cross(self, crossings: _Crossings) -> None:
         ray, item = crossings.pixel, crossings.item
@@ -256,15 +256,15 @@ class _Walk:
     def _changed(self, ray: Integers) -> Mask:
         return self.optics.matters(self.before[ray], self.optics.dominant(self.inside.where(ray)))
 
-    def _borders(self) -> Borders:
+    def _interfaces(self) -> Interfaces:
         rays = np.arange(len(self.time))
         after = self.optics.dominant(self.inside)
         is_sheet = self.sheet >= 0
         found = is_sheet | self.optics.matters(self.before, after)
-        # The border is that of the body that is entered; where the ray only leaves one, of that.
+        # The interface is that of the body that is entered; where the ray only leaves one, of that.
         entered = (after != AIR) & (self.face[rays, after] >= 0)
         item = np.where(is_sheet, self.sheet, np.where(entered, after, self.before))
-        return Borders(
+        return Interfaces(
             np.where(found, self.place, np.inf),
             item,
             self.face[rays, item],
@@ -276,17 +276,17 @@ class _Walk:
         )
 
 
-def border_normals(own: Optics, borders: Borders, directions: Array) -> tuple[Array, Array]:
-    """Unit normals (n, 3) of borders, to the side that rays (n, 3) come from: of smooth surfaces, and of their faces.
+def interface_normals(own: Optics, interfaces: Interfaces, directions: Array) -> tuple[Array, Array]:
+    """Unit normals (n, 3) of interfaces, towards where rays (n, 3) come from: of smooth surfaces, and of their faces.
 
-    Smooth normals may look away from a ray that their face looks at: it meets the border edge-on.
+    Smooth normals may look away from a ray that their face looks at: it meets the interface edge-on.
     """
     smooth, flat = np.zeros((2, len(directions), 3))
-    for i in np.unique(borders.item):
-        own_rays = np.flatnonzero(borders.item == i)
-        body, face = own.scene.objects[i], borders.face[own_rays]
+    for i in np.unique(interfaces.item):
+        own_rays = np.flatnonzero(interfaces.item == i)
+        body, face = own.scene.objects[i], interfaces.face[own_rays]
         flat[own_rays] = world_normals(body, face)
-        corners = np.einsum("kij,ki->kj", own.corner_normals(int(i))[face], borders.barycentric[own_rays])
+        corners = np.einsum("kij,ki->kj", own.corner_normals(int(i))[face], interfaces.barycentric[own_rays])
         smooth[own_rays] = corners @ np.linalg.inv(body.matrix[:3, :3])
     away = np.einsum("ki,ki->k", flat, directions) > 0
     flat[away] *= -1.0

@@ -1,4 +1,4 @@
-"""What a plan adds where light changes at the borders of bodies: they bend, mirror, tint or spread it."""
+"""What a plan adds where light changes at the interfaces of bodies: they bend, mirror, tint or spread it."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from translucent.errors import InputError
 from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
-from translucent.planning.render_plan import Borders, RenderPlan
+from translucent.planning.render_plan import Interfaces, RenderPlan
 from translucent.planning.slots import overlapping_pair
 from translucent.scene.scene import Object, Scene, object_names
 
-#: What a plan says in which rays bend at the front border alone.
-ONE_BORDER = Note(
-    NoteKind.ONE_BORDER,
-    'borders="front": bends once, where a ray enters; leaves without bending: rays leave curved bodies in wrong '
+#: What a plan says in which rays bend at the front interface alone.
+ONE_INTERFACE = Note(
+    NoteKind.ONE_INTERFACE,
+    'interfaces="front": bends once, where a ray enters; leaves without bending: rays leave curved bodies in wrong '
     "directions",
 )
 
-#: Time of the passes over borders with one border, as a share of that with two, as measured on a software rasteriser.
+#: Time of the passes over one interface of each body, as a share of that over two; measured on a software rasterizer.
 _FRONT_COST = {PassName.INTERFACES: 0.4, PassName.SURFACES: 0.45}
 
 
-def border_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: float) -> tuple[PassSpec, ...]:
-    """The pass that finds borders, and the one that shades them; none where nothing happens at a border."""
+def interface_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: float) -> tuple[PassSpec, ...]:
+    """The pass that finds interfaces, and the one that shades them; none where nothing happens at an interface."""
     objects = tuple(i for i, body in enumerate(scene.objects) if body.has_interface)
     if not objects:
         return ()
     names = _names(scene, objects)
     if method.makes_sheets or all(scene.objects[i].sheet_thickness is not None for i in objects):
-        # What bends on entering a sheet bends back on leaving it: each has one border, that towards the eye.
+        # What bends on entering a sheet bends back on leaving it: each has one interface, that towards the eye.
         return (
             PassSpec(
                 PassName.INTERFACES,
@@ -49,7 +49,7 @@ def border_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: fl
                 cost=shade_cost,
             ),
         )
-    found = f"{names}: normal and place of the border where a ray enters, and of the one where it leaves"
+    found = f"{names}: normal and place of the interface where a ray enters, and of the one where it leaves"
     return (
         PassSpec(PassName.INTERFACES, found, objects, 2, cost=draw_cost),
         PassSpec(
@@ -60,19 +60,19 @@ def border_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: fl
     )
 
 
-def check_borders(borders: str) -> None:
-    """Raise `InputError` for what is no choice of borders."""
-    if borders not in get_args(Borders):
-        raise InputError(f"borders {borders!r}", "not known", f"use one of {', '.join(get_args(Borders))}")
+def check_interfaces(interfaces: str) -> None:
+    """Raise `InputError` for what is no choice of interfaces."""
+    if interfaces not in get_args(Interfaces):
+        raise InputError(f"interfaces {interfaces!r}", "not known", f"use one of {', '.join(get_args(Interfaces))}")
 
 
-def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
+def with_one_interface(scene: Scene, plan: RenderPlan) -> RenderPlan:
     """The plan in which rays bend where they enter bodies and not where they leave; as it is if nothing bends there.
 
     Raises
     ------
     InputError
-        If rays start inside such a body: they have no front border.
+        If rays start inside such a body: they have no front interface.
     """
     found = [i for step in plan.passes if step.name is PassName.INTERFACES for i in step.objects]
     solids = [scene.objects[i] for i in found if scene.objects[i].sheet_thickness is None]
@@ -81,12 +81,12 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
     for body in solids:
         if _starts_inside(scene, body):
             raise InputError(
-                'borders="front"',
-                f"rays start inside {body.mesh.name!r}, and meet no border where they would enter it",
-                'use borders="both", or move the camera outside',
+                'interfaces="front"',
+                f"rays start inside {body.mesh.name!r}, and meet no interface where they would enter it",
+                'use interfaces="both", or move the camera outside',
             )
     told = {
-        PassName.INTERFACES: f"{_names(scene, found)}: normal and place of the border where a ray enters",
+        PassName.INTERFACES: f"{_names(scene, found)}: normal and place of the interface where a ray enters",
         PassName.SURFACES: f"{_effects(scene)}; rays bend where they enter and go straight on",
     }
     passes = tuple(
@@ -100,7 +100,7 @@ def with_one_border(scene: Scene, plan: RenderPlan) -> RenderPlan:
         else step
         for step in plan.passes
     )
-    return replace(plan, passes=passes, unmodelled=(*plan.unmodelled, ONE_BORDER), borders="front")
+    return replace(plan, passes=passes, unmodelled=(*plan.unmodelled, ONE_INTERFACE), interfaces="front")
 
 
 def _starts_inside(scene: Scene, body: Object) -> bool:
@@ -122,16 +122,15 @@ def picture_cuts(scene: Scene, body: Object) -> bool:
     return bool(np.where(forward > 0, low, high) @ forward < 0 < np.where(forward > 0, high, low) @ forward)
 
 
-def touching_borders(scene: Scene) -> str | None:
-    """Why the order of surfaces tells more where bodies with borders may touch; None if none do."""
+def touching_interfaces(scene: Scene) -> str | None:
+    """Why the order of surfaces tells more where bodies with interfaces may touch; None if none do."""
     solids = [body for body in scene.bodies if body.sheet_thickness is None]
     bends = np.array([body.has_interface for body in solids])
     if not bends.any() or (found := overlapping_pair(solids, lambda one, other: bends[one] | bends[other])) is None:
         return None
     earlier, later = (solids[place] for place in found)
-    return (
-        f"borders of {earlier.mesh.name!r} and {later.mesh.name!r} may touch: the order tells where a ray leaves both"
-    )
+    names = f"{earlier.mesh.name!r} and {later.mesh.name!r}"
+    return f"interfaces of {names} may touch: the order tells where a ray leaves both"
 
 
 def _names(scene: Scene, objects: Iterable[int]) -> str:
@@ -139,12 +138,12 @@ def _names(scene: Scene, objects: Iterable[int]) -> str:
 
 
 def _effects(scene: Scene, *, bends: bool = True) -> str:
-    """What happens at the borders of this scene, in words."""
+    """What happens at the interfaces of this scene, in words."""
     bodies = [body for body in scene.bodies if body.has_interface]
     surfaces = [body.surface for body in bodies if body.surface is not None]
     effects = []
     if any(body.medium is not None and body.medium.ior > 1 for body in bodies):
-        effects.append(f"borders mirror the environment{' and bend rays' if bends else ''} (ior above 1)")
+        effects.append(f"interfaces mirror the environment{' and bend rays' if bends else ''} (ior above 1)")
     if any(surface.roughness > 0 for surface in surfaces):
         effects.append("rough ones blur both")
     if bends and any(surface.dispersion > 0 for surface in surfaces):
@@ -155,4 +154,4 @@ def _effects(scene: Scene, *, bends: bool = True) -> str:
         effects.append("colors tint what enters")
     if any(surface.multiple_scattering for surface in surfaces):
         effects.append("light that scatters many times leaves as from a layer (Kubelka and Munk)")
-    return "; ".join(effects) or "borders"
+    return "; ".join(effects) or "interfaces"
