@@ -67,7 +67,7 @@ def plan(
 
 
 def _choice(scene: Scene, method: Method | None, capabilities: Capabilities, borders: Borders) -> tuple[Method, str]:
-    """The method of a renderer with OpenGL, and why it is that one; refuses what was asked for if it cannot do."""
+    """Method for a renderer with OpenGL, and the reason for it; refuses a requested method that cannot do the scene."""
     if scene.varies:
         return marching_method(scene, method, capabilities), "the density varies from place to place"
     if method is not None and method.ordered:
@@ -84,7 +84,7 @@ def _choice(scene: Scene, method: Method | None, capabilities: Capabilities, bor
 
 
 def _ordered_method(scene: Scene, method: Method | None, capabilities: Capabilities, why: str) -> Method:
-    """The method for a scene that only ordered intervals can tell; refuses any other that was asked for."""
+    """Method for a scene that needs ordered intervals; refuses any other that was asked for."""
     if not solids_of(scene):
         raise InputError(
             f"rendering {object_names(scene.bodies)}",
@@ -99,7 +99,7 @@ def _ordered_method(scene: Scene, method: Method | None, capabilities: Capabilit
 
 
 def _cheapest_ordered(scene: Scene, capabilities: Capabilities) -> Method:
-    """Of the methods that find all intervals, the one that is expected to be fastest."""
+    """Method with the lowest expected cost of those that find all intervals."""
     # Of two that cost the same the lists come first: peeling waits for a count before it goes on.
     candidates: list[Method] = [FragmentLists()] if capabilities.shader_storage else []
     candidates.append(DepthPeeling())
@@ -113,7 +113,7 @@ def plan_over_backdrop(
     *,
     borders: Borders = "both",
 ) -> RenderPlan:
-    """The plan for a scene before a `Backdrop`, which somebody else has drawn.
+    """Plan for a scene before a `Backdrop`, which another renderer has drawn.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def plan_over_backdrop(
 
 
 def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities) -> RenderPlan:
-    """The plan of a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
+    """Plan for a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
     chosen = method or FragmentLists()
     sheets = chosen.makes_sheets
     reason = "no OpenGL: all surfaces on each ray, in float64"
