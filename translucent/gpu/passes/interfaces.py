@@ -1,4 +1,4 @@
-"""Borders of bodies: where each ray first enters one, and unless it leaves unbent, where it first leaves one beyond."""
+"""Interfaces: where each ray first enters a body, and, if exits refract, where it first leaves one beyond."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _UNITS = {"opaque_place": 0, "entered": 1, "ordered_layers": 2} | texture_units(
 
 
 class InterfacesPass:
-    """Nearest border towards the eye, then the nearest away from it; see ``shaders/shade/interface.frag``."""
+    """Nearest interface that faces the eye, then the nearest that faces away; see ``shaders/shade/interface.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/border.vert", "shade/interface.frag", **_UNITS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Draw the bodies for each border, with the depth test on; sheets have one, seen from either side."""
+        """Draw the bodies for each interface, with the depth test on; sheets have one, seen from either side."""
         nothing = float(CONSTANTS["NOTHING"])
         thin = job.features.sheets
         sheets = tuple(i for i in spec.objects if i in thin)
