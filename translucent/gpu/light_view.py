@@ -44,9 +44,7 @@ class LightView(SceneView):
         return self.targets.size[0] * self.targets.size[1]
 
     def rows(self, center: Array) -> Array:
-        """(4, 4): rows that map a point, relative to the center of the media, to x, y and w of the picture, and
-        depth.
-        """
+        """(4, 4): from points, relative to the center of the media, to x, y and w of the picture, and depth."""
         camera, media = self.scene.camera, self.placed.media
         axes = np.stack([camera.right, camera.up, camera.forward])
         seen = np.column_stack([axes, axes @ (center - camera.eye)])
