@@ -1,4 +1,4 @@
-"""Arrays as annotations name them."""
+"""Names of array types for annotations."""
 
 from __future__ import annotations
 

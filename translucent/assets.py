@@ -1,4 +1,6 @@
-"""The single door to ``shaders/`` and ``meshes/``: beside the package in an installed wheel, else in the checkout."""
+"""Paths of the files in ``shaders/`` and ``meshes/``: beside the package in an installed wheel, else in the
+checkout.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,14 @@ def shader_library() -> list[Path]:
 
 
 def shader_names() -> list[str]:
-    """All shader files, as `shader_path` takes them: stages, and what they include."""
+    """Names of all shader files, as `shader_path` takes them: stages, and the files that they include."""
     folder = _folder("shaders")
     files = (path for path in folder.rglob("*.*") if path.suffix in (".vert", ".frag", ".glsl"))
     return sorted(path.relative_to(folder).as_posix() for path in files)
 
 
 def newest_shader() -> float:
-    """When a shader file was written last, in seconds since 1970."""
+    """Time at which a shader file was last written, in seconds since 1970."""
     newest = 0.0
     for path in _folder("shaders").rglob("*.[gvf]*"):
         try:

@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _quoting(error: click.ClickException) -> str:
-    """What may have become of the color after an option at the end of the line."""
+    """Hint about quoting for a color after an option at the end of the line, which a shell may have dropped."""
     if not (isinstance(error, click.BadOptionUsage) and error.option_name in TAKE_COLORS):
         return ""
     from translucent.media.colors import QUOTE_HINT

@@ -1,4 +1,4 @@
-"""What this machine has: OpenGL, packages, and what is missing for what."""
+"""Diagnosis of this machine: OpenGL, packages, and which features lack something."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from translucent.errors import RenderError
 from translucent.gpu.context import Backend, NoContextError, open_context
 from translucent.gpu.renderer import SHADER_STORAGE
 
-#: Packages beside the core, and what each is for.
+#: Optional packages, and the purpose of each.
 OPTIONAL = {
     "OpenEXR": "writing .exr files (pip install 'translucent-shading[exr]')",
     "imgui-bundle": "the window of translucent preview (pip install 'translucent-shading[ui]')",
@@ -30,7 +30,7 @@ CORE = ("numpy", "scipy", "trimesh", "moderngl", "glcontext", "pillow", "click",
 
 @dataclass(frozen=True)
 class BackendReport:
-    """One backend: what it offers, or why it does not work."""
+    """Report on one OpenGL backend: its properties, or why it does not work."""
 
     name: str
     works: bool
@@ -82,7 +82,7 @@ def examine() -> dict[str, Any]:
 
 
 def report(facts: dict[str, Any]) -> str:
-    """The facts in words, with what to do about what is missing."""
+    """The facts as text, with advice on whatever is missing."""
     lines = [
         f"translucent {facts['translucent']}, Python {facts['python']}, {facts['platform']}",
         "packages: " + ", ".join(f"{name} {found or 'MISSING'}" for name, found in facts["packages"].items()),

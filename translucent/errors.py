@@ -1,4 +1,4 @@
-"""The few exceptions of the toolkit: each is also a builtin, and each message says what, found and do.
+"""Exceptions of the toolkit: each is also a builtin one, and says what is wrong, what was found and what to do.
 
 Messages quote names and values of files that others have made: what is no printable character is escaped here, and what
 is too long for a line is shortened here, for all of them.
@@ -9,12 +9,14 @@ from __future__ import annotations
 #: Characters of the longest message.
 LONGEST = 300
 
-#: Characters that every part of a message may have, however long the others are.
+#: Characters that every part of a message keeps, however long the others are.
 _SHARE = 80
 
 
 def printable(text: str) -> str:
-    """`text` with every character that is not printable as an escape: no file's name commands a terminal."""
+    """`text` with every character that is not printable escaped, so that no file name can send control codes to a
+    terminal.
+    """
     if text.isprintable():
         return text
     # Undecodable bytes of file names, which are lone surrogates, are no printable characters either.
@@ -22,7 +24,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """`text` without its middle where it is longer than this; its beginning and its end say the most."""
+    """`text` with its middle cut out if it is longer than the limit; beginning and end say the most."""
     if len(text) <= longest:
         return text
     kept = longest - len(" ... ")
@@ -30,7 +32,7 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 
 
 def message_of(*parts: str) -> str:
-    """The parts that say something in one printable line, the longest ones shortened where it would be too long."""
+    """Join the nonempty parts into one printable line, with the longest parts shortened if it is too long."""
     found = [printable(part) for part in parts if part]
     room = LONGEST - len("; ") * (len(found) - 1)
     for i in sorted(range(len(found)), key=lambda i: len(found[i]), reverse=True):
@@ -41,7 +43,7 @@ def message_of(*parts: str) -> str:
 
 
 class TranslucentError(Exception):
-    """Base of every error that the toolkit raises on purpose.
+    """Base class of every error that the toolkit raises on purpose.
 
     Parameters
     ----------
@@ -58,19 +60,19 @@ class TranslucentError(Exception):
 
 
 class InputError(TranslucentError, ValueError):
-    """The input cannot be used: a bad file, a value out of its range, an unknown name."""
+    """Error for input that cannot be used: a bad file, a value out of its range, an unknown name."""
 
 
 class UnreadableError(InputError):
-    """A file, or a picture in one, is missing or damaged."""
+    """Error for a file, or an image in a file, that is missing or damaged."""
 
 
 class RenderError(TranslucentError, RuntimeError):
-    """The input is fine, yet the work failed: no OpenGL, a shader that does not compile, a full disk."""
+    """Error for work that failed although the input is fine: no OpenGL, a shader that does not compile, a full disk."""
 
 
 class TranslucentWarning(UserWarning):
-    """The result can be used, but not all of it: the message counts what is affected."""
+    """Warning that part of a result cannot be used: the message counts what is affected."""
 
     def __init__(self, text: str) -> None:
         super().__init__(message_of(text))

@@ -1,4 +1,4 @@
-"""Packages that not every task needs: imported here alone, where it is known which extra brings each."""
+"""Optional packages: the only place that imports them, with the extra that installs each."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from translucent.errors import RenderError
 
-#: The extra that brings a package, by the package's module.
+#: The extra that installs a package, by the name of the package's module.
 EXTRAS = {
     "OpenEXR": "exr",
     "distributed": "cluster",

@@ -1,4 +1,4 @@
-"""Values that never change, whose arrays stay read-only when they are copied or sent to another process."""
+"""Immutable values whose arrays stay read-only when they are copied or pickled."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 
 class Frozen:
-    """Base of values with read-only arrays: what is derived from the arrays is kept, and must stay true."""
+    """Base class of immutable values with read-only arrays, so that cached results derived from them stay valid."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take over what a copy or a pickle holds; NumPy makes arrays in it that can be written to."""
+        """Restore the state of a copy or a pickle, whose arrays NumPy makes writable, as read-only."""
         for value in state.values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)

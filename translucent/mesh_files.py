@@ -25,7 +25,7 @@ from translucent.units import metres_per_unit
 #: Formats of trimesh that are archives.
 _ARCHIVES = {"zae", "zip"}
 
-#: Files of programs that can all write a .glb.
+#: Suffixes of the native files of programs that can all export .glb.
 _SCENES_OF_PROGRAMS = (
     ".blend",
     ".fbx",
@@ -133,7 +133,7 @@ def _part(part: Any) -> Triangles:
 
 
 def _require_archive_room(stream: BinaryIO, asked: str) -> None:
-    """Raise `InputError` if a format that is an archive within, such as 3MF, unpacks into too much."""
+    """Raise `InputError` if a file in an archive format, such as 3MF, unpacks into too much data."""
     if stream.read(4) == b"PK\3\4":
         try:
             size = sum(member.file_size for member in zipfile.ZipFile(stream).infolist())
@@ -144,7 +144,7 @@ def _require_archive_room(stream: BinaryIO, asked: str) -> None:
 
 
 class _NoLinks:
-    """What trimesh asks for the files that a mesh names: there are none."""
+    """Resolver that refuses trimesh every file that a mesh links to."""
 
     file_name = None
 

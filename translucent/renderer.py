@@ -1,4 +1,4 @@
-"""The renderer that users see: plans a scene, and hands the plan to OpenGL, or to the CPU where there is none."""
+"""The public renderer: plans a scene, and runs the plan with OpenGL, or on the CPU where there is none."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from translucent.cpu.renderer import CpuRenderer
 
-#: What a user may ask for.
+#: Backends that a user may ask for.
 BACKENDS = (*get_args(Backend), "cpu")
 
 #: More samples per pixel change nothing that 8 bits could show.
@@ -41,7 +41,7 @@ MAX_SAMPLES = 4096
 
 
 class Renderer:
-    """Renders scenes with OpenGL, or on the CPU. Use it as a context manager: leaving it frees everything.
+    """Renderer of scenes with OpenGL, or on the CPU. Use it as a context manager: leaving it frees everything.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ class Renderer:
 
     @property
     def _engine(self) -> GpuRenderer | CpuRenderer:
-        """What draws: another one after a frame that was interrupted, since nobody knows what that has left."""
+        """Engine that draws: a new one after an interrupted frame, whose state on the GPU is unknown."""
         if not self._closed and isinstance(self._made, GpuRenderer) and self._made.interrupted:
             self._made = _engine(*self._asked)
         return self._made
 
     @property
     def gpu(self) -> GpuRenderer:
-        """What draws with OpenGL.
+        """Engine that draws with OpenGL.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class Renderer:
         over_backdrop: bool = False,
         interfaces: Interfaces = "both",
     ) -> RenderPlan:
-        """The plan that `render` would run here, without a backdrop or with one."""
+        """Plan that `render` would run with this renderer, with or without a backdrop."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         check_interfaces(interfaces)
@@ -267,13 +267,13 @@ class Renderer:
         return chosen
 
     def close(self) -> None:
-        """Free everything. Closing twice is fine."""
+        """Free all resources. Closing twice is fine."""
         if not self._closed:
             self._closed = True
             self._made.close()
 
     def _note_interruption(self, error: BaseException) -> None:
-        """Draw no more with what an exception has ended that comes at any point, such as Ctrl-C."""
+        """Mark the engine as unusable after an exception that may come at any point, such as Ctrl-C."""
         if not isinstance(error, Exception) and isinstance(self._made, GpuRenderer):
             self._made.interrupt()
 

@@ -1,14 +1,14 @@
-"""What somebody may have meant who wrote a name that is none."""
+"""Suggestions for misspelled names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-#: Names that are suggested at most.
+#: Largest number of names to suggest.
 MOST = 4
 
-#: Letters that a part of a name needs at least to point to it.
+#: Smallest number of letters with which part of a name suggests that name.
 LEAST_PART = 3
 
 
@@ -28,7 +28,7 @@ def close_names(written: str, known: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(names: Iterable[str]) -> str:
-    """The question, for at least one name."""
+    """The question "did you mean ...?" for one or more names."""
     *others, last = names
     return f"did you mean {', '.join(others)} or {last}?" if others else f"did you mean {last}?"
 

@@ -1,6 +1,6 @@
-"""Which version of the toolkit this is."""
+"""Version of the toolkit."""
 
 from importlib.metadata import version
 
-#: Of the installed distribution.
+#: Version of the installed distribution.
 VERSION = version("translucent-shading")

@@ -1,1 +1,1 @@
-"""The way to and from files: paths, atomic writing, and reading what strangers made within limits."""
+"""Files: paths, atomic writing, and reading of untrusted files within limits."""

@@ -1,4 +1,4 @@
-"""Folders that results are written into."""
+"""Folders for results."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from translucent.files.paths import require_folder
 
 @contextmanager
 def made_folder(folder: Path) -> Iterator[None]:
-    """Make a folder, and those above it; after an error those that were made and are empty are removed.
+    """Context manager that makes a folder and its parents; after an error, empty ones that it made are removed.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Pictures and arrays as files: PNG, OpenEXR and NumPy's own. Each function fills the file that it is given; that a
+"""Writing of pictures and arrays: PNG, OpenEXR and NumPy's own. Each function fills the file that it is given; that a
 file appears complete or not at all is for `translucent.files.paths.write_atomically` to see to."""
 
 from __future__ import annotations

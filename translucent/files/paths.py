@@ -1,5 +1,4 @@
-"""Files and folders that a user names: whether they are what they have to be, told before any work is done; and the one
-way in which files are written, complete or not at all."""
+"""Checks of paths that a user names, before any work is done; and atomic writing of files."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ if sys.platform != "win32":
 
 
 def require_file(path: Path, asked: str) -> None:
-    """Raise unless there is a file to read.
+    """Raise unless the path is a file that can be read.
 
     Parameters
     ----------
@@ -44,7 +43,7 @@ def require_file(path: Path, asked: str) -> None:
 
 
 def require_place(path: Path, asked: str) -> None:
-    """Raise unless a file of this name can be written.
+    """Raise unless a file can be written to the path.
 
     Parameters
     ----------
@@ -67,7 +66,7 @@ def require_place(path: Path, asked: str) -> None:
 
 
 def require_folder(path: Path, asked: str) -> None:
-    """Raise unless this is a folder, or one of this name can be made, with those above it.
+    """Raise unless the path is a folder, or one that can be made with its parents.
 
     Parameters
     ----------
@@ -86,7 +85,7 @@ def require_folder(path: Path, asked: str) -> None:
 
 
 def same_file(one: Path, other: Path) -> bool:
-    """Whether both are names of one file that is there: directly, or through links of either kind."""
+    """Whether both paths name one existing file: directly, or through links of either kind."""
     try:
         return os.path.samefile(one, other)
     except (OSError, ValueError):
@@ -126,7 +125,7 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def remove_partial(path: Path) -> None:
-    """Remove what others have left that were killed while they wrote `path`; not what somebody is writing now."""
+    """Remove temporary files of processes that were killed while they wrote `path`; not those in use."""
     path = Path(os.path.realpath(path))
     for left in path.parent.glob(f"{_partial(path)}*"):
         # It may be gone meanwhile, not be ours, or be where there are no locks to tell.
@@ -145,7 +144,7 @@ def write_text_atomically(path: Path, text: str) -> None:
 
 
 def _temporary_file(path: Path) -> tuple[Path, BinaryIO]:
-    """A new file beside `path`, locked for as long as it is open: a process that is killed lets go of it."""
+    """New temporary file beside `path`, locked while it is open: the lock ends with the process."""
     while True:
         temporary = path.with_name(f"{_partial(path)}{secrets.token_hex(4)}{path.suffix}")
         try:
@@ -165,7 +164,7 @@ def _temporary_file(path: Path) -> tuple[Path, BinaryIO]:
 
 
 def _lock(file: BinaryIO) -> bool:
-    """Whether nobody else holds the file; then it is held until it is closed, or this process ends."""
+    """Try to lock a file until it is closed or this process ends; false if another process holds it."""
     if sys.platform == "win32":
         return True  # no file that somebody has open can be removed there
     try:
@@ -176,5 +175,5 @@ def _lock(file: BinaryIO) -> bool:
 
 
 def _partial(path: Path) -> str:
-    """How the names of temporary files for `path` begin."""
+    """Prefix of the names of temporary files for `path`."""
     return f".partial-{zlib.crc32(os.fsencode(path.name)):08x}-"

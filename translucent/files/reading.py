@@ -1,4 +1,4 @@
-"""The way in for files that others have made: what may be opened, and how much may come out of it.
+"""Reading of untrusted files: which may be opened, and how much memory they may take.
 
 Every reader of the toolkit begins here. Opened are regular files only, since a device may never end and a pipe may wait
 forever; a file that another one names has to lie below that one's folder, links followed. Nothing is allocated because
@@ -24,20 +24,20 @@ from translucent.files.paths import require_file
 
 #: Bytes of the largest file: what the header of a .glb can state.
 MAX_FILE = 2**32 - 1
-#: Bytes of the largest text that a person may have written: a material, a table, a session.
+#: Bytes of the largest text file: a material, a table, a session.
 MAX_TEXT = 8 << 20
 #: Bytes that any file may unpack into, and how many times its own size a larger one may.
 FREE, RATIO = 1 << 29, 128
-#: Levels of lists and objects within each other.
+#: Largest depth of nested lists and objects.
 MAX_DEPTH = 100
-#: Digits of a whole number that is still in the range of float64.
+#: Largest number of digits of an integer within the range of float64.
 MAX_DIGITS = 300
 
 _SCHEME = re.compile(r"file:|[A-Za-z][A-Za-z0-9+.-]+://")
 
 
 def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
-    """A regular file, open for reading.
+    """Open a regular file for reading.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ def open_file(path: str | Path, asked: str, limit: int = MAX_FILE) -> BinaryIO:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    """Open what was a file a moment ago, and does not wait if it has become a pipe."""
+    """Open a path without blocking if it has become a pipe since it was checked."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_bytes(path: str | Path, asked: str, limit: int = MAX_FILE) -> bytes:
-    """The content of a file; raises `InputError` like `open_file`."""
+    """Read the bytes of a file; raises `InputError` like `open_file`."""
     with open_file(path, asked, limit) as stream:
         try:
             return stream.read(os.fstat(stream.fileno()).st_size)
@@ -81,7 +81,7 @@ def read_bytes(path: str | Path, asked: str, limit: int = MAX_FILE) -> bytes:
 
 
 def read_text(path: str | Path, asked: str, limit: int = MAX_TEXT, do: str = "save it as text") -> str:
-    """The content of a file of UTF-8 text; raises `InputError` like `open_file`, or if it is none."""
+    """Read a file of UTF-8 text; raises `InputError` like `open_file`, or if it is not UTF-8."""
     try:
         return read_bytes(path, asked, limit).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -89,7 +89,7 @@ def read_text(path: str | Path, asked: str, limit: int = MAX_TEXT, do: str = "sa
 
 
 def linked_file(folder: Path, link: str, asked: str, allow_outside: bool = False) -> Path:
-    """The file that a file in `folder` names.
+    """Path of a file that another file in `folder` links to.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def linked_file(folder: Path, link: str, asked: str, allow_outside: bool = False
 
 
 def require_room(asked: str, found: str, size: int, stored: int, do: str = "make it smaller") -> None:
-    """Raise unless what is read may take this much memory.
+    """Raise unless reading may take this much memory.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def require_room(asked: str, found: str, size: int, stored: int, do: str = "make
 
 
 def size_text(size: int) -> str:
-    """Bytes, for people."""
+    """Text of a size in bytes."""
     for unit, scale in (("GiB", 1 << 30), ("MiB", 1 << 20), ("kiB", 1 << 10)):
         if size >= scale:
             return f"{size / scale:.3g} {unit}" if size < 1000 * scale else f"{size // scale} {unit}"
@@ -153,7 +153,7 @@ def size_text(size: int) -> str:
 
 
 def json_value(text: str) -> Any:
-    """The value of a JSON text, without infinities, numbers beyond all use, and nesting that no reader could follow.
+    """Parse a JSON text, without infinities, oversized numbers and deep nesting.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def json_value(text: str) -> Any:
 
 
 def toml_value(text: str) -> dict[str, Any]:
-    """The table of a TOML text; raises `ValueError` like `json_value`."""
+    """Parse a TOML text; raises `ValueError` like `json_value`."""
     try:
         value = tomllib.loads(text)
     except RecursionError:
@@ -215,5 +215,5 @@ def _require_shallow(value: Any) -> None:
 
 
 def shown(error: BaseException) -> str:
-    """What an error of a library says, in a few words."""
+    """Short text of a library's error."""
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -1,4 +1,4 @@
-"""Arrays and pictures of files that others have made: their headers are read and believed only where there is room."""
+"""Unpacking of arrays and pictures from untrusted files: headers are checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from translucent.files.reading import open_file, require_room, shown
 if TYPE_CHECKING:
     from PIL.ImageFile import ImageFile
 
-#: Kinds of pictures that are read: Pillow knows more, some of which run other programs.
+#: Formats of pictures that are read: Pillow knows more, some of which run other programs.
 PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
 
 
 def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it with numpy.save") -> npt.NDArray[Any]:
-    """The array of numbers of a .npy file.
+    """Read the numeric array of a .npy file.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def read_array(stream: IO[bytes], size: int, asked: str, do: str = "write it wit
 
 
 def read_arrays(path: str | Path, asked: str, names: Iterable[str], do: str) -> dict[str, npt.NDArray[Any]]:
-    """Arrays of a .npz file by their names; raises `InputError` if one is missing or broken."""
+    """Read arrays of a .npz file by their names; raises `InputError` if one is missing or broken."""
     found = {}
     with open_file(path, asked) as stream:
         whole = os.fstat(stream.fileno()).st_size
@@ -90,7 +90,7 @@ def open_picture(
     per_pixel: int,
     do: str = "check the file",
 ) -> ImageFile:
-    """A picture, whose pixels are still to be decoded, and may be: there is room for them.
+    """Open a picture without decoding its pixels, after a check that there is memory for them.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def open_picture(
 
 
 def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
-    """Header and channels of the first part of an OpenEXR file; the package has to be installed.
+    """Read header and channels of the first part of an OpenEXR file; the package has to be installed.
 
     Raises
     ------
@@ -154,6 +154,6 @@ def read_exr(path: str | Path, asked: str) -> tuple[dict[str, Any], dict[str, np
 
 
 def _exr_size(header: dict[str, Any]) -> tuple[int, int, int]:
-    """Width, height and number of channels."""
+    """Width, height and number of channels of an OpenEXR header."""
     (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
     return right - left + 1, bottom - top + 1, len(header["channels"])

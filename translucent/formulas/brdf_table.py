@@ -1,4 +1,4 @@
-"""How much of a uniform light a rough interface reflects: a table for the split-sum approximation.
+"""Reflectance of a rough interface under uniform light: a table for the split-sum approximation.
 
 With Schlick's Fresnel term F = F0 + (F90 - F0) (1 - v.h)^5 the reflectance for light from everywhere is
 ``F0 * scale + F90 * bias`` (Karis 2013, "Real Shading in Unreal Engine 4"). The microfacets are GGX with alpha =
@@ -20,7 +20,7 @@ TABLE_SIZE = 64
 #: Gauss-Legendre points in the polar and in the azimuthal angle, in `albedo`.
 POINTS = (24, 16)
 
-#: Halvings that find where the reflected direction leaves the hemisphere above the surface.
+#: Bisections for where the reflected direction leaves the hemisphere above the surface.
 BISECTIONS = 40
 
 #: Smaller cosines are taken for this one: seen exactly from the side, a surface has no visible normals.
@@ -37,7 +37,7 @@ def brdf_table() -> npt.NDArray[np.float32]:
 
 
 def albedo(cosine: npt.ArrayLike, roughness: npt.ArrayLike) -> Array:
-    """Scale and bias, (..., 2), of what is reflected of a uniform light, by quadrature to 1e-4.
+    """Scale and bias (..., 2) of the reflectance under uniform light, by quadrature to 1e-4.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def _visible_normal(n_v: Array, alpha: Array, radius: Array, angle: Array) -> Ar
 
 
 def _shadowing(n_v: Array, n_l: Array, alpha: Array) -> Array:
-    """G2 / G1(v): the share of what leaves visible facets that no other facet stops; 0 below the surface."""
+    """G2 / G1(v): the share of light from visible facets that no other facet blocks; 0 below the surface."""
     seen, lit = _tail(n_v, alpha), _tail(n_l, alpha)
     total = n_l * seen + n_v * lit
     return np.asarray(n_l * (seen + n_v) / np.where(total > 0, total, 1.0))

@@ -1,4 +1,4 @@
-"""What boundaries between media do with light, in float64. Each has a twin in ``shaders/lib/interface.glsl``.
+"""Formulas of light at interfaces between media, in float64. Each has a twin in ``shaders/lib/interface.glsl``.
 
 All functions are pure and broadcast. Directions (..., 3) are unit vectors in which light travels; a normal looks to the
 side that the light comes from; ``ior`` is the index of the other side relative to this one. The share that a smooth
@@ -22,14 +22,14 @@ from translucent.formulas import optics
 
 @np.errstate(under="ignore")
 def reflected_direction(direction: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
-    """Direction d - 2 (d.n) n of mirrored light, (..., 3); the normal may look to either side."""
+    """Direction d - 2 (d.n) n of reflected light, (..., 3); the normal may look to either side."""
     d, n = np.asarray(direction, dtype=np.float64), np.asarray(normal, dtype=np.float64)
     return np.asarray(d - 2.0 * np.sum(d * n, axis=-1, keepdims=True) * n)
 
 
 @np.errstate(under="ignore")
 def refracted_direction(direction: npt.ArrayLike, normal: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
-    """Direction of the light behind a boundary (Snell), (..., 3); zero under total internal reflection.
+    """Direction of the light behind an interface (Snell), (..., 3); zero under total internal reflection.
 
     It is zero where `optics.fresnel_dielectric` of the same cosine is 1, but for grazing incidence on a denser medium,
     which has a direction and carries nothing.
@@ -111,7 +111,7 @@ def _smith_root(cosine: Array, alpha: Array) -> Array:
 
 @np.errstate(under="ignore")
 def slab_transmittance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
-    """Share of light that a thin wall lets through: (1 - r)^2 a / (1 - r^2 a^2), a = exp(-tau) (Stokes 1862).
+    """Transmittance of a thin wall: (1 - r)^2 a / (1 - r^2 a^2), a = exp(-tau) (Stokes 1862).
 
     All reflections between the two parallel boundaries are added up as powers, not amplitudes: the wall is many
     wavelengths thick. The light leaves in the direction in which it came. Together with `slab_reflectance` this is 1 at
@@ -134,6 +134,6 @@ def slab_transmittance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike)
 
 @np.errstate(under="ignore")
 def slab_reflectance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
-    """Share of light that a thin wall sends back: r + r (1 - r)^2 a^2 / (1 - r^2 a^2); as for `slab_transmittance`."""
+    """Reflectance of a thin wall: r + r (1 - r)^2 a^2 / (1 - r^2 a^2); as for `slab_transmittance`."""
     through = slab_transmittance(reflectance, optical_depth)
     return np.asarray(np.asarray(reflectance, np.float64) * (1.0 + optics.transmittance(optical_depth) * through))

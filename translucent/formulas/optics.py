@@ -16,24 +16,24 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 
-#: Smallest cosine that the thin-layer formula divides by (Drobot 2017): a sheet seen edge-on is 1000 times as thick.
+#: Smallest cosine in the thin-layer formula (Drobot 2017): a sheet seen edge-on is 1000 times as thick.
 MIN_THIN_LAYER_COSINE = 0.001
 
 
 def transmittance(optical_depth: npt.ArrayLike) -> Array:
-    """Share of light that passes, T = exp(-tau) (Beer-Lambert); underflows to exactly 0."""
+    """Transmittance, the share of light that passes, T = exp(-tau) (Beer-Lambert); underflows to exactly 0."""
     with np.errstate(under="ignore"):
         return np.exp(-np.asarray(optical_depth, dtype=np.float64))
 
 
 def opacity(optical_depth: npt.ArrayLike) -> Array:
-    """Share of light that is lost, alpha = 1 - exp(-tau), without cancellation at small tau."""
+    """Opacity, the share of light that is lost, alpha = 1 - exp(-tau), without cancellation at small tau."""
     with np.errstate(under="ignore"):
         return -np.expm1(-np.asarray(optical_depth, dtype=np.float64))
 
 
 def log_one_minus(x: npt.ArrayLike) -> Array:
-    """log(1 - x), without cancellation at small x; -inf at x = 1."""
+    """Logarithm log(1 - x), without cancellation at small x; -inf at x = 1."""
     with np.errstate(divide="ignore"):
         return np.log1p(-np.asarray(x, dtype=np.float64))
 
@@ -58,7 +58,7 @@ def extinction_from_color(color: npt.ArrayLike, distance: npt.ArrayLike) -> Arra
 
 
 def mean_transmittance(optical_depth: npt.ArrayLike) -> Array:
-    """(1 - exp(-x)) / x, the mean transmittance over a path of optical depth x; 1 at x = 0."""
+    """Mean transmittance (1 - exp(-x)) / x over a path of optical depth x; 1 at x = 0."""
     x = np.asarray(optical_depth, dtype=np.float64)
     safe = np.where(x == 0, 1.0, x)
     return np.where(x == 0, 1.0, opacity(safe) / safe)
@@ -84,7 +84,7 @@ def opacity_for_step(opacity_at_reference: npt.ArrayLike, step_ratio: npt.ArrayL
 
 @np.errstate(under="ignore")
 def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: npt.ArrayLike) -> Array:
-    """Front over behind for associated (premultiplied) colours: F + (1 - alpha) B (Porter & Duff 1984)."""
+    """Composite of front over behind for associated (premultiplied) colors: F + (1 - alpha) B (Porter & Duff 1984)."""
     return np.asarray(front, np.float64) + (1.0 - np.asarray(front_opacity, np.float64)) * np.asarray(
         behind, np.float64
     )
@@ -92,7 +92,7 @@ def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: n
 
 @np.errstate(under="ignore")
 def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
-    """Unpolarised reflectance of a smooth dielectric boundary; 1 under total internal reflection.
+    """Unpolarized Fresnel reflectance of a smooth dielectric interface; 1 under total internal reflection.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where in a pixel its samples are."""
+"""Positions of samples within a pixel."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ NEUTRAL_DESATURATION = 0.15
 AGX_STOPS = (-10.0, 6.5)
 AGX_MIDDLE_GREY = 0.18
 
-#: AgX: what every channel gets of the three, besides 1 minus their sum of its own: a gamut narrowed towards grey.
+#: AgX: share of each channel mixed into every other, which narrows the gamut towards gray.
 AGX_MIX = (0.04240107095046854, 0.07843650156180276, 0.0791624274877287)
 
 #: AgX: powers of the toe and of the shoulder, slope of the sigmoid between, and the power of the display.
@@ -38,7 +38,7 @@ AGX_DISPLAY = 2.2
 
 
 def tone_none(linear: npt.ArrayLike) -> Array:
-    """Clamped to 0..1."""
+    """Tone curve "none": colors clamped to 0..1."""
     return np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
 
 
@@ -107,7 +107,7 @@ TONES = tuple(_CURVES)
 
 
 def tone_curve(name: str) -> Callable[[npt.ArrayLike], Array]:
-    """The curve of this name.
+    """Tone curve of this name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Light that a layer scatters any number of times, in float64. Each has a twin in ``shaders/lib/two_stream.glsl``.
+"""Two-stream formulas of multiple scattering, in float64. Each has a twin in ``shaders/lib/two_stream.glsl``.
 
 Two diffuse streams, forwards and backwards, lose K to absorption and exchange S per metre. Depths are without unit:
 K d and S d for a layer of thickness d. All functions are pure and broadcast.
@@ -21,12 +21,12 @@ from translucent.formulas import optics
 
 
 def two_stream_absorption(absorption: npt.ArrayLike) -> Array:
-    """K = 2 sigma_a in 1/m: diffuse light travels twice as far as the layer is thick (Gate 1974)."""
+    """Absorption K = 2 sigma_a in 1/m: diffuse light travels twice as far as the layer is thick (Gate 1974)."""
     return 2.0 * np.asarray(absorption, dtype=np.float64)
 
 
 def two_stream_scattering(scattering: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
-    """S = 3/4 sigma_s (1 - g) in 1/m (Gate 1974): of reduced scattering, three quarters turn light around.
+    """Scattering S = 3/4 sigma_s (1 - g) in 1/m (Gate 1974): of reduced scattering, three quarters turn light around.
 
     For diffuse light on a wide slab of an albedo from 0.9, both shares are within 0.03 of the true ones whatever its
     thickness, and within 0.07 from an albedo of 0.5; of light straight on, thin slabs reflect up to half less.
@@ -35,7 +35,7 @@ def two_stream_scattering(scattering: npt.ArrayLike, anisotropy: npt.ArrayLike) 
 
 
 def two_stream_depth(absorption_depth: npt.ArrayLike, scattering_depth: npt.ArrayLike) -> Array:
-    """gamma d = sqrt(K (K + 2 S)) d: a deep layer lets exp(-gamma d) through."""
+    """Two-stream depth gamma d = sqrt(K (K + 2 S)) d: a deep layer lets exp(-gamma d) through."""
     k, s = np.asarray(absorption_depth, dtype=np.float64), np.asarray(scattering_depth, dtype=np.float64)
     # Two roots, so that no product overflows.
     return np.asarray(np.sqrt(k) * np.sqrt(k + 2.0 * s))
@@ -43,7 +43,7 @@ def two_stream_depth(absorption_depth: npt.ArrayLike, scattering_depth: npt.Arra
 
 @np.errstate(under="ignore")
 def two_stream_denominator(absorption_depth: npt.ArrayLike, scattering_depth: npt.ArrayLike) -> Array:
-    """((K + S) sinh(gamma d) / gamma + cosh(gamma d)) exp(-gamma d), which never overflows; 1 + S d at K = 0."""
+    """Denominator ((K + S) sinh(gamma d) / gamma + cosh(gamma d)) exp(-gamma d), without overflow; 1 + S d at K = 0."""
     k, s = np.asarray(absorption_depth, dtype=np.float64), np.asarray(scattering_depth, dtype=np.float64)
     both_ways = 2.0 * two_stream_depth(k, s)
     return np.asarray((k + s) * optics.mean_transmittance(both_ways) + 0.5 * (1.0 + optics.transmittance(both_ways)))
@@ -51,7 +51,7 @@ def two_stream_denominator(absorption_depth: npt.ArrayLike, scattering_depth: np
 
 @np.errstate(under="ignore")
 def two_stream_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: npt.ArrayLike) -> Array:
-    """Share of diffuse light that a layer sends back (Kubelka & Munk 1931): S sinh / ((K + S) sinh + gamma cosh).
+    """Diffuse reflectance of a layer (Kubelka & Munk 1931): S sinh / ((K + S) sinh + gamma cosh).
 
     S d / (1 + S d) where nothing absorbs; 1 + K/S - sqrt((K/S)^2 + 2 K/S) for a layer without end. Boundaries reflect
     nothing: the layer is index-matched.
@@ -68,14 +68,14 @@ def two_stream_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: np
 
 @np.errstate(under="ignore")
 def two_stream_transmittance(absorption_depth: npt.ArrayLike, scattering_depth: npt.ArrayLike) -> Array:
-    """Share of diffuse light that a layer lets through: gamma / ((K + S) sinh + gamma cosh); 1 / (1 + S d) at K = 0."""
+    """Diffuse transmittance of a layer: gamma / ((K + S) sinh + gamma cosh); 1 / (1 + S d) at K = 0."""
     depth = two_stream_depth(absorption_depth, scattering_depth)
     return np.asarray(optics.transmittance(depth) / two_stream_denominator(absorption_depth, scattering_depth))
 
 
 @np.errstate(under="ignore")
 def multiple_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: npt.ArrayLike) -> Array:
-    """`two_stream_reflectance` without the light that turned around just once, S / (2 (K + S)) (1 - exp(-2 (K + S) d)).
+    """Reflectance of a layer without light scattered back only once, S / (2 (K + S)) (1 - exp(-2 (K + S) d)).
 
     To be added to single scattering that is known exactly.
     """

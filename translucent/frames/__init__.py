@@ -1,1 +1,1 @@
-"""What a renderer gives back: frames, their layers and films, and how far they are from the truth."""
+"""Results of a renderer: frames, their arrays as pictures, films, and error metrics."""

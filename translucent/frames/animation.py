@@ -1,4 +1,4 @@
-"""Frames one after the other: animated pictures, films, or numbered files."""
+"""Animations of frames: animated pictures, films, or numbered files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DEFAULT_FPS = 24.0
 
 
 def check_animation(path: Path, fps: float) -> None:
-    """Raise before any work is done where an animation could not be written to `path`.
+    """Raise before any work is done if an animation could not be written to `path`.
 
     Raises
     ------
@@ -49,7 +49,8 @@ def check_animation(path: Path, fps: float) -> None:
 
 
 def write_animation(path: str | Path, frames: Iterable[Pixels], fps: float = DEFAULT_FPS) -> None:
-    """Write frames as they come: an animated ``.webp`` or ``.gif`` that repeats, an ``.mp4``, or a folder of PNG files.
+    """Write frames as they are rendered: an animated ``.webp`` or ``.gif`` that repeats, an ``.mp4``, or a folder of
+    PNG files.
 
     A file appears complete or not at all; in a folder each picture does, as 0000.png and so on.
 

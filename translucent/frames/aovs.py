@@ -1,4 +1,4 @@
-"""Pictures of what a frame knows besides its radiance: thickness in false colors, transmittance, validity."""
+"""Pictures of a frame's AOVs (arrays besides its radiance): thickness in false colors, transmittance, validity."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from translucent.formulas.color import linear_to_srgb
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 
-#: sRGB colors of text and of what lies around it, of pixels without a medium, and of those that cannot be trusted.
+#: sRGB colors of text and of its background, of pixels without a medium, and of invalid pixels.
 INK, PAPER, EMPTY, WRONG = (225, 225, 225), (24, 24, 24), (52, 52, 52), (255, 110, 60)
 SEEN = (90, 165, 225)
 
-#: Units of thickness: the largest of them of which there is at least one.
+#: Units of thickness: the largest one that the thickness exceeds is used.
 UNITS = ((1e3, "km"), (1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 
 #: Steps between marks of a scale, times a power of ten, and how many marks to aim at.
@@ -56,14 +56,14 @@ def aov_pictures(arrays: Arrays, truth: Arrays | None = None) -> dict[str, Pixel
 
 
 def normals_picture(normals: npt.NDArray[Any]) -> Pixels:
-    """The customary colors of normals: red, green and blue for x, y and z, from -1 to 1."""
+    """Picture of normals in the customary colors: red, green and blue for x, y and z, from -1 to 1."""
     pixels = np.rint((0.5 + 0.5 * np.asarray(normals, dtype=np.float64)) * 255.0).astype(np.uint8)
     pixels[~normals.any(axis=-1)] = EMPTY
     return pixels
 
 
 def lengths_picture(lengths: npt.NDArray[Any], coverage: Mask, valid: Mask) -> Pixels:
-    """Metres in false colors from 0 to the largest, with a scale in a metric unit below."""
+    """Picture of lengths in false colors from 0 to the largest, with a scale in a metric unit below."""
     seen = coverage & valid & np.isfinite(lengths)
     most = float(lengths[seen].max(initial=0.0))
     with np.errstate(under="ignore"):
@@ -78,7 +78,7 @@ def lengths_picture(lengths: npt.NDArray[Any], coverage: Mask, valid: Mask) -> P
 
 
 def validity_picture(coverage: Mask, valid: Mask) -> Pixels:
-    """Which pixels crossed a medium, and which cannot be trusted, with their numbers below."""
+    """Picture of covered and of invalid pixels, with their counts below."""
     classes = (
         (EMPTY, "no medium", ~coverage & valid),
         (SEEN, "valid", coverage & valid),
@@ -132,7 +132,7 @@ def marks(most: float) -> list[float]:
 
 
 def _scale(width: int, most: float, unit: str) -> Pixels:
-    """The colors from 0 to `most` of a unit, with marks."""
+    """Color scale from 0 to `most` of a unit, with marks."""
     font = _font(width)
     margin, line = int(font.size), int(1.4 * font.size)
     strip = Image.new("RGB", (width, margin // 2 + line + 2 * line), PAPER)
@@ -154,7 +154,7 @@ def _scale(width: int, most: float, unit: str) -> Pixels:
 
 
 def _with_legend(pixels: Pixels, entries: list[tuple[tuple[int, int, int], str]]) -> Pixels:
-    """The picture, and below it a row for each color."""
+    """Picture with a legend below, a row for each color."""
     width = pixels.shape[1]
     font = _font(width)
     line = int(1.5 * font.size)

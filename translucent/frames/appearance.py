@@ -1,4 +1,4 @@
-"""The color that a medium shows on a mesh: transmittance averaged over how thick the mesh is, pixel by pixel.
+"""Average color of a medium on a mesh: transmittance averaged over the thickness of each pixel.
 
 A color at one distance is not the color of an object: its thin parts let more light through. Here the distances are
 those of a rendered frame, T_mean = mean(exp(-sigma d)), and the inverse finds the extinction for a color as seen.
@@ -23,7 +23,7 @@ from translucent.media.conversion import CHANNELS, CLAMP
 from translucent.media.medium import Medium
 from translucent.media.swatches import html_swatches
 
-#: Shares of the pixels that are thinner than the thicknesses by which a mesh is described.
+#: Quantiles of the thickness by which a mesh is described.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 _MAX_STEPS = 200
@@ -31,7 +31,7 @@ _MAX_STEPS = 200
 
 @dataclass(frozen=True, eq=False)
 class Appearance:
-    """How a medium looks on a mesh before white light.
+    """Appearance of a medium on a mesh before white light.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Appearance:
     thin_share: Array
 
     def summary(self) -> dict[str, Any]:
-        """The numbers as JSON can hold them; lengths in metres."""
+        """Summary as values that JSON can hold; lengths in metres."""
         with np.errstate(under="ignore"):
             parts = [
                 {"thinner": share, "thickness": metres, "color": color, "hex": to_hex(color)}
@@ -84,7 +84,7 @@ class Appearance:
 
 
 def appearance_of(seen: Frame | npt.ArrayLike, medium: Medium) -> Appearance:
-    """How a medium looks on a mesh, from a frame of it (whose medium does not matter) or thickness in metres per pixel.
+    """Appearance of a medium on a mesh, from any frame of the mesh or from thickness in metres per pixel.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def appearance_of(seen: Frame | npt.ArrayLike, medium: Medium) -> Appearance:
 
 
 def thickness_samples(seen: Frame | npt.ArrayLike) -> Array:
-    """Thickness in metres of what is seen: a frame's covered and valid pixels, or an array as it is, flat.
+    """Samples of thickness in metres: a frame's covered and valid pixels, or an array as it is, flat.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def extinction_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.A
 
 
 def medium_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.ArrayLike, ior: float = 1.0) -> Medium:
-    """Absorbing medium in which a mesh shows `color` on average, for a frame or thickness in metres per pixel.
+    """Absorbing medium with which a mesh has `color` on average, for a frame or thickness in metres per pixel.
 
     See `extinction_for_average_color` for ranges and errors. The camera matters: other views see other thickness.
     """
@@ -192,7 +192,7 @@ def _solve(thickness: Array, name: str, target: float) -> float:
 
 
 def _root(shares: Array, goal: float) -> float:
-    """x >= 0 where log(mean(exp(-x shares))) = goal: Newton within a bracket, else bisection.
+    """Root x >= 0 of log(mean(exp(-x shares))) = goal: Newton within a bracket, else bisection.
 
     The logarithm of the mean is convex and falls, so Newton from the left never passes the root; the bracket is for
     rounding. By Jensen's inequality, x = -goal (the shares' mean is 1) is at the root or left of it.

@@ -1,4 +1,4 @@
-"""Films: pictures through ffmpeg, which is asked how it ended, and whether the film is whole."""
+"""Films through ffmpeg, whose exit status and output are checked."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import numpy as np
 
 from translucent.arrays import Pixels
 
-#: Constant rate factor of H.264, 0 to 51: what is lost is hardly seen.
+#: Constant rate factor of H.264, 0 to 51: the loss is hardly visible.
 _RATE_FACTOR = 10
 
-#: Characters of what ffmpeg says that an error repeats.
+#: Largest number of characters of ffmpeg's output in an error.
 _MOST_TOLD = 120
 
 
@@ -68,7 +68,7 @@ def _arguments(width: int, height: int, fps: float) -> list[str]:
 
 
 class _Told:
-    """What a process says of its errors; read while it runs, lest it waits for somebody to do so."""
+    """Reader of a process's error output, so that the process never blocks on a full pipe."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self._said = b""
@@ -88,6 +88,6 @@ class _Told:
 
 
 def _even(picture: Pixels) -> Pixels:
-    """The picture with its last row and column twice where their number is odd: color is stored for 2 by 2 pixels."""
+    """Pad a picture to even size by repeating its last row and column: color is stored for 2 by 2 pixels."""
     height, width = picture.shape[:2]
     return np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")

@@ -22,13 +22,13 @@ from translucent.planning.render_plan import RenderPlan
 #: The arrays of a frame, under the names that .npz files use.
 ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage", "valid")
 
-#: More of them, that frames of ordered methods have.
+#: Additional arrays of frames of ordered methods.
 LAYER_ARRAYS = ("layers", "truncated")
 
-#: What frames without a background have, and those of bodies with interfaces.
+#: Additional arrays of frames without a background, and of bodies with interfaces.
 MATTE_ARRAYS = ("alpha", "normals")
 
-#: Stops beyond which radiance would leave what float64 can hold, or be black for sure.
+#: Largest exposure in stops, beyond which radiance would overflow float64 or be black.
 MAX_EXPOSURE = 100.0
 
 
@@ -95,7 +95,7 @@ class Frame:
         return {name: array for name, array in every.items() if array is not None}
 
     def summary(self) -> dict[str, Any]:
-        """What happened, in numbers that JSON can hold; thickness in metres over the valid, covered pixels."""
+        """Statistics of the frame as values that JSON can hold; thickness in metres over the valid, covered pixels."""
         seen = self.thickness[self.coverage & self.valid]
         found: dict[str, Any] = {
             "size": list(self.size),
@@ -111,7 +111,7 @@ class Frame:
         return found
 
     def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
-        """(h, w, 3) uint8: the radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
+        """(h, w, 3) uint8: radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
         A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them. Where it shines
         more than it hides, alpha is raised to what the brightest channel needs.
@@ -190,7 +190,7 @@ class Frame:
 
 
 def check_exposure(stops: float) -> float:
-    """The exposure, if it is one.
+    """Check an exposure; raises `InputError` if it is out of range.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The files of a frame: a picture, or its arrays."""
+"""Writing of frames: a picture, or its arrays."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from translucent.files.paths import require_place, write_atomically
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 
-#: Of files that hold a frame.
+#: Suffixes of files that hold a frame.
 SUFFIXES = (".png", ".exr", ".npz")
 
 
 def check_output(path: Path) -> None:
-    """Raise before any work is done where a frame could not be written to `path`."""
+    """Raise before any work is done if a frame could not be written to `path`."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
     require_place(path, f"output {str(path)!r}")
@@ -60,7 +60,7 @@ def write_frame(path: Path, arrays: Arrays, picture: Callable[[], Pixels]) -> No
 
 
 def write_pictures(folder: Path, pictures: Iterable[tuple[str, Pixels]]) -> list[Path]:
-    """Write named pictures as PNG files into a folder that is made if need be; the files.
+    """Write named pictures as PNG files into a folder that is made if needed; returns the files.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def write_pictures(folder: Path, pictures: Iterable[tuple[str, Pixels]]) -> list
 
 
 def _channels(arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
-    """What an OpenEXR file calls them."""
+    """Channel names of an OpenEXR file."""
     channels = {"RGB": arrays["radiance"]}
     if "normals" in arrays:
         channels |= _split("normals", "XYZ", arrays)

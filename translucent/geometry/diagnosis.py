@@ -1,4 +1,4 @@
-"""What is wrong with a triangle mesh, counted, with the first offenders named.
+"""Diagnosis of a triangle mesh: its defects, counted, with the first offenders named.
 
 The question that matters for thickness is whether every ray enters as often as it leaves. That holds exactly when the
 faces form a cycle: every directed edge is used as often in one direction as in the other. Winding numbers are integers
@@ -17,16 +17,16 @@ from translucent.geometry.repair import spread_winding
 from translucent.geometry.sample_lines import winds_negatively
 from translucent.geometry.winding import inside_out_parts
 
-#: A dent not deeper than this share of the size leaves a body convex.
+#: Deepest dent of a convex body, as a share of its size.
 CONVEX_TOLERANCE = 1e-6
 
-#: How many offenders a finding names.
+#: Largest number of offenders that a finding names.
 FIRST = 3
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One kind of defect.
+    """Finding of one kind of defect.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Diagnosis:
 
     @property
     def sound(self) -> bool:
-        """Solid, and nowhere inside out: exits minus entries is the thickness along every ray."""
+        """Whether the mesh is solid and nowhere inside out: exits minus entries is the thickness along every ray."""
         return self.solid and not self.inside_out
 
     @property
@@ -201,7 +201,7 @@ class _Edges:
         return Finding(int(mask.sum()), tuple((int(a), int(b)) for a, b in self.pairs[mask][:FIRST]))
 
     def components(self) -> int:
-        """Parts that hang together by edges."""
+        """Connected components by shared edges."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -213,7 +213,7 @@ class _Edges:
         return int(connected_components(graph, directed=False, return_labels=False))
 
     def all_convex(self, vertices: npt.NDArray[np.float64], orientation: float) -> bool:
-        """Whether no edge bends inwards; with one closed component of genus 0 that means a convex body."""
+        """Whether all edges are convex; with one closed component of genus 0 that means a convex body."""
         if not (self.total == 2).all() or orientation == 0:
             return False
         used = used_vertices(self.faces)
@@ -231,13 +231,13 @@ class _Edges:
 
 
 def _inside_out(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int64]) -> int:
-    """Number of closed parts that look inwards and lie inside no other."""
+    """Number of closed parts that face inwards and lie inside no other."""
     part, _ = spread_winding(faces)
     return len(inside_out_parts(vertices, faces, part))
 
 
 def _collapsed(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Faces with two corners at one position: they have no side and no part in the cycle."""
+    """Faces with two corners at one position: they have no side and do not belong to the cycle."""
     return np.asarray((faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1))
 
 

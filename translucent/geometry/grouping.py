@@ -1,4 +1,4 @@
-"""What is the same in a mesh: vertices at one position, edges that several faces share.
+"""Grouping of equal elements of a mesh: vertices at one position, edges that several faces share.
 
 Sorting whole rows at once, as `numpy.unique` does, takes ten times as long and holds the interpreter's lock meanwhile,
 which is felt with millions of faces while a window is open.
@@ -18,7 +18,7 @@ from translucent.arrays import Integers
 
 @dataclass(frozen=True)
 class Groups:
-    """Things of which some are equal.
+    """Groups of equal elements.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Groups:
 
     @cached_property
     def sizes(self) -> Integers:
-        """(k,): how many are in each group."""
+        """(k,): number of elements in each group."""
         return np.bincount(self.of, minlength=len(self.first))
 
 
@@ -47,7 +47,7 @@ def equal_rows(rows: npt.NDArray[Any]) -> Groups:
 
 
 def position_ids(vertices: npt.NDArray[np.float64]) -> Integers:
-    """For each vertex, a number that all vertices at exactly the same position share: the first one's index."""
+    """Position id of each vertex: the first index of all vertices at exactly the same position."""
     groups = equal_rows(vertices)
     return groups.first[groups.of]
 
@@ -76,7 +76,7 @@ def used_vertices(faces: npt.NDArray[np.integer]) -> Integers:
 
 
 def _groups(order: npt.NDArray[np.intp], changes: npt.NDArray[np.bool_]) -> Groups:
-    """Groups of what is in order, from where the next thing is another one."""
+    """Groups of sorted elements, from where the next element differs."""
     begins = np.ones(len(order), dtype=bool)
     begins[1:] = changes
     of = np.empty(len(order), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Triangle meshes: a frozen value, and its geometry in float64."""
+"""Triangle meshes: immutable values with their geometry in float64."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MIN_DIAGONAL = 1e-18
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Frozen):
-    """Triangles with shared vertices. Compared by identity; its arrays are read-only.
+    """Triangle mesh with shared vertices. Compared by identity; its arrays are read-only.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Mesh(Frozen):
 
     @cached_property
     def diagnosis(self) -> Diagnosis:
-        """What is wrong with the mesh, and whether it bounds a solid."""
+        """Diagnosis of the mesh: its defects, and whether it bounds a solid."""
         return diagnose(self.vertices, self.faces)
 
     @cached_property
@@ -159,7 +159,7 @@ class Mesh(Frozen):
         return np.where(length > 0, normals / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0))
 
     def winding_number(self, point: npt.ArrayLike) -> float:
-        """How often the surface winds around `point`: 0 outside, 1 inside, a fraction on it or near a hole."""
+        """Winding number of the surface around `point`: 0 outside, 1 inside, a fraction on it or near a hole."""
         return winding_number(self.vertices[self.faces], point)
 
     def is_near(self, point: npt.ArrayLike, distance: float) -> bool:
@@ -174,7 +174,7 @@ class Mesh(Frozen):
         return bool((np.linalg.norm(nearest - target, axis=1) <= distance).any())
 
     def summary(self) -> dict[str, object]:
-        """What is known about the mesh, in values that JSON can hold; lengths in metres."""
+        """Summary of the mesh as values that JSON can hold; lengths in metres."""
         found = self.diagnosis
         return {
             "name": self.name,
@@ -190,13 +190,13 @@ class Mesh(Frozen):
         }
 
     def require_finite(self) -> None:
-        """Raise `InputError` where coordinates are not finite, or the mesh is too large or small for float32."""
+        """Raise `InputError` if coordinates are not finite, or the mesh is too large or small for float32."""
         if self._refusal is not None:
             raise InputError(f"mesh {self.name!r}", *self._refusal)
 
     @cached_property
     def _refusal(self) -> tuple[str, str] | None:
-        """Why coordinates cannot be used, and what to do; found once for all objects that share the mesh."""
+        """Reason why coordinates cannot be used, and advice; found once for all objects that share the mesh."""
         bad = np.flatnonzero(~np.isfinite(self.vertices).all(axis=1))
         if len(bad):
             return f"{len(bad)} vertices are not finite (first: {bad[0]})", "export the mesh again"
@@ -209,7 +209,7 @@ class Mesh(Frozen):
 
 
 def mended(raw: Mesh) -> Mesh:
-    """`raw` welded and consistently wound, with its repairs on record."""
+    """Weld `raw` and wind it consistently, with its repairs on record."""
     corners = raw.vertices[raw.faces]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     # A stray vertex far away makes the diagonal huge; what is short beside the usual edge is still one point.

@@ -12,7 +12,7 @@ from translucent.arrays import Array, Integers
 from translucent.geometry.grouping import equal_rows
 from translucent.geometry.mesh import Mesh
 
-#: Edges whose faces meet at a larger angle than this, in radians, are creases; modelling tools offer 30 to 60 degrees.
+#: Smallest angle between the faces of a crease, in radians; modeling tools offer 30 to 60 degrees.
 CREASE = math.radians(40.0)
 
 
@@ -50,7 +50,7 @@ def corner_angles(corners: Array) -> Array:
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=2), (a * b).sum(axis=2)))
 
 
-#: Of meshes that have been drawn, or are about to be.
+#: Cached normals of meshes that have been drawn, or are about to be.
 _drawn: WeakKeyDictionary[Mesh, npt.NDArray[np.float32]] = WeakKeyDictionary()
 
 
@@ -62,7 +62,7 @@ def drawn_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
 
 
 def keep_drawn_normals(mesh: Mesh, normals: npt.NDArray[np.floating]) -> None:
-    """Let `drawn_normals` be these, which have been made elsewhere."""
+    """Cache these `drawn_normals`, which have been made elsewhere."""
     _drawn[mesh] = normals.astype(np.float32, copy=False)
 
 

@@ -1,4 +1,4 @@
-"""The repairs that are safe: weld vertices that are one point, and wind all faces of a part alike, outwards.
+"""Safe repairs of a mesh: welding of coincident vertices, and consistent outward winding.
 
 Nothing here invents geometry. A hole stays a hole, and what is ambiguous stays as it was made.
 """
@@ -14,16 +14,16 @@ from translucent.geometry.winding import inside_out_parts
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
 
-#: Vertices closer than this share of the bounding-box diagonal are one point. Files store float32 at best, whose last
-#: bit is 6e-8 of the coordinate: CAD exports differ by some of these between neighbouring faces.
+#: Welding distance as a share of the bounding-box diagonal. Files store float32 at best, whose last bit is 6e-8 of the
+#: coordinate: CAD exports differ by some of these between neighbouring faces.
 WELD_TOLERANCE = 1e-6
 
-#: Nor are vertices one point that are farther apart than this share of the median edge.
+#: Largest welding distance as a share of the median edge.
 WELD_EDGE_SHARE = 1e-2
 
 
 def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
-    """For each vertex the index of the vertex that stands for all those within `tolerance` of one another.
+    """Index, for each vertex, of the vertex that replaces all those within `tolerance` of one another.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
 
 
 def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
-    """Wind the faces of each edge-connected part alike, and turn parts that are inside out.
+    """Wind the faces of each edge-connected part consistently, and flip parts that are inside out.
 
     A part is turned outwards only if it is closed and lies inside no other part: a shell within another is a cavity,
     and keeps the sense that it has.
@@ -83,7 +83,7 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
 
 
 def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
-    """Part of each face, and whether it must be turned to agree with the majority of its part.
+    """Part of each face, and whether the face must be flipped to agree with the majority of its part.
 
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice
     is one connected component of that graph.

@@ -1,4 +1,4 @@
-"""Whether a surface is inside out somewhere: winding numbers along sample lines in three directions."""
+"""Detection of inside-out surfaces: winding numbers along sample lines in three directions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from translucent.arrays import Array, Integers
 #: What is smaller than a cell can slip through.
 LINES = (12, 96)
 
-#: On a share of the diagonal, rounding and welding may wind a surface negatively.
+#: Share of the diagonal on which rounding and welding may wind a surface negatively.
 NEGATIVE = 1e-5
 
 #: Pairs of a triangle and a line that are tested at a time: the working arrays stay below 100 MB.
@@ -57,7 +57,7 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
 def _chunks(
     points: Array, faces: npt.NDArray[np.integer], lines: int, direction: Integers
 ) -> Iterator[tuple[Integers, Array, Integers]]:
-    """What the lines along the last axis meet of faces with points within -0.5 to 0.5; see `_crossings`."""
+    """Crossings, in chunks, of the lines along the last axis with faces within -0.5 to 0.5; see `_crossings`."""
     scaled = (points[:, :2] + 0.5) * lines - 0.5
     first, count = zip(*(_span(column[faces]) for column in scaled.T), strict=True)
     pairs = count[0] * count[1]

@@ -1,4 +1,4 @@
-"""Below the analytic solids: surfaces of revolution, and lines against slabs and quadrics without cancellation."""
+"""Helpers of the analytic solids: surfaces of revolution, and lines against slabs and quadrics without cancellation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from translucent.geometry.mesh import Mesh
 
 
 def revolve(profile: npt.ArrayLike, segments: int, closed: bool = False) -> tuple[Array, npt.NDArray[np.int32]]:
-    """Surface that a profile sweeps around z; outwards where the solid is on the left of the profile's course.
+    """Surface of revolution of a profile around z; outwards where the solid is on the left of the profile's course.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def dot(a: Array, b: Array) -> Array:
 
 
 def nearest_to_zero(point: Array, direction: Array) -> tuple[Array, Array]:
-    """The point of each line nearest to 0, and how far along the line it is.
+    """Point of each line nearest to 0, and its distance along the line.
 
     From there a quadric's terms have the size of the solid, however far away the ray began. The second round removes
     what the first, with its large numbers, has left along the line.
@@ -75,7 +75,7 @@ def nearest_to_zero(point: Array, direction: Array) -> tuple[Array, Array]:
 
 
 def between(position: Array, velocity: Array, half: Array) -> tuple[Array, Array]:
-    """When `position + t velocity` is within [-half, half]: elementwise first and last t; start > end says never."""
+    """First and last t with `position + t velocity` within [-half, half], elementwise; none where start > end."""
     moving = velocity != 0
     safe = np.where(moving, velocity, 1.0)
     always = np.where(np.abs(position) <= half, np.inf, -np.inf)

@@ -23,7 +23,7 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 class Solid(ABC):
-    """A body whose surface and whose path length along any ray are known in closed form."""
+    """Solid whose surface and whose path length along any ray are known in closed form."""
 
     @property
     @abstractmethod
@@ -76,7 +76,7 @@ class Solid(ABC):
 
 
 class _Intervals(Solid):
-    """A solid that knows the pieces of a line inside it."""
+    """Base class of solids that compute the pieces of a line inside them."""
 
     def _length(self, origins: Array, directions: Array) -> Array:
         nearest, shift = nearest_to_zero(origins - self._middle(), directions)
@@ -89,14 +89,14 @@ class _Intervals(Solid):
 
     @abstractmethod
     def _inside(self, point: Array, direction: Array) -> Array:
-        """(n, k, 2): where each line enters and leaves, as distances from `point`; start >= end says empty.
+        """(n, k, 2): entry and exit of each line, as distances from `point`; start >= end says empty.
 
         `point` (n, 3) is relative to the middle, and the line's nearest to it.
         """
 
 
 class _Round(_Intervals):
-    """An ellipsoid, whatever its parameters are called."""
+    """Base class of ellipsoids, whatever their parameters are called."""
 
     @abstractmethod
     def _shape(self) -> tuple[Vector, Vector]:
@@ -138,7 +138,7 @@ class _Round(_Intervals):
 
 @dataclass(frozen=True)
 class Sphere(_Round):
-    """All points within `radius` metres of `center`."""
+    """Sphere of all points within `radius` metres of `center`."""
 
     center: Vector = ORIGIN
     radius: float = 1.0
@@ -152,7 +152,7 @@ class Sphere(_Round):
 
 @dataclass(frozen=True)
 class Ellipsoid(_Round):
-    """An ellipsoid along the axes, with `radii` in metres."""
+    """Axis-aligned ellipsoid, with `radii` in metres."""
 
     center: Vector = ORIGIN
     radii: Vector = (1.0, 1.0, 1.0)
@@ -166,7 +166,7 @@ class Ellipsoid(_Round):
 
 @dataclass(frozen=True)
 class Box(_Intervals):
-    """The box along the axes between the corners `low` and `high`, in metres."""
+    """Axis-aligned box between the corners `low` and `high`, in metres."""
 
     low: Vector = (-0.5, -0.5, -0.5)
     high: Vector = (0.5, 0.5, 0.5)
@@ -176,7 +176,7 @@ class Box(_Intervals):
 
     @classmethod
     def slab(cls, size: tuple[float, float] = (1.0, 1.0), thickness: float = 1e-3) -> Box:
-        """A plate centered on the origin: `size` along x and y, `thickness` along z, in metres."""
+        """Plate centered on the origin: `size` along x and y, `thickness` along z, in metres."""
         high = (size[0] / 2, size[1] / 2, thickness / 2)
         return cls((-high[0], -high[1], -high[2]), high)
 
@@ -206,7 +206,7 @@ class Box(_Intervals):
 
 @dataclass(frozen=True)
 class Torus(_Intervals):
-    """A ring around z through the origin: a tube of radius `minor` about a circle of radius `major`, in metres."""
+    """Torus around z through the origin: a tube of radius `minor` about a circle of radius `major`, in metres."""
 
     major: float = 1.0
     minor: float = 0.25
@@ -235,7 +235,7 @@ class Torus(_Intervals):
         return ((self.major + self.minor) * h**2 + self.minor * (2.0 * h * k + k**2)) / 8.0
 
     def _inside(self, point: Array, direction: Array) -> Array:
-        """Four pieces of each line, cut where the quartic of the torus turns, so that each has one root at most.
+        """Pieces of each line inside the torus, between roots of its quartic, which are bracketed by its extrema.
 
         The roots themselves are found in the surface's own equation, whose rounding is far below that of the quartic's
         coefficients. A double root that rounding hides costs less than sqrt(epsilon): a tangent has no more digits.
@@ -291,7 +291,7 @@ class Torus(_Intervals):
 
 @dataclass(frozen=True)
 class Frustum(_Intervals):
-    """A capped cone around z, from -height/2 to height/2; a cylinder, or a cone where one radius is 0. In metres."""
+    """Capped cone around z, from -height/2 to height/2; a cylinder, or a cone where one radius is 0. In metres."""
 
     bottom_radius: float = 1.0
     top_radius: float = 0.0
@@ -338,7 +338,7 @@ class Frustum(_Intervals):
 
 
 class _Spheres(Solid):
-    """Spheres that do not meet: bodies, or cavities in one."""
+    """Base class of disjoint spheres: bodies, or cavities in one."""
 
     @abstractmethod
     def _parts(self) -> tuple[tuple[Sphere, int], ...]:
@@ -366,7 +366,7 @@ class _Spheres(Solid):
 
 @dataclass(frozen=True)
 class SphericalShell(_Spheres):
-    """A hollow sphere: the points between the radii `inner` and `outer` about `center`, in metres."""
+    """Hollow sphere: the points between the radii `inner` and `outer` about `center`, in metres."""
 
     outer: float = 1.0
     inner: float = 0.5
@@ -381,7 +381,7 @@ class SphericalShell(_Spheres):
 
 @dataclass(frozen=True)
 class TwoSpheres(_Spheres):
-    """Two spheres that do not meet."""
+    """Two disjoint spheres."""
 
     first: Sphere
     second: Sphere

@@ -1,4 +1,4 @@
-"""Bare triangles, before they are a mesh: as files hold them, in the files' units."""
+"""Raw triangles, as files hold them, in the files' units."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import InputError
 
-#: Vertices (n, 3), faces (m, 3), and texture coordinates (n, 2) if there are some.
+#: Raw triangles: vertices (n, 3), faces (m, 3), and texture coordinates (n, 2) if there are some.
 Triangles = tuple[Array, npt.NDArray[np.int32], Array | None]
 
 
 def joined(parts: list[Triangles], asked: str) -> Triangles:
-    """The triangles of all parts; raises `InputError` if there are none."""
+    """Concatenate the triangles of all parts; raises `InputError` if there are none."""
     if not parts:
         raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
     starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts[:-1])])

@@ -1,4 +1,4 @@
-"""Which side of a surface a point is on, and which parts of a mesh are inside out."""
+"""Winding numbers of points, and parts of a mesh that are inside out."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.geometry.grouping import shared_edges, side_ends
 
-#: A closed part counts as inside out if its volume is below minus this share of its cubed size: less is rounding.
+#: Smallest negative volume of an inside-out part, as a share of its cubed size: less is rounding.
 _FLAT = 1e-12
 
 
 def winding_number(corners: Array, point: npt.ArrayLike) -> float:
-    """How often triangles wind around a point: the sum of their solid angles over 4 pi (van Oosterom & Strackee 1983).
+    """Winding number of triangles: the sum of their solid angles over 4 pi (van Oosterom & Strackee 1983).
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def winding_number(corners: Array, point: npt.ArrayLike) -> float:
 def inside_out_parts(
     vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.int64]:
-    """Closed parts that look inwards without being a cavity: they lie inside no other part.
+    """Closed parts that face inwards without being a cavity: they lie inside no other part.
 
     Parameters
     ----------

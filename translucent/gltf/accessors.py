@@ -1,4 +1,4 @@
-"""The arrays of a glTF file: accessors of its buffers, strided, sparse and normalized.
+"""Accessors of a glTF file: arrays in its buffers, strided, sparse and normalized.
 
 Source: glTF 2.0, section 3.6 (binary data storage), and KHR_mesh_quantization, which lets positions be integers.
 """
@@ -23,12 +23,12 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
-#: Bytes that a vertex costs until its mesh is welded and diagnosed: counted where no buffer holds it.
+#: Bytes of memory per vertex until its mesh is welded and diagnosed: counted where no buffer holds it.
 _MADE_UP = 512
 
 
 class Accessors:
-    """Arrays of a file, by the index of their accessor; what is made of them may take what `require_room` allows."""
+    """Arrays of a file, by the index of their accessor; the memory that they take is limited by `require_room`."""
 
     def __init__(self, file: GltfFile) -> None:
         self.file = file
@@ -79,7 +79,7 @@ class Accessors:
         return found, entry
 
     def keep(self, what: str, size: int) -> None:
-        """Count the bytes of a mesh that is kept: many that share one buffer make no small file a large one."""
+        """Count the bytes of a mesh that is kept, since many meshes may share one buffer of a small file."""
         self._kept += size
         self._require_room(f"{what} and what was read before it", self._kept)
 
@@ -87,7 +87,7 @@ class Accessors:
         require_room(f"glTF {str(self.file.path)!r}", what, size, self.file.stored, "split the file")
 
     def _replaced(self, where: str, sparse: Json, stored: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """A copy of `stored` with those elements exchanged that a sparse accessor lists."""
+        """Copy of `stored` with the elements of a sparse accessor replaced."""
         count = whole(self.file, where, sparse, "count")
         indices = section(self.file, where, sparse, "indices")
         values = section(self.file, where, sparse, "values")
@@ -105,7 +105,7 @@ class Accessors:
         return np.dtype(COMPONENTS[code])
 
     def _block(self, where: str, entry: Json, dtype: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
-        """(count, width): what a buffer view holds from the entry's offset on."""
+        """(count, width): contents of a buffer view from the entry's offset on."""
         view = self.file.item("bufferViews", entry.get("bufferView"))
         data = self.file.buffer(view.get("buffer"))
         start, length = (whole(self.file, where, view, key, 0) for key in ("byteOffset", "byteLength"))

@@ -18,7 +18,7 @@ from translucent.scene.camera import Camera
 def scene_camera(
     file: GltfFile, transforms: dict[int, Array], index: int | None, metres: float, left_out: LeftOut
 ) -> Camera | None:
-    """The camera of this index; None if none is asked for, or if the first is and there is none.
+    """Camera of this index; None if none is asked for, or if the first is asked for and the file has none.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def _axes(file: GltfFile, where: str, linear: Array) -> Array:
 
 
 def require_regular(file: GltfFile, where: str, linear: Array) -> None:
-    """Raise `InputError` if a transform (3, 3) flattens space, so that directions are lost."""
+    """Raise `InputError` if a transform (3, 3) is singular."""
     if np.linalg.matrix_rank(linear) < 3:
         raise refused(
             file,

@@ -1,4 +1,4 @@
-"""Values of a glTF file's JSON, checked, and the one form of a refusal."""
+"""Checked values of a glTF file's JSON, and the common form of its errors."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from translucent.gltf.file import GltfFile, Json
 
 
 def refused(file: GltfFile, found: str, do: str = "export the file again") -> InputError:
-    """The error for a file that cannot become a scene."""
+    """Error for a file that cannot be read as a scene."""
     return InputError(f"glTF {str(file.path)!r}", found, do)
 
 
 def label(items: list[Json], index: int) -> str:
-    """What messages call an item of a list: its name in quotes, or its index."""
+    """Label of a list's item in messages: its name in quotes, or its index."""
     name = items[index].get("name")
     return repr(name) if isinstance(name, str) and name else f"number {index}"
 
 
 def section(file: GltfFile, where: str, holder: Json, key: str) -> Json:
-    """The object that `holder` has as `key`; empty if it has none.
+    """Object of `holder` under `key`; empty if it has none.
 
     Raises
     ------
@@ -35,12 +35,12 @@ def section(file: GltfFile, where: str, holder: Json, key: str) -> Json:
 
 
 def extension(file: GltfFile, where: str, holder: Json, name: str) -> Json:
-    """What an extension says of `holder`; empty if it says nothing."""
+    """Object of an extension of `holder`; empty if it is absent."""
     return section(file, where, section(file, where, holder, "extensions"), name)
 
 
 def number(file: GltfFile, where: str, holder: Json, key: str, default: float | None = None) -> float:
-    """A number of `holder`; raises `InputError` if it is none, or missing without a default."""
+    """Number of `holder`; raises `InputError` if it is not a number, or missing without a default."""
     value = holder.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise refused(file, f"{where}: {key} is {value!r}, not a number")
@@ -48,7 +48,7 @@ def number(file: GltfFile, where: str, holder: Json, key: str, default: float | 
 
 
 def share(file: GltfFile, where: str, holder: Json, key: str, default: float) -> float:
-    """A number of `holder` in 0..1; raises `InputError` if it is none."""
+    """Number of `holder` in 0..1; raises `InputError` if it is not one."""
     value = number(file, where, holder, key, default)
     if not 0 <= value <= 1:
         raise refused(file, f"{where}: {key} {value:g} is not in 0..1", "mend the file")
@@ -56,7 +56,7 @@ def share(file: GltfFile, where: str, holder: Json, key: str, default: float) ->
 
 
 def shares(file: GltfFile, where: str, holder: Json, key: str, default: tuple[float, ...]) -> Array:
-    """As many numbers in 0..1 as the default has; raises `InputError` if they are others."""
+    """Numbers in 0..1, as many as the default has; raises `InputError` otherwise."""
     values = numbers(file, where, holder, key, default)
     if not ((values >= 0) & (values <= 1)).all():
         raise refused(file, f"{where}: {key} {values.tolist()} is not in 0..1", "mend the file")
@@ -64,7 +64,7 @@ def shares(file: GltfFile, where: str, holder: Json, key: str, default: tuple[fl
 
 
 def whole(file: GltfFile, where: str, holder: Json, key: str, default: int | None = None) -> int:
-    """A whole number of 0 or more of `holder`; raises `InputError` if it is none."""
+    """Nonnegative integer of `holder`; raises `InputError` if it is not one."""
     value = holder.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
         raise refused(file, f"{where}: {key} is {value!r}, not a whole number of 0 or more")
@@ -72,7 +72,7 @@ def whole(file: GltfFile, where: str, holder: Json, key: str, default: int | Non
 
 
 def numbers(file: GltfFile, where: str, holder: Json, key: str, default: tuple[float, ...]) -> Array:
-    """As many numbers as the default has; raises `InputError` if they are others."""
+    """Numbers, as many as the default has; raises `InputError` otherwise."""
     values = holder.get(key, list(default))
     if not isinstance(values, list) or len(values) != len(default):
         raise refused(file, f"{where}: {key} is {values!r}, not {len(default)} numbers")

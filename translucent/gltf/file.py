@@ -17,7 +17,7 @@ from translucent.files.reading import json_value, linked_file, read_bytes
 
 Json = dict[str, Any]
 
-#: Of GLB: how it begins, the kinds of its chunks, its header and that of a chunk.
+#: Constants of GLB: magic number, kinds of chunks, header of the file and of a chunk.
 MAGIC, GLB_VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
@@ -25,7 +25,7 @@ HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 
 @dataclass(frozen=True)
 class GltfFile:
-    """A glTF file: its JSON as `tree`, and for .glb what follows it as `chunks`, headers included.
+    """Contents of a glTF file: its JSON as `tree`, and for .glb the chunks after it as `chunks`, headers included.
 
     Files that it links to are read from its own folder, and from elsewhere where `allow_outside` says so.
     """
@@ -34,12 +34,12 @@ class GltfFile:
     tree: Json
     chunks: bytes = b""
     allow_outside: bool = False
-    #: The lists that have been looked through, with their lengths: once is enough, and there are many look-ups.
+    #: Lists that have been checked, with their lengths, so that each is checked once.
     _checked: dict[str, tuple[list[Json], int]] = field(default_factory=dict, init=False, repr=False, compare=False)
     _buffers: dict[int, bytes] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def items(self, key: str) -> list[Json]:
-        """The objects of a top-level list such as ``"materials"``; raises `InputError` if it is none."""
+        """The objects of a top-level list such as ``"materials"``; raises `InputError` if it is not one."""
         found: list[Json] = self.tree.get(key, [])
         if (known := self._checked.get(key)) is not None and known[0] is found and known[1] == len(found):
             return known[0]
@@ -49,7 +49,7 @@ class GltfFile:
         return found
 
     def item(self, key: str, index: object) -> Json:
-        """One object of such a list; raises `InputError` if the index points at none."""
+        """Object of such a list by index; raises `InputError` if there is none."""
         found = self.items(key)
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(found):
             raise InputError(
@@ -58,7 +58,7 @@ class GltfFile:
         return found[index]
 
     def resource(self, holder: Json) -> bytes:
-        """Bytes of a buffer or image: from its data URI, the file beside, its buffer view, or the binary chunk."""
+        """Bytes of a buffer or image: from its data URI, a linked file, its buffer view, or the binary chunk."""
         if "bufferView" in holder and not isinstance(holder.get("uri"), str):
             view = self.item("bufferViews", holder["bufferView"])
             whole = self.buffer(view.get("buffer"))
@@ -79,7 +79,7 @@ class GltfFile:
 
     @property
     def stored(self) -> int:
-        """Bytes that have been read so far, of the file and of what it links to, JSON apart."""
+        """Number of bytes read so far, of the file and of its links, without the JSON."""
         return len(self.chunks) + sum(map(len, self._buffers.values()))
 
     def _content(self, holder: Json) -> bytes:
@@ -105,7 +105,7 @@ class GltfFile:
 
 
 def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
-    """Read a .gltf or .glb file; which of them it is says its content.
+    """Read a .gltf or .glb file; its content tells which of them it is.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def read_gltf(path: str | Path, allow_outside: bool = False) -> GltfFile:
 
 
 def _split(asked: str, data: bytes) -> tuple[bytes, bytes]:
-    """The JSON of a .glb, and all that follows it."""
+    """Split a .glb into its JSON and everything after it."""
     cut = InputError(asked, f"cut short at {len(data)} bytes", "copy or export the file again")
     if len(data) < HEADER.size + CHUNK.size:
         raise cut

@@ -24,10 +24,10 @@ from translucent.scene.texture import Texture, Wrap
 Bytes = npt.NDArray[np.uint8]
 Pixels = npt.NDArray[np.float32]
 
-#: Pixels along a side beyond which a picture is made smaller.
+#: Largest side of a picture in pixels; larger ones are made smaller.
 MAX_SIDE = 4096
 
-#: Characters of a link that a message repeats; a longer one is told by its number.
+#: Largest number of characters of a link in a message; a longer one is named by its index.
 _LONGEST_NAME = 60
 
 _NEAREST = 9728
@@ -53,7 +53,7 @@ class Textures:
     def read(
         self, name: str, holder: Json, key: str, *, srgb: bool = False, normal_scale: float = 1.0, strength: float = 1.0
     ) -> Texture | None:
-        """The texture that `holder` has as `key`; None if it has none, or none that is read.
+        """Texture of `holder` under `key`; None if it is absent or cannot be read.
 
         Parameters
         ----------
@@ -142,7 +142,7 @@ class Textures:
         return np.asarray(image)
 
     def _decoded(self, where: str, data: bytes) -> Image.Image | None:
-        """The picture; None if it is none, or broken."""
+        """Decoded picture; None if it is broken or of an unknown format."""
         try:
             opened = open_picture(data, f"glTF {str(self._file.path)!r}: {where}", ("PNG", "JPEG"), per_pixel=12)
         except UnreadableError:
@@ -165,7 +165,7 @@ def _linear(picture: Bytes, *, srgb: bool) -> Pixels:
 
 
 def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
-    """A normal map whose normals are steeper by a factor, and of unit length again."""
+    """Normal map with slopes scaled by a factor and renormalized."""
     if scale == 1.0:
         return pixels
     largest = max(abs(scale), 1.0)  # only directions count
@@ -176,12 +176,12 @@ def _scaled_normals(pixels: Pixels, scale: float) -> Pixels:
 
 
 def _diluted(pixels: Pixels, strength: float) -> Pixels:
-    """A picture mixed with white."""
+    """Mix a picture with white."""
     return pixels if strength == 1.0 else (1.0 + strength * (pixels - 1.0)).astype(np.float32)
 
 
 def _texture(pixels: Pixels, wraps: tuple[str, ...], transform: TextureTransform) -> Texture:
-    """From coordinates that count downwards to those that count upwards."""
+    """Texture from a picture, with v converted from downwards to upwards."""
     turn, (scale_u, scale_v), (offset_u, offset_v) = transform.rotation, transform.scale, transform.offset
     c, s = math.cos(turn), math.sin(turn)
     scale, offset = np.array([scale_u, scale_v]), np.array([offset_u + s * scale_v, 1.0 - offset_v - c * scale_v])
@@ -193,7 +193,7 @@ def _texture(pixels: Pixels, wraps: tuple[str, ...], transform: TextureTransform
 
 
 def _with_mirror_images(pixels: Pixels, wraps: tuple[str, ...]) -> Pixels:
-    """Twice as wide and high, so that repeating it mirrors the picture in turn, where it is to be mirrored."""
+    """Picture with its mirror images appended, so that repeating it acts as mirrored wrapping."""
     right = {"mirror": pixels[:, ::-1], "repeat": pixels, "clamp": np.repeat(pixels[:, -1:], pixels.shape[1], axis=1)}
     wide = np.concatenate([pixels, right[wraps[0]]], axis=1)
     above = {"mirror": wide[::-1], "repeat": wide, "clamp": np.repeat(wide[:1], len(wide), axis=0)}

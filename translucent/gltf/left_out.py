@@ -1,23 +1,23 @@
-"""What a file asks for and a scene does not hold, gathered while it is read."""
+"""Record of features that a file asks for and a scene does not support."""
 
 from __future__ import annotations
 
-#: How many names a line tells.
+#: Largest number of names in a line.
 FIRST = 3
 
 
 class LeftOut:
-    """One line per kind of loss, with the names of those that have it."""
+    """Record of features left out: one line per kind, with the names of the objects concerned."""
 
     def __init__(self) -> None:
         self._names: dict[str, dict[str, None]] = {}
 
     def add(self, what: str, name: str) -> None:
-        """Note a loss; the same one again counts once."""
+        """Record a loss; the same one again counts once."""
         self._names.setdefault(what, {})[name] = None
 
     def lines(self) -> tuple[str, ...]:
-        """Such as ``base color textures ('Label', 'Table', 'Wall' and 2 more)``."""
+        """Lines of text such as ``base color textures ('Label', 'Table', 'Wall' and 2 more)``."""
         return tuple(f"{what} ({_listed(list(names))})" for what, names in self._names.items())
 
 

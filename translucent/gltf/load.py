@@ -1,4 +1,4 @@
-"""From a glTF file to a scene."""
+"""Loading of a scene from a glTF file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from translucent.units import metres_per_unit
 
 SUFFIXES = (".glb", ".gltf")
 
-#: Extensions that are read; what of them a scene cannot hold is told one by one.
+#: Extensions that are read; parts of them that a scene cannot hold are reported one by one.
 _READ = (
     TRANSMISSION,
     VOLUME,
@@ -42,14 +42,14 @@ _READ = (
     LIGHTS,
     "KHR_mesh_quantization",
 )
-#: A file that requires these can be read without them: they change how surfaces and textures look.
+#: Extensions that a file may require and that can be ignored: they only change the look of surfaces and textures.
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_")
 _COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GltfScene(Scene):
-    """A scene from a glTF file.
+    """Scene read from a glTF file.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def _read(path: str | Path, allow_outside: bool) -> GltfFile:
 
 
 def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
-    """Refuse a file that cannot be read without what it requires, and note what it merely uses."""
+    """Refuse a file with unsupported required extensions, and record those that it merely uses."""
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
@@ -146,7 +146,7 @@ def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
 
 
 def scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
-    """Node to world of the nodes of the scene; raises `InputError` where one is not finite."""
+    """Node-to-world transforms of the nodes of the scene; raises `InputError` where one is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         world = node_transforms(file)
     transforms = {node: world[node] for node in _scene_nodes(file, left_out)}

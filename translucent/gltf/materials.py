@@ -1,4 +1,4 @@
-"""glTF 2.0 materials that light passes: what the KHR extensions say of the volume, read and checked.
+"""Translucent glTF 2.0 materials: the volume of the KHR extensions, read and checked.
 
 ============================  =======================================================  =======================
 extension                     field here                                               default
@@ -46,10 +46,10 @@ VOLUME = "KHR_materials_volume"
 IOR = "KHR_materials_ior"
 EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
 DISPERSION = "KHR_materials_dispersion"
-#: A volume must not be used with these.
+#: Extensions that must not be used with a volume.
 EXCLUDED = ("KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness")
 
-#: Index of refraction of a material that states none.
+#: Default index of refraction.
 DEFAULT_IOR = 1.5
 
 Triple = tuple[float, float, float]
@@ -66,7 +66,7 @@ _VOLUME_KEYS = {
 
 @dataclass(frozen=True)
 class GltfMaterial:
-    """What a glTF material says of light inside; lengths and ranges are those of the module's table.
+    """Volume of a glTF material; lengths and ranges are those of the module's table.
 
     Parameters
     ----------
@@ -108,11 +108,11 @@ class GltfMaterial:
 
     @property
     def kind(self) -> Literal["opaque", "thin wall", "volume"]:
-        """What it makes of an object."""
+        """Kind of object that the material makes."""
         return "opaque" if not self.transmits else "thin wall" if self.medium() is None else "volume"
 
     def medium(self) -> Medium | None:
-        """The medium inside, or None: the material is opaque, or a thin wall without an inside (thickness 0).
+        """Medium inside; None if the material is opaque, or a thin wall without an inside (thickness 0).
 
         A black channel is read as `BLACKEST`, and an ior of 0 (which glTF has for old materials) as 1.5; both are among
         the warnings. The index of refraction is the only thing that a medium takes from the surface.
@@ -131,7 +131,7 @@ class GltfMaterial:
         return head + html_strip(medium.extinction, distance if math.isfinite(distance) else None)
 
     def summary(self) -> dict[str, Any]:
-        """The fields and the medium in values that JSON can hold; None stands for an infinite distance."""
+        """Fields and medium as values that JSON can hold; None stands for an infinite distance."""
         medium = self.medium()
         return {
             "index": self.index,
@@ -151,7 +151,7 @@ class GltfMaterial:
 
 
 def read_materials(path: str | Path) -> list[GltfMaterial]:
-    """All materials of a .gltf or .glb file, in its order; no file that it links to is read.
+    """Read all materials of a .gltf or .glb file, in its order, without the files that it links to.
 
     Raises
     ------
@@ -163,12 +163,12 @@ def read_materials(path: str | Path) -> list[GltfMaterial]:
 
 
 def materials_of(file: GltfFile) -> list[GltfMaterial]:
-    """All materials of a file that has been read; see `read_materials`."""
+    """Read all materials of an open file; see `read_materials`."""
     return [_material(file, index, entry) for index, entry in enumerate(file.items("materials"))]
 
 
 class _Fields:
-    """Values of one JSON object, checked; what is wrong goes into `problems`."""
+    """Reader of the checked values of one JSON object; errors go into `problems`."""
 
     def __init__(self, owner: object, where: str, problems: list[str]) -> None:
         self.problems = problems
@@ -177,7 +177,7 @@ class _Fields:
         self.values: Json = owner if isinstance(owner, dict) else {}
 
     def number(self, key: str, default: float, low: float, high: float = math.inf, *, above: bool = False) -> float:
-        """A number in `low`..`high`; with `above` not `low` itself."""
+        """A number in `low`..`high`; excluding `low` itself with `above`."""
         value = self.values.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.problems.append(f"{key} is {value!r}, not a number")
@@ -208,7 +208,7 @@ class _Fields:
         return parts.number(f"{key}[0]", default[0], -math.inf), parts.number(f"{key}[1]", default[1], -math.inf)
 
     def whole(self, key: str, default: int) -> int:
-        """A whole number of 0 and above."""
+        """A nonnegative integer."""
         value = self.values.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
             self.problems.append(f"{key} is {value!r}, not a whole number of 0 or more")
@@ -216,7 +216,7 @@ class _Fields:
         return value
 
     def texture(self, key: str, count: int) -> tuple[int | None, TextureTransform]:
-        """Index of a texture, if there is one, and its transform."""
+        """Index and transform of a texture, if there is one."""
         if key not in self.values:
             return None, TextureTransform()
         info = _Fields(self.values[key], key, self.problems)
@@ -285,7 +285,7 @@ def _lets_light_in(extensions: Json) -> bool:
 
 
 def _warnings(found: GltfMaterial, entry: Json, extensions: Json, volume: Json) -> list[str]:
-    """What is allowed and yet suspicious; the first three are what the glTF validator warns of."""
+    """Warnings about valid but suspicious values; the first three are those of the glTF validator."""
     if not found.has_volume:
         return []
     told = [f"{VOLUME} has an unknown property {key!r}" for key in volume if key not in _VOLUME_KEYS]

@@ -1,4 +1,4 @@
-"""The objects of a glTF scene: the primitives that its nodes place, each with what its material makes of it."""
+"""Objects of a glTF scene: the primitives that its nodes place, with their materials."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from translucent.scene.surface import TEXTURE_FIELDS, Surface
 #: Thickness of a thin wall as a share of the scene's diagonal: too little to see, enough to count as covered.
 WALL_SHARE = 1e-5
 
-#: What fills a layer that covers a share of what is behind: nothing.
+#: Medium of a partly transparent layer: empty.
 _CLEAR = Medium()
 
-#: What is told of alphaMode BLEND.
+#: Message about alphaMode BLEND.
 BLENDED = (
     "alphaMode BLEND, drawn as thin sheets that cover a share of what is behind, sorted by object as in viewers; they "
     "cast no shadows, and rays that bend do not meet them"
 )
 
-#: Share of metal in a texture beyond which it is no noise.
+#: Smallest share of metal in a texture that is not taken for noise.
 _METAL = 0.1
 
 
 def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Object]:
-    """One object per node and primitive, with what its material makes of it.
+    """Objects of a scene, one per node and primitive, with their materials.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, l
 
 
 def _fitted(finish: Finish, mesh: Mesh, left_out: LeftOut) -> tuple[Finish, Surface | None]:
-    """What a material makes of a mesh, and the surface that the mesh can have of it."""
+    """Finish of a material on a mesh, and the part of its surface that the mesh supports."""
     if finish.surface is None and mesh.colors is not None:
         finish = VERTEX_COLORED
     if finish.unlit and mesh.colors is not None and (mesh.colors[:, :3] < 1).any():
@@ -93,7 +93,9 @@ def _fitted(finish: Finish, mesh: Mesh, left_out: LeftOut) -> tuple[Finish, Surf
 
 
 def _blended(finish: Finish, surface: Surface, mesh: Mesh, left_out: LeftOut) -> Finish:
-    """A material of alphaMode BLEND on a mesh: opaque where its alpha is 1 all over, and hidden where it is 0."""
+    """Finish of a material with alphaMode BLEND on a mesh: opaque where its alpha is 1 all over, and hidden where it is
+    0.
+    """
     least = finish.opacity * _alpha(surface, mesh)
     if finish.translucent:
         if least < 1:
@@ -108,7 +110,7 @@ def _blended(finish: Finish, surface: Surface, mesh: Mesh, left_out: LeftOut) ->
 
 
 def _without_holes(surface: Surface, finish: Finish, mesh: Mesh, left_out: LeftOut) -> Surface:
-    """The surface of a solid, which has no inside where it has a hole."""
+    """Surface of a solid without holes, since a solid cannot have any."""
     if surface.alpha_cutoff > _alpha(surface, mesh):
         what = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside)"
         left_out.add(what, finish.name)
@@ -116,7 +118,7 @@ def _without_holes(surface: Surface, finish: Finish, mesh: Mesh, left_out: LeftO
 
 
 def _alpha(surface: Surface, mesh: Mesh) -> float:
-    """The least alpha of texture and vertices."""
+    """Smallest alpha of texture and vertices."""
     pixels = None if surface.color_texture is None else surface.color_texture.pixels
     least = 1.0 if pixels is None or pixels.shape[2] < 4 else float(pixels[..., 3].min())
     return least * (1.0 if mesh.colors is None else float(mesh.colors[:, 3].min()))
@@ -132,7 +134,7 @@ def _with_medium(item: Object, finish: Finish, wall: float) -> Object:
 
 
 def _fitting(surface: Surface | None, mesh: Mesh, left_out: LeftOut) -> Surface | None:
-    """The surface, without its textures if the mesh has no coordinates for them."""
+    """Surface without its textures if the mesh has no coordinates for them."""
     if surface is None or mesh.uv is not None or not any(surface.textures):
         return surface
     left_out.add("textures of meshes without TEXCOORD_0", repr(mesh.name))
@@ -174,7 +176,7 @@ def _placed_meshes(
 
 
 def _mesh_name(node: Json, entry: Json, index: int, *, shared: bool) -> str:
-    """The name of the only node that uses a mesh, or of the mesh; without one, of its first node."""
+    """Name of an object: that of the only node that uses its mesh, or of the mesh, or of its first node."""
     names = [node.get("name"), entry.get("name")]
     for name in names[::-1] if shared else names:
         if isinstance(name, str) and name:

@@ -1,4 +1,4 @@
-"""What a .gltf has in several buffers and data URIs, gathered into the one binary chunk of a .glb.
+"""Packing of the buffers and data URIs of a .gltf into the one binary chunk of a .glb.
 
 A .glb has room for one buffer. Buffers with bytes, linked or embedded, are laid one behind the other, and the views of
 them move along, those of mesh compression, too; a buffer without bytes (the fallback of a compressed one) stays. Images
@@ -17,12 +17,12 @@ from translucent.gltf.file import GltfFile, Json
 
 _ALIGNMENT = 4  # bytes: the size of the largest component of an accessor
 
-#: How pictures begin that glTF and its extensions know; nothing else is copied into a file.
+#: Magic numbers of the image formats of glTF and its extensions; nothing else is copied into a file.
 _PICTURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"\xabKTX 20\xbb": "image/ktx2"}
 
 
 def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
-    """JSON whose first buffer is the binary chunk, and its bytes; where there are none, the JSON as it is.
+    """Gather buffers: JSON whose first buffer is the binary chunk, and its bytes; without any, the JSON as it is.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
 
 
 def _append(binary: bytearray, data: bytes) -> int:
-    """Where the data begin in the binary, at whose end they are."""
+    """Append data to the binary; returns their offset."""
     binary += b"\0" * (-len(binary) % _ALIGNMENT)
     start = len(binary)
     binary += data
@@ -107,7 +107,7 @@ def _picture_kind(data: bytes) -> str | None:
 
 
 def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
-    """Put the images that are files into the binary, and make them views of it in the JSON.
+    """Embed linked images in the binary, as buffer views in the JSON.
 
     What cannot be read, or is no picture, stays a link, with a `TranslucentWarning`.
 
@@ -142,7 +142,7 @@ def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
 
 
 def _move(file: GltfFile, old: Json, new: Json, places: dict[int, tuple[int, int]]) -> None:
-    """Point a view at the place where its buffer is now."""
+    """Move a buffer view to the new offset of its buffer."""
     index, offset = old.get("buffer"), old.get("byteOffset", 0)
     if not (isinstance(index, int) and index in places and isinstance(offset, int)):
         raise InputError(f"glTF {str(file.path)!r}", f"a buffer view of buffer {index!r}", "export the file again")

@@ -1,4 +1,4 @@
-"""Where glTF materials are used: nodes, their transforms, and the thickness that a node's material has in the world.
+"""Uses of glTF materials: nodes, their transforms, and the world-space thickness of a node's material.
 
 Formula: the thickness factor (times the texture's G channel) is a length in the mesh's own space. Along a direction v,
 a unit vector **of that space**, it is |M v| times as long in the world, with M the node's matrix. Scaling a world
@@ -26,7 +26,7 @@ from translucent.gltf.textures import sample
 
 @dataclass(frozen=True, eq=False)
 class MaterialUse:
-    """One node that uses a material: the node's index and name, the material's index, and node to world (4x4)."""
+    """Use of a material by a node: the node's index and name, the material's index, and node to world (4x4)."""
 
     node: int
     name: str
@@ -54,7 +54,7 @@ def material_uses(file: GltfFile) -> list[MaterialUse]:
 
 
 def node_transforms(file: GltfFile) -> dict[int, Array]:
-    """Node to world (4x4) of every node, by its index.
+    """Node-to-world transform (4x4) of every node, by its index.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def node_transforms(file: GltfFile) -> dict[int, Array]:
 
 
 def primitives(file: GltfFile, mesh: Json) -> list[Json]:
-    """The primitives of a mesh; raises `InputError` if they are no list of objects."""
+    """The primitives of a mesh; raises `InputError` if they are not a list of objects."""
     found = mesh.get("primitives")
     if not (isinstance(found, list) and all(isinstance(item, dict) for item in found)):
         raise InputError(f"glTF {str(file.path)!r}", "a mesh has no list of primitives", "export the file again")
@@ -99,7 +99,7 @@ def _indices(file: GltfFile, node: Json) -> list[int]:
 
 
 def _local(file: GltfFile, index: int, node: Json) -> Array:
-    """A node's own 4x4 matrix; glTF lists matrices by columns, and quaternions as x, y, z, w."""
+    """Local 4x4 matrix of a node; glTF lists matrices by columns, and quaternions as x, y, z, w."""
     try:
         if "matrix" in node:
             return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
@@ -123,7 +123,7 @@ def _local(file: GltfFile, index: int, node: Json) -> Array:
 
 
 def world_thickness(thickness: npt.ArrayLike, transform: npt.ArrayLike, direction: npt.ArrayLike) -> Array:
-    """Length in the world of a thickness in mesh space, measured along a direction of the world.
+    """World-space length of a thickness in mesh space, measured along a direction of the world.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What glTF materials make of the objects that have them: bodies, thin walls, or opaque objects.
+"""Finishes of objects from glTF materials: bodies, thin walls, or opaque objects.
 
 =================================================  ==================================================================
 material                                           object
@@ -61,13 +61,13 @@ from translucent.scene.texture import Texture
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 UNLIT = "KHR_materials_unlit"
 
-#: Extensions of materials that are not drawn, and what messages call them.
+#: Extensions of materials that are not rendered, and their names in messages.
 LEFT_OUT = {"KHR_materials_clearcoat": "clear coats", "KHR_materials_iridescence": "iridescence"}
 
 
 @dataclass(frozen=True, eq=False)
 class Finish:
-    """What an object of a material is.
+    """Finish of an object: its surface, its medium, and whether it is a thin wall.
 
     Attributes
     ----------
@@ -103,22 +103,22 @@ class Finish:
 
     @property
     def translucent(self) -> bool:
-        """Whether light passes it."""
+        """Whether light passes the object."""
         return self.medium is not None or self.wall_ior is not None
 
     def wall_medium(self, thickness: float) -> Medium:
-        """The medium that tints like the wall when it fills a sheet of this thickness in metres."""
+        """Medium that gives a sheet of this thickness in metres the tint of the wall."""
         tints = self.surface is None or (np.asarray(self.surface.color) == 1).all()
         color = self.color if tints else np.ones(3)
         return Medium(absorption=extinction_at(color, thickness), ior=self.wall_ior or DEFAULT_IOR)
 
 
-#: What a mesh is that has colors at its vertices and no material: matt.
+#: Finish of a mesh with vertex colors and no material: matte.
 VERTEX_COLORED = Finish((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, ior=1.0))
 
 
 def finish_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[[int | None], Finish]:
-    """A function from the index of a material to what its objects are, each read once; None is that of no material.
+    """Function from the index of a material to its finish, each read once; None is the index of no material.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def finish_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[
 
 
 class _Reader:
-    """One material, as its file has it."""
+    """Reader of one material of a file."""
 
     def __init__(
         self, file: GltfFile, name: str, material: GltfMaterial, entry: Json, textures: Textures, left_out: LeftOut
@@ -154,7 +154,7 @@ class _Reader:
         self.base_color = shares(file, self.where, self.base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
 
     def finish(self, metres: float) -> Finish:
-        """What its objects are; `metres` are per unit of the file."""
+        """Finish of its objects; `metres` are per unit of the file."""
         found = self._finish(metres)
         opacity, mode = float(self.base_color[3]), self._alpha_mode()
         for name, what in LEFT_OUT.items():
@@ -165,7 +165,7 @@ class _Reader:
         )
 
     def _finish(self, metres: float) -> Finish:
-        """What its objects are, but for what alpha makes of them."""
+        """Finish of its objects, without the effect of alpha."""
         color, diffuse = self.base_color[:3], self._extension(DIFFUSE_TRANSMISSION)
         passes = share(self.file, self.where, diffuse, "diffuseTransmissionFactor", 0.0) > 0
         medium, transmission = self.material.medium(), self.material.transmission
@@ -211,7 +211,7 @@ class _Reader:
         )
 
     def _common(self) -> Surface:
-        """What surfaces of any kind of object have."""
+        """Surface parameters common to all kinds of objects."""
         file, where, diffuse = self.file, self.where, self._extension(DIFFUSE_TRANSMISSION)
         for key in ("diffuseTransmissionTexture", "diffuseTransmissionColorTexture"):
             if key in diffuse:
@@ -235,7 +235,7 @@ class _Reader:
         return self.textures.read(self.name, self.base, "baseColorTexture", srgb=True)
 
     def _with_sides(self, surface: Surface) -> Surface:
-        """The surface of an opaque object with the sides from which it is seen."""
+        """Surface of an opaque object with its visible sides."""
         double_sided = self.entry.get("doubleSided", False)
         if not isinstance(double_sided, bool):
             raise refused(self.file, f"{self.where}: doubleSided is {double_sided!r}, not true or false")
@@ -253,7 +253,7 @@ class _Reader:
         return str(mode)
 
     def _cutoff(self) -> float:
-        """What alpha of texture and vertices a hole is below: the rest of alpha is a factor."""
+        """Alpha of texture and vertices below which there is a hole: the rest of alpha is a factor."""
         if self._alpha_mode() != "MASK":
             return 0.0
         return min(self._alpha_cutoff() / max(float(self.base_color[3]), 1e-9), 1.0)

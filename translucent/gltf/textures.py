@@ -1,4 +1,4 @@
-"""Where a glTF texture is read: its set of UVs, their transform (KHR_texture_transform), and the sampler's wrapping.
+"""Lookup of glTF textures: the set of UVs, their transform (KHR_texture_transform), and the sampler's wrapping.
 
 Formula: u' = offset_u + c scale_u u + s scale_v v, v' = offset_v - s scale_u u + c scale_v v, with c and s the cosine
 and sine of the rotation. It is counter-clockwise in the UVs of glTF, whose v points down, as the words and the example
@@ -26,7 +26,7 @@ _NEAREST, _REPEAT, _CLAMP, _MIRROR = 9728, 10497, 33071, 33648
 
 @dataclass(frozen=True)
 class TextureTransform:
-    """How a texture's own coordinates follow from the UVs of a mesh.
+    """Transform from the UVs of a mesh to a texture's own coordinates.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class TextureTransform:
 
 
 def sample(image: Array, coordinates: Array, sampler: Json) -> Array:
-    """Values (...,) of an image (h, w) at coordinates (..., 2) of a texture with this sampler."""
+    """Sample an image (h, w) at coordinates (..., 2) of a texture with this sampler."""
     height, width = image.shape
     x, y = coordinates[..., 0] * width - 0.5, coordinates[..., 1] * height - 0.5
     if sampler.get("magFilter") == _NEAREST:
@@ -64,7 +64,7 @@ def sample(image: Array, coordinates: Array, sampler: Json) -> Array:
 
 
 def _wrapped(index: Array, size: int, mode: object) -> npt.NDArray[np.intp]:
-    """Index of a texel within the image for one that may be outside."""
+    """Wrap the index of a texel into the image."""
     if mode == _CLAMP:
         return np.clip(index, 0, size - 1).astype(np.intp)
     if mode == _MIRROR:

@@ -19,7 +19,7 @@ from translucent.gltf.scene_media import primitives
 
 
 def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
-    """Vertices, faces and, if all parts have them, texture coordinates of the default scene, in the file's unit.
+    """Read vertices, faces and, if all parts have them, texture coordinates of the default scene, in the file's unit.
 
     Raises
     ------
@@ -51,6 +51,6 @@ def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
 
 
 def _placed(mesh: Mesh, matrix: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Triangles:
-    """A mirrored part is wound the other way, so that its outside stays outside."""
+    """Place a part in the world; a mirrored one is rewound so that its outside stays outside."""
     faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
     return mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces, mesh.uv

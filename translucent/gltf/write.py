@@ -1,4 +1,4 @@
-"""A medium written into the materials of a glTF file; everything else in the file keeps its meaning.
+"""Writing of a medium into the materials of a glTF file; everything else in the file keeps its meaning.
 
 Per target material: KHR_materials_transmission (factor 1, unless it is already above 0), KHR_materials_volume
 (color at a distance, thickness) and KHR_materials_ior. metallicFactor becomes 0, since metal transmits nothing, and
@@ -25,7 +25,7 @@ from translucent.media.medium import Medium
 
 
 def volume_extensions(medium: Medium, distance: float | None, thickness: float, ior: float) -> Json:
-    """The extensions of a material that holds this medium.
+    """Material extensions that hold this medium.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def write_medium(
     keep_ior: bool = False,
     allow_outside: bool = False,
 ) -> list[int]:
-    """Give a medium to the objects of a glTF file, and write the file; it is complete or not there.
+    """Give a medium to the objects of a glTF file, and write the file atomically.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -
 
 
 def _copy(file: GltfFile, index: object, object_name: str | None) -> Json:
-    """A duplicate of a material under the object's name, or a new one where there was none."""
+    """Duplicate a material under the object's name, or make a new one if there was none."""
     if index is None:
         return {"name": object_name or "medium", "pbrMetallicRoughness": {"roughnessFactor": 0}}
     made = copy.deepcopy(file.item("materials", index))
@@ -187,7 +187,7 @@ def _meshes_named(file: GltfFile, name: str) -> set[int]:
 
 
 def _in_variants(file: GltfFile) -> set[Any]:
-    """Materials that variants name."""
+    """Materials used by variants."""
     try:
         return {
             mapping.get("material")

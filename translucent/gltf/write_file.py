@@ -1,4 +1,4 @@
-"""The two containers of glTF 2.0, .gltf (JSON) and .glb (JSON and binary chunks), written without loss.
+"""The two containers of glTF 2.0, .gltf (JSON) and .glb (JSON and binary chunks), written losslessly.
 
 Source: glTF 2.0, section 4.4 (GLB).
 """
@@ -23,7 +23,7 @@ _DATA_URI = "data:application/octet-stream;base64,"
 
 
 def write_gltf(file: GltfFile, path: str | Path) -> None:
-    """Write a file as .glb or .gltf, by its suffix; the file is complete or not there.
+    """Write a file as .glb or .gltf, by its suffix, atomically.
 
     A .glb turned into .gltf holds its binary chunk as a data URI; a .gltf turned into .glb has its buffers in one, and
     every .glb holds its images, see `translucent.gltf.pack`. What links there are in a .gltf is made relative
@@ -56,14 +56,14 @@ def _fill(path: Path, content: bytes) -> None:
 
 
 def check_gltf_output(path: Path) -> None:
-    """Raise `InputError` if `path` is no name for a glTF file in an existing folder."""
+    """Raise `InputError` unless `path` is a valid name for a glTF file in an existing folder."""
     if path.suffix.lower() not in (".glb", ".gltf"):
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .glb or .gltf")
     require_place(path, f"output {str(path)!r}")
 
 
 def _relocated(file: GltfFile, path: Path) -> Json:
-    """The JSON with links that hold in the folder of `path`."""
+    """JSON with links relative to the folder of `path`."""
     old, new = file.path.parent.resolve(), path.parent.resolve()
     if old == new:
         return file.tree
@@ -98,7 +98,7 @@ def _packed(file: GltfFile, tree: Json) -> bytes:
 
 
 def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes]:
-    """JSON and chunks with the images in the binary one."""
+    """JSON and chunks with the images embedded in the binary chunk."""
     size, kind = CHUNK.unpack_from(chunks) if len(chunks) >= CHUNK.size else (0, None)
     end = CHUNK.size + size if kind == BINARY_CHUNK else 0
     binary = bytearray(chunks[CHUNK.size : end])

@@ -1,1 +1,1 @@
-"""The GPU ring: the only code that touches OpenGL."""
+"""Rendering with OpenGL: the only room that touches it."""

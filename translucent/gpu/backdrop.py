@@ -9,7 +9,7 @@ import moderngl
 
 @dataclass(frozen=True, eq=False)
 class TextureBackdrop:
-    """What is opaque in a frame, as `Backdrop`, but in textures; it is seen everywhere, and nothing is read back.
+    """Backdrop in textures of the same context, so that nothing is read back; it is seen everywhere.
 
     Parameters
     ----------

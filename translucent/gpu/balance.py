@@ -1,4 +1,4 @@
-"""Rules of validity: what faces add to a pixel's signed count, and which sums can be trusted. Without OpenGL."""
+"""Rules of validity: contribution of each face to a pixel's signed count, and bounds of valid sums. Without OpenGL."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from translucent.gpu.placement import PlacedScene
 from translucent.planning.methods import Method
 from translucent.scene.scene import Object, Scene
 
-#: A count that no pixel expects.
+#: Count that is invalid in every pixel.
 UNEXPECTED = float(CONSTANTS["UNEXPECTED"])
 
 #: Share of the diagonal below which a path is the rounding of a sum that should be 0.
@@ -29,7 +29,7 @@ ROUNDING = 1e-5
 
 @dataclass(frozen=True)
 class FaceCount:
-    """What one face of a body adds to the signed count of a pixel.
+    """Contribution of one face of a body to the signed count of a pixel.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class FaceCount:
 
 @dataclass(frozen=True)
 class Balance:
-    """Bounds that the sums of a trustworthy pixel keep.
+    """Bounds within which the sums of a pixel are valid.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Balance:
 
 
 def count_weights(scene: Scene) -> list[float]:
-    """What a face of each object adds to a pixel's count, with the sign of its side."""
+    """Weight of each object's faces in a pixel's signed count."""
     weights = []
     used = 0
     for body in scene.objects:
@@ -86,7 +86,7 @@ def count_weights(scene: Scene) -> list[float]:
 
 
 def face_counts(scene: Scene, subpixel_bits: int) -> list[FaceCount]:
-    """What a face of each object adds to a pixel's count, with a rasterizer of this precision."""
+    """Contribution of each object's faces to a pixel's count, with a rasterizer of this precision."""
     weights = count_weights(scene)
     # Where a body is broken, paths below 0 are more likely to be real than swapped at a silhouette; and the weights of
     # open bodies leave no room in the fraction of a count.
@@ -99,7 +99,7 @@ def face_counts(scene: Scene, subpixel_bits: int) -> list[FaceCount]:
 
 
 def count_offset(body: Object) -> float:
-    """What each face adds whatever its side: no pixel expects a body that is inside out."""
+    """Count that each face adds whatever its side, which invalidates all pixels of a body that is inside out."""
     return UNEXPECTED if body.medium is not None and body.mesh.diagnosis.inside_out else 0.0
 
 
@@ -115,7 +115,7 @@ def _expected_count(placed: PlacedScene, method: Method, counts: Sequence[FaceCo
 
 
 def _rounding(placed: PlacedScene, method: Method) -> float:
-    """Metres below 0 that float32 alone explains.
+    """Largest rounding error of a path in float32, in metres.
 
     Next to a silhouette a rasterizer may swap two faces, and a path is then below 0 by as much as it misplaces
     them; that differs from pixel to pixel, and goes along with what they hold (``thickness/snapping.glsl``).

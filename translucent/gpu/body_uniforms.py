@@ -1,4 +1,4 @@
-"""Contents of the Body block: where a body is in a picture, and what it is made of."""
+"""Contents of the Body block: placement and material of a body."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_SCENE_OPTICAL_DEPTH = 1e30
 
 @dataclass(frozen=True)
 class BodyRole:
-    """What a body is in a frame, besides where it is.
+    """Role of a body in a frame, apart from its placement.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Meshes on the GPU: uploaded once, shared by all passes, gone when the mesh is."""
+"""Meshes on the GPU: uploaded once, shared by all passes, freed with the mesh."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ class MeshBuffers:
         return [(self._of_corners("colors", mesh.colors, mesh), "4f", "corner_color")]
 
     def _of_corners(self, name: str, values: npt.NDArray[np.float64] | None, mesh: Mesh) -> moderngl.Buffer:
-        """What the vertices have, for each corner of each face; zeros if they have none."""
+        """Vertex attribute for each corner of each face; zeros if the mesh lacks it."""
         if name not in self._looks:
             content = np.zeros((*mesh.faces.shape, 2)) if values is None else values[mesh.faces]
             self._looks[name] = self._gl.buffer(content.astype(np.float32))
         return self._looks[name]
 
     def _flat_faces(self, mesh: Mesh) -> moderngl.Buffer:
-        """Each face with vertices of its own, which carry its normal."""
+        """Unshared vertices of all faces, with flat normals."""
         if self._flat is None:
             corners = (mesh.vertices - mesh.center)[mesh.faces]
             normals = np.broadcast_to(mesh.face_normals[:, None], corners.shape)
@@ -74,7 +74,7 @@ class MeshBuffers:
         return self._flat
 
     def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
-        """Each face with vertices of its own, which carry smooth normals and texture coordinates."""
+        """Unshared vertices of all faces, with smooth normals and texture coordinates."""
         if self._smooth is None:
             before_making(self._gl)
             content = np.zeros((*mesh.faces.shape, 8), dtype=np.float32)
@@ -96,7 +96,7 @@ class MeshBuffers:
 
 
 class MeshCache:
-    """Buffers of each mesh that has been drawn and is still alive."""
+    """Cache of the buffers of each mesh that has been drawn and is still alive."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl

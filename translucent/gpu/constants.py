@@ -1,4 +1,4 @@
-"""Numbers that shaders share: written here and nowhere else; ``#include <constants>`` emits them."""
+"""Constants shared by Python and shaders: written here and nowhere else; ``#include <constants>`` emits them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ STORAGE_BINDINGS = {
     "light_ends": 6,
 }
 
-#: What each name stands for in GLSL.
+#: Values of the constants by their names in GLSL.
 CONSTANTS: dict[str, str] = {
     "PI": "3.14159265358979",
     "LUMINANCE_WEIGHTS": f"vec3{LUMINANCE_WEIGHTS}",

@@ -1,4 +1,4 @@
-"""Where OpenGL comes from: one place that opens contexts, and records what it tried.
+"""OpenGL contexts: the one place that opens them, and records what it tried.
 
 ``python -m translucent.gpu.context --probe`` prints as JSON which backend works here.
 """
@@ -22,10 +22,10 @@ from translucent.gpu.osmesa import OSMesaContext
 
 Backend = Literal["egl", "window", "osmesa"]
 
-#: Version of what we speak to OpenGL with. Looking it up takes a millisecond, and every frame records it.
+#: Version of moderngl. Looking it up takes a millisecond, and every frame records it.
 MODERNGL = version("moderngl")
 
-#: OpenGL 3.3 core is what every raster path needs.
+#: OpenGL version code that every raster path needs: 3.3 core.
 REQUIRED = 330
 
 
@@ -38,20 +38,20 @@ class _Entered(threading.local):
 
 _entered = _Entered()
 
-#: The process that has opened OpenGL: none that is forked from it can use or open any.
+#: Id of the process that has opened OpenGL: no process forked from it can use it.
 _opened_in: int | None = None
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One backend that was tried, and why it failed; None if it did not."""
+    """Attempt to open one backend, and the reason why it failed; None if it did not."""
 
     backend: str
     error: str | None
 
 
 class NoContextError(RenderError):
-    """There is no OpenGL to draw with; `attempts` says what was tried."""
+    """Error for a machine without usable OpenGL; `attempts` says what was tried."""
 
     def __init__(self, attempts: tuple[Attempt, ...]) -> None:
         tried = "; ".join(f"{attempt.backend}: {attempt.error}" for attempt in attempts)
@@ -89,7 +89,7 @@ class GpuContext:
 
     @property
     def owned(self) -> bool:
-        """Whether we made the context, and so release it."""
+        """Whether the context was made here, and is released here."""
         return self.backend != "adopted"
 
     @property
@@ -123,7 +123,7 @@ class GpuContext:
         _entered.stack[:] = [context for context in _entered.stack if context is not self]
 
     def drain(self) -> None:
-        """Free what has been dropped since the last call; at a safe moment, with the context current."""
+        """Free objects dropped since the last call; to be called at a safe moment, with the context current."""
         queue = self.gl.objects
         while queue:
             # moderngl's own gc() trips over objects that were released before they were dropped.
@@ -132,7 +132,7 @@ class GpuContext:
 
 
 class _Current:
-    """A context that is current within.
+    """Context manager that makes a context current.
 
     Ctrl-C may end any of this between two lines: a context may stay current, which harms nothing, or listed, until
     `GpuContext.forget`. A generator would be resumed when it is collected, and leave what is current then.
@@ -208,7 +208,7 @@ def open_context(backend: str | None = None) -> GpuContext:
 
 
 def adopt_context(gl: moderngl.Context) -> GpuContext:
-    """Use a context that somebody else owns: it is never released, and must be current whenever we draw.
+    """Use a context that somebody else owns: it is never released, and must be current whenever something is drawn.
 
     Where it has no ``gc_mode`` it gets ``"context_gc"``, or what we drop would stay in its memory.
     """

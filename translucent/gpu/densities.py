@@ -1,4 +1,4 @@
-"""Densities that vary in space, on the GPU: one 3D texture with all grids, and where in each body a point is."""
+"""Spatially varying densities on the GPU: one 3D texture with all grids, and transforms into each body's unit box."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from translucent.scene.scene import Object, Scene
 
 
 class GridTexture:
-    """The grids of the scene that was drawn last, one behind the other, in float32."""
+    """Texture with the grids of the scene that was drawn last, one behind the other, in float32."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
@@ -26,7 +26,7 @@ class GridTexture:
         self._texture: moderngl.Texture3D | None = None
 
     def use(self, unit: int, grids: Sequence[DensityGrid]) -> None:
-        """Give grids to the shader that reads texture `unit`.
+        """Bind grids for the shader that reads texture `unit`.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Faults of drivers that cannot be worked around, and so are refused before they do harm; see ``docs/drivers.md``."""
+"""Faults of drivers that cannot be worked around, refused before they do harm; see ``docs/drivers.md``."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from translucent.errors import RenderError
 
 
 class DriverFaultError(RenderError):
-    """What was asked for would end the process, through no fault of its own."""
+    """Error for a request that would crash the process through a fault of the driver."""
 
 
 def require_interfaces(info: Mapping[str, Any]) -> None:
-    """Raise `DriverFaultError` where the driver crashes on what the interfaces of bodies do to light.
+    """Raise `DriverFaultError` where the driver crashes on the shading of interfaces.
 
     Lavapipe 22 reads before the first of its constant buffers where it inlines uniforms into that shader.
     """

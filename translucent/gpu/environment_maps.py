@@ -16,7 +16,7 @@ from translucent.scene.environment_map import EnvironmentMap
 
 @dataclass(frozen=True, eq=False)
 class LightMaps:
-    """Filtered maps of what lights a scene.
+    """Filtered maps of an environment's light.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class LightMaps:
 
 
 class EnvironmentMaps:
-    """Textures of each map that has been seen and is still alive."""
+    """Cache of textures of each environment map that has been drawn and is still alive."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
@@ -39,7 +39,7 @@ class EnvironmentMaps:
         self._filtered: WeakKeyDictionary[EnvironmentMap, LightMaps] = WeakKeyDictionary()
 
     def sharp(self, environment: Environment) -> moderngl.Texture:
-        """The environment as it is."""
+        """Texture of the unfiltered environment."""
         source = environment.light_map
         if (texture := self._sharp.get(source)) is None:
             before_making(self._gl)
@@ -47,7 +47,7 @@ class EnvironmentMaps:
         return texture
 
     def light(self, environment: Environment) -> LightMaps:
-        """What rough surfaces mirror and receive of it; filtered on first use."""
+        """Maps for rough reflection and irradiance; filtered on first use."""
         source = environment.light_map
         if (maps := self._filtered.get(source)) is None:
             before_making(self._gl)

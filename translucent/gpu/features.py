@@ -1,4 +1,4 @@
-"""Features of a frame: what its scene and plan ask of the passes, without OpenGL."""
+"""Features of a frame: requirements of its scene and plan on the passes, worked out without OpenGL."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ class FrameFeatures:
 
     @property
     def has_surfaces(self) -> bool:
-        """Whether light changes at the interface of a body."""
+        """Whether any body has an interface that changes light."""
         return self.plan.has(PassName.SURFACES)
 
     @property
     def has_layers(self) -> bool:
-        """Whether layers are painted over the picture, or interfaces glow."""
+        """Whether layers are drawn over the picture, or interfaces emit light."""
         return self.plan.has(PassName.LAYERS)
 
     @property
     def accumulates(self) -> bool:
-        """Whether paths add up: those that the method finds without an order, or those through sheets."""
+        """Whether path lengths are accumulated without order, by the method or through sheets."""
         return not self.plan.ordered or self.plan.has(PassName.THIN_LAYER)
 
     @property
     def has_fallback(self) -> bool:
-        """Whether pixels that do not balance take their path from another target."""
+        """Whether pixels with unbalanced counts take their path length from another target."""
         return self._fills("fallback")
 
     @property
     def has_unlit(self) -> bool:
-        """Whether pixels are marked invalid where bodies are that scatter unseen light."""
+        """Whether pixels are marked invalid where bodies scatter light that is not followed."""
         return self._fills("unlit")
 
     @property
@@ -65,17 +65,17 @@ class FrameFeatures:
 
     @property
     def last_pass(self) -> str:
-        """Name of the pass after which a sample's radiance is whole, and can be summed up."""
+        """Name of the pass after which a sample's radiance is complete and can be summed."""
         return self.plan.passes[-1].name
 
     @property
     def one_interface(self) -> bool:
-        """Whether rays bend at the interface where they enter a body, and not at the one where they leave it."""
+        """Whether rays refract where they enter a body, and not where they leave it."""
         return self.plan.interfaces == "front"
 
     @property
     def finds_exits(self) -> bool:
-        """Whether the intervals tell where each ray first leaves all bodies: interfaces need it where bodies touch."""
+        """Whether the intervals give each ray's first exit from all bodies: touching interfaces need it."""
         return self.has_surfaces and self.plan.method.finds_exits
 
     @property
@@ -90,12 +90,12 @@ class FrameFeatures:
 
     @cached_property
     def slots(self) -> tuple[Slot, ...]:
-        """Bodies by the winding numbers that rays keep apart."""
+        """Slots: bodies grouped by the winding numbers that rays keep apart."""
         return medium_slots(self.scene)
 
     @cached_property
     def sheets(self) -> dict[int, float]:
-        """Thickness in metres of the objects that are drawn as sheets, without an inside, by their numbers."""
+        """Thickness in metres of the objects that are drawn as sheets, by object index."""
         thin = self.plan.method.makes_sheets
         return {
             i: self.sheet_thickness(body)
@@ -104,7 +104,7 @@ class FrameFeatures:
         }
 
     def sheet_thickness(self, body: Object) -> float:
-        """Metres through every face of a body, wherever a pass takes it for a sheet."""
+        """Thickness in metres of each face of a body, where a pass draws it as a sheet."""
         if body.sheet_thickness is not None:
             return body.sheet_thickness
         if (usual := self.plan.method.usual_thickness) is not None:

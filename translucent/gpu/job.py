@@ -1,4 +1,4 @@
-"""One frame under way: its scene and plan, and what the passes share."""
+"""State of a frame that is being rendered: its scene and plan, and the data that passes share."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from translucent.scene.scene import Scene
 
 
 class FrameJob(SceneView):
-    """What a pass needs: the features of the frame, its bodies placed before the camera, its targets.
+    """Input of a pass: the features of the frame, its bodies placed before the camera, its targets.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class FrameJob(SceneView):
         self._cleared.clear()
 
     def light(self, lights: LightLookup) -> None:
-        """Tell the shaders where the lights are that media scatter; they are the same for all samples."""
+        """Write the uniforms of the lights that media scatter; they are the same for all samples."""
         if not self._lit:
             content = scatter_uniforms(self.placed, self.targets.size, lights, self.plan.method.light_points)
             self.uniforms.add(SCATTER, content)
@@ -92,7 +92,7 @@ class FrameJob(SceneView):
 
     @property
     def picture(self) -> moderngl.Framebuffer:
-        """Whose first attachment is the frame's radiance."""
+        """Framebuffer whose first attachment is the frame's radiance."""
         return self.targets.surfaced() if self.features.has_surfaces else self.targets.result()
 
     def sums_after(self, name: str) -> bool:
@@ -118,12 +118,12 @@ class FrameJob(SceneView):
         self.gl.blend_func = moderngl.ONE, moderngl.ONE
 
     def bind_opaque(self, unit: int) -> None:
-        """Give the places where rays end to the shader that reads texture `unit`, if there are any."""
+        """Bind the places where rays end for the shader that reads texture `unit`, if there are any."""
         if self.features.has_opaque:
             self.targets.opaque().color_attachments[0].use(unit)
 
     def bind_grids(self, unit: int) -> None:
-        """Give the density grids to the shader that reads texture `unit`, if a density varies."""
+        """Bind the density grids for the shader that reads texture `unit`, if a density varies."""
         if self.scene.varies:
             self.resources.grids.use(unit, scene_grids(self.scene, self.features.slots))
 
@@ -131,7 +131,7 @@ class FrameJob(SceneView):
 def _contents(
     features: FrameFeatures, placed: PlacedScene, balance: Balance, size: tuple[int, int]
 ) -> dict[UniformBlock, bytes]:
-    """Contents of the blocks that are alike for all samples of a frame."""
+    """Contents of the uniform blocks that are the same for all samples of a frame."""
     scene = placed.scene
     shine = features.has_opaque or features.has_surfaces or features.has_layers
     contents = {

@@ -24,10 +24,10 @@ _TYPES: dict[tuple[str, tuple[int, ...]], tuple[str, int, int]] = {
     ("f", (4, 4)): ("mat4", 64, 16),
 }
 
-#: Lights that shine on opaque objects.
+#: Largest number of lights that shine on opaque objects.
 MAX_LIGHTS = 32
 
-#: Views from lights that media scatter: one each, or the six of a cube.
+#: Largest number of views from lights that media scatter: one each, or the six of a cube.
 MAX_LIGHT_VIEWS = 6 * MAX_SCATTER_LIGHTS
 
 
@@ -74,7 +74,7 @@ class UniformBlock:
 
 @dataclass(frozen=True)
 class PackedTable:
-    """Records in the texels of a texture of RGBA32F, one record a row.
+    """Table of records in an RGBA32F texture, one record a row.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ VIEW = UniformBlock(
     ),
 )
 
-#: Per body: where it is, and what it is made of.
+#: Per body: its placement and material.
 BODY = UniformBlock(
     "Body",
     1,
@@ -199,7 +199,7 @@ BODY = UniformBlock(
     ),
 )
 
-#: Per frame: from path to radiance.
+#: Per frame: the shading of path lengths.
 SHADE = UniformBlock(
     "Shade",
     2,
@@ -213,7 +213,7 @@ SHADE = UniformBlock(
     ),
 )
 
-#: Per frame: what intervals are filled with.
+#: Per frame: the media of intervals.
 MEDIA = UniformBlock(
     "Media",
     3,
@@ -226,7 +226,7 @@ MEDIA = UniformBlock(
     ),
 )
 
-#: Per frame: what is far away, as it is seen behind everything, and as it lights.
+#: Per frame: the environment, as a background and as a light.
 ENVIRONMENT = UniformBlock(
     "Environment",
     5,
@@ -309,7 +309,7 @@ DENSITY = UniformBlock(
 
 BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES)}
 
-#: What does not vary over the surface of an object: a record for each of them.
+#: Surface parameters that do not vary over an object: a record for each object.
 SURFACE_ROW = PackedTable(
     "SurfaceRow",
     "surface_table",

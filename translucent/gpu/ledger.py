@@ -1,4 +1,4 @@
-"""What the frames of a context make and keep, and what has to wait: a window must not stand still for it."""
+"""Compile budget of a context: a ledger of the programs made, and postponement of others so that no window freezes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TypeAlias
 
 import moderngl
 
-#: What names a program in every process: its files, and its switches.
+#: Key of a program, the same in every process: its files, and its switches.
 ProgramName: TypeAlias = tuple[tuple[str, str], tuple[tuple[str, int], ...]]
 
 
 class PostponedError(Exception):
-    """A frame is not drawn to its end.
+    """Signal that a frame is left unfinished, as it would exceed the compile budget.
 
     Attributes
     ----------
@@ -28,7 +28,8 @@ class PostponedError(Exception):
 
 @dataclass(eq=False)
 class Ledger:
-    """What a context has made and may make. It is the context's ``extra``, if anything is.
+    """Ledger of the programs that a context has made, and of its compile budget. It is the context's ``extra``, if
+    anything is.
 
     Attributes
     ----------
@@ -48,11 +49,11 @@ class Ledger:
     _made: bool = False
 
     def begin_frame(self, seconds: float) -> None:
-        """A frame begins, that has some seconds to make things."""
+        """Begin a frame with a compile budget in seconds."""
         self._until, self._made = time.perf_counter() + seconds, False
 
     def enter(self, program: ProgramName | None) -> None:
-        """Note what is about to be made, or raise `PostponedError`."""
+        """Record a program that is about to be made, or raise `PostponedError`."""
         if self.postpones and program is not None and program not in self.elsewhere:
             raise PostponedError(program)
         # Every frame makes something, or none would ever be done.
@@ -64,6 +65,6 @@ class Ledger:
 
 
 def before_making(gl: moderngl.Context, program: ProgramName | None = None) -> None:
-    """Ask the context's ledger whether a program, or something else that is kept and takes time, is to be made now."""
+    """Ask the context's ledger whether a program, or another cached object that takes time, may be made now."""
     if isinstance(gl.extra, Ledger):
         gl.extra.enter(program)

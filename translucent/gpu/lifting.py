@@ -21,23 +21,23 @@ from translucent.suggestions import close_names, did_you_mean
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _COMMENT = re.compile(r"//.*")
 _FUNCTION = re.compile(r"[\w\s\[\]]*?\b(\w+)\s*\([^;{]*\)\s*\{")
-#: What names in a declaration say of it, and that nothing else could be declared as.
+#: GLSL keywords and types, which no declaration can have as its name.
 _WORDS = re.compile(
     r"[iub]?vec[234]|mat[234](x[234])?|float|u?int|bool|void|[iu]?sampler\w+|const|uniform|buffer|struct|layout|std140|"
     r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
 )
 _LINE = re.compile(r"#line \d+ (\d+)$")
 _DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
-#: What needs a newer GLSL than the rest.
+#: Identifiers that need a newer GLSL version.
 _STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
 
-#: Of GLSL: for all shaders, and for those that write to buffers.
+#: Versions of GLSL: for all shaders, and for those that write to buffers.
 PLAIN, WITH_STORAGE = 330, 430
 
 
 @dataclass(frozen=True)
 class Lifted:
-    """A shader to be used elsewhere.
+    """Shader text for use in another engine.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Lifted:
 
 @dataclass
 class _Part:
-    """A top-level declaration with the comment above it, or a comment that stands alone."""
+    """Part of a shader: a top-level declaration with the comment above it, or a comment that stands alone."""
 
     file: int
     text: str
@@ -69,18 +69,18 @@ class _Part:
 
     @property
     def function(self) -> str | None:
-        """The name of the function that it defines."""
+        """Name of the function that the part defines."""
         match = _FUNCTION.match(self.code.strip())
         return None if match is None else match[1]
 
     @property
     def names(self) -> set[str]:
-        """All that it speaks of."""
+        """All names in the part."""
         return {name for name in _NAME.findall(self.code) if not _WORDS.fullmatch(name)}
 
     @property
     def declares(self) -> set[str]:
-        """What others may need it for: the name of a function, or any name that is in it."""
+        """Names that other parts may need from it: the name of a function, or any name in the part."""
         return self.names if self.function is None else {self.function}
 
 
@@ -108,12 +108,12 @@ def find_shader(name: str) -> str:
 
 
 def switches(name: str) -> list[str]:
-    """The switches of a shader file and of all that it includes, sorted."""
+    """Switches of a shader file and of its includes, sorted."""
     return sorted(gather(name).switches)
 
 
 def lift(name: str, defines: Mapping[str, int]) -> Lifted:
-    """A shader as one text.
+    """Text of a shader, with its includes and constants written out.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def lift(name: str, defines: Mapping[str, int]) -> Lifted:
 
 
 def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:
-    """The lines that the switches leave, each with the number of its file."""
+    """Lines that remain after preprocessing the switches, each with the number of its file."""
     file, missing = 0, set[str]()
     live, done = [True], [True]  # for each nested condition: whether we are in, and whether a branch has been taken
     for line in gathered.lines:
@@ -180,12 +180,12 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Itera
 
 
 def _least(key: str, gathered: Gathered) -> int:
-    """The smallest value that a shader takes for a switch."""
+    """Smallest value that a shader accepts for a switch."""
     return int(any(re.match(rf"\s*#if {key} < 1$", line) for line in gathered.lines))
 
 
 def _value(condition: str, defines: Mapping[str, int]) -> bool:
-    """Whether a condition of whole numbers and switches holds."""
+    """Value of a preprocessor condition of integers and switches."""
     text = re.sub(r"!(?!=)", " not ", condition.replace("&&", " and ").replace("||", " or "))
     return bool(_evaluated(ast.parse(text.strip(), mode="eval").body, defines))
 
@@ -208,7 +208,7 @@ def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
 
 
 def _parts(lines: Iterable[tuple[int, str]]) -> Iterator[_Part]:
-    """The top-level declarations, in order, without those of constants, which are written anew."""
+    """Top-level declarations in order, without constants, which are written anew."""
     above: list[str] = []
     part: list[str] = []
     depth = 0
@@ -237,7 +237,7 @@ def _parts(lines: Iterable[tuple[int, str]]) -> Iterator[_Part]:
 
 
 def _reached(parts: list[_Part]) -> list[_Part]:
-    """Those that the shader needs, and the comments on files of which something is left."""
+    """Parts that the shader needs, and the comments on files of which any part remains."""
     functions = {part.function for part in parts}
     declaring: dict[str, list[_Part]] = {}
     for part in parts:
@@ -259,12 +259,12 @@ def _reached(parts: list[_Part]) -> list[_Part]:
 
 
 def _faces(part: _Part) -> bool:
-    """Whether it is what a stage shares with the one before or after, which has to agree."""
+    """Whether a part is an input or output of a stage, which has to match the neighboring stage."""
     return re.match(r"\s*(layout\s*\([^)]*\)\s*)?(flat\s+)?(in|out|invariant)\b", part.code) is not None
 
 
 def _constants(used: set[str]) -> list[str]:
-    """The constants that are used, or that these are made of, in the order in which they are written."""
+    """Constants that are used, directly or by other constants, in the order in which they are written."""
     wanted = {key for key in CONSTANTS if key in used}
     while more := {key for one in wanted for key in _NAME.findall(CONSTANTS[one]) if key in CONSTANTS} - wanted:
         wanted |= more

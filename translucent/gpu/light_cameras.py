@@ -9,13 +9,13 @@ from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Scene
 
-#: The frame of a view is larger than what must be in it by this factor: interpolation needs neighbors.
+#: Factor by which the frame of a view is larger than its content: interpolation needs neighbors.
 _MARGIN = 1.02
 
-#: A point light whose view would have to be wider than this angle, in degrees, looks in six directions instead.
+#: Widest view of a point light, in degrees; one that needs a wider view gets six instead.
 _WIDEST = 110.0
 
-#: Smallest angle of a view, in degrees: media that are but a point.
+#: Smallest angle of a view, in degrees, for media as small as a point.
 _NARROWEST = 1e-6
 
 #: Directions of the six views, as `light_view_towards` in ``shaders/volume/light_views.glsl`` numbers them.
@@ -30,7 +30,7 @@ def media_sphere(scene: Scene) -> tuple[Array, float]:
 
 
 def light_cameras(light: Light, scene: Scene) -> list[Camera]:
-    """One camera that sees all media from a light, or six where the light is among them or close by."""
+    """Cameras of a light: one that sees all media, or six where the light is among them or close by."""
     center, radius = media_sphere(scene)
     points = np.concatenate([body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] for body in scene.bodies])
     if isinstance(light, DirectionalLight):
@@ -60,5 +60,5 @@ def light_cameras(light: Light, scene: Scene) -> list[Camera]:
 
 
 def _any_up(direction: Array) -> Array:
-    """A unit axis that is far from a direction."""
+    """Coordinate axis that is far from a direction."""
     return np.asarray(np.eye(3)[int(np.abs(direction).argmin())])

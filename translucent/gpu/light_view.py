@@ -1,4 +1,4 @@
-"""Views from the lights of a scene at its media: bodies placed before each, and how shaders find points in them."""
+"""Views from the lights of a scene at its media: bodies placed before each, and lookup data for shaders."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from translucent.scene.camera import Camera
 
 
 class LightView(SceneView):
-    """The scene of a frame as a light sees it in one direction.
+    """View of the scene from a light in one direction.
 
     It has uniforms of its own for what depends on the camera only, and leaves bound what the frame has bound else.
 
@@ -44,7 +44,7 @@ class LightView(SceneView):
         return self.targets.size[0] * self.targets.size[1]
 
     def rows(self, center: Array) -> Array:
-        """(4, 4): x, y and w of the picture, and place, of a point given from the center of the media."""
+        """(4, 4): from points, relative to the center of the media, to x, y and w of the picture, and depth."""
         camera, media = self.scene.camera, self.placed.media
         axes = np.stack([camera.right, camera.up, camera.forward])
         seen = np.column_stack([axes, axes @ (center - camera.eye)])
@@ -60,7 +60,7 @@ def first_texels(views: Sequence[LightView]) -> list[int]:
 
 
 def light_lookup(groups: Sequence[Sequence[LightView]]) -> LightLookup:
-    """Where each light's views are, and how points get into them; a group holds the views of one light."""
+    """Lookup of each light's views, and of points in them; a group holds the views of one light."""
     views = [view for group in groups for view in group]
     offsets = first_texels(views)
     spans, first = [], 0

@@ -1,4 +1,4 @@
-"""A software OpenGL without a window system, through Mesa's off-screen library and ctypes.
+"""Software OpenGL without a window system, through Mesa's off-screen library and ctypes.
 
 The library is the system's libOSMesa, or the one in the Python package that the extra ``osmesa`` installs.
 """

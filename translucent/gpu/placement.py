@@ -1,4 +1,4 @@
-"""Where bodies are in a frame: float64 on the CPU, rounded to float32 only relative to each body's center."""
+"""Placement of bodies in a frame: float64 on the CPU, rounded to float32 only relative to each body's center."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from translucent.arrays import Array
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
-#: An eye nearer to a surface than this share of the diagonal is on it; what is nearer than that ahead is clipped.
+#: Distance to a surface, as a share of the diagonal, within which the eye is on it; anything nearer ahead is clipped.
 NEAR_SURFACE = 1e-6
 
 
 @dataclass(frozen=True)
 class Placement:
-    """One object as seen by a camera.
+    """Placement of one object before a camera.
 
     Attributes
     ----------
@@ -63,14 +63,14 @@ class Placement:
 
 @dataclass(frozen=True)
 class AxialRange:
-    """From the nearest to the farthest metre along the camera's forward axis, counted from the eye."""
+    """Nearest and farthest distance along the camera's forward axis, in metres from the eye."""
 
     near: float
     far: float
 
     @classmethod
     def of(cls, objects: Sequence[Object], camera: Camera) -> AxialRange:
-        """Of what is ahead of the eye, or of an orthographic picture."""
+        """Range of the scene ahead of the eye, or of an orthographic picture."""
         depths = np.concatenate([_corners(body.bounds - camera.eye) @ camera.forward for body in objects])
         near = max(float(depths.min()), 0.0)
         # A flat scene has one depth; any length will do.
@@ -78,13 +78,13 @@ class AxialRange:
 
     @property
     def length(self) -> float:
-        """In metres, above 0."""
+        """Length in metres, above 0."""
         return self.far - self.near
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedScene:
-    """A scene as its camera sees it.
+    """Scene placed before its camera.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class PlacedScene:
 
 @dataclass(frozen=True)
 class SampleView:
-    """The camera, and the sample points of a picture.
+    """Camera with the sample points of a picture.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def _corners(bounds: Array) -> Array:
 
 
 def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:
-    """Signed counts that are right for a body whose bounds the eye, or the image plane, is in."""
+    """Valid signed counts of a body whose bounds contain the eye or part of the image plane."""
     if body.sheet_thickness is not None or camera.fov_y is None:
         # An orthographic ray is a whole line: it leaves a body as often as it enters, some of it behind the picture.
         return 0.0, 0.0

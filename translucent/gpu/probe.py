@@ -1,4 +1,4 @@
-"""Run a function of ``shaders/lib`` over arrays, by transform feedback: how GLSL is tested against NumPy."""
+"""Run a function of ``shaders/lib`` over arrays, by transform feedback: used to test GLSL against NumPy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WIDTH = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 
 @dataclass(frozen=True)
 class Signature:
-    """A GLSL function: its name, the type it returns, and its parameters as (type, name)."""
+    """Signature of a GLSL function: its name, the type it returns, and its parameters as (type, name)."""
 
     name: str
     returns: str
@@ -37,7 +37,7 @@ def signatures(path: Path) -> dict[str, Signature]:
 def run_function(
     gl: moderngl.Context, library: str, signature: Signature, *arguments: npt.ArrayLike
 ) -> npt.NDArray[np.float32]:
-    """Values of a GLSL function.
+    """Evaluate a GLSL function over arrays.
 
     Parameters
     ----------

@@ -29,12 +29,12 @@ from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
 
-#: OpenGL from which on shaders write to buffers.
+#: First OpenGL version in which shaders write to buffers.
 SHADER_STORAGE = 430
 
 
 class GpuRenderer:
-    """Runs plans with OpenGL.
+    """Renderer that runs plans with OpenGL.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class GpuRenderer:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the planner may count on."""
+        """Capabilities of this OpenGL for the planner."""
         return Capabilities(shader_storage=self.context.gl.version_code >= SHADER_STORAGE)
 
     def render(
@@ -128,7 +128,7 @@ class GpuRenderer:
         plan: RenderPlan,
         backdrop: Backdrop | TextureBackdrop | None = None,
     ) -> FrameJob:
-        """Everything that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
+        """Prepare the job that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
         self._require_open()
         if self._targets is None or self._targets.size != size:
             old, self._targets = self._targets, None
@@ -158,7 +158,7 @@ class GpuRenderer:
         return self._timer.seconds()
 
     def read(self, job: FrameJob, samples: int = 1) -> Frame:
-        """The frame that the passes have left in the job's targets, radiance and transmittance averaged if sampled."""
+        """Read the frame from the job's targets, with radiance and transmittance averaged if sampled."""
         result = job.targets.result()
         if samples > 1:
             averages = job.targets.average()
@@ -212,11 +212,11 @@ class GpuRenderer:
 
     @property
     def interrupted(self) -> bool:
-        """Whether a frame was ended at a place where nobody knows what is half done, as by Ctrl-C."""
+        """Whether a frame was interrupted at an unknown point, as by Ctrl-C."""
         return self._interrupted
 
     def interrupt(self) -> None:
-        """Draw nothing any more: what is half done may be anywhere, and would be in the next frames, too."""
+        """Stop drawing for good, as half-finished work would show up in later frames."""
         self._interrupted = True
         self.context.forget()
         if not self.context.owned and self._pid == os.getpid():
@@ -224,7 +224,7 @@ class GpuRenderer:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Within, no other thread uses this renderer, whose context can be current in one thread only."""
+        """Lock against use by other threads, as the context can be current in one thread only."""
         require_own_process()
         if not self._turn.acquire(blocking=False):
             raise RenderError("rendering", "another thread uses this renderer", "give each thread one of its own")
@@ -255,7 +255,7 @@ class GpuRenderer:
 
 
 def _release(gl: moderngl.Context, pid: int) -> None:
-    """Release a context, but not in a process that is forked from the one that it belongs to."""
+    """Release a context, but not in a process forked from its owner."""
     if pid == os.getpid():
         gl.release()
 
@@ -269,7 +269,7 @@ def _read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components:
 
 
 def _read_normals(interfaces: moderngl.Framebuffer) -> npt.NDArray[np.float32]:
-    """(h, w, 3): of the interfaces that the interfaces pass has found, 0 where there is none."""
+    """(h, w, 3): normals of the interfaces that the interfaces pass has found, 0 where there is none."""
     found = _read_floats(interfaces, 0, 4)[::-1]
     there = found[..., 3:] < float(CONSTANTS["NOTHING"])
     return np.ascontiguousarray(np.where(there, found[..., :3], np.float32(0.0)))

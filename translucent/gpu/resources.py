@@ -1,4 +1,4 @@
-"""What frames share on the GPU, uploaded once: meshes, densities, environments, textures, and what lights see."""
+"""Resources shared by frames on the GPU, uploaded once: meshes, densities, environments, textures, and light views."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from translucent.gpu.textures import TextureCache
 
 
 class Resources:
-    """The caches of one context."""
+    """Caches of one context."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self.meshes = MeshCache(gl)
         self.grids = GridTexture(gl)
         self.environments = EnvironmentMaps(gl)
         self.textures = TextureCache(gl)
-        #: What lights see is the same for frames of all sizes.
+        #: Views from lights, which are the same for frames of all sizes.
         self.light_lists = Storage(gl, "light that media scatter")
 
     def release(self) -> None:
-        """Free all of it."""
+        """Free all caches."""
         for cache in (self.meshes, self.grids, self.environments, self.textures, self.light_lists):
             cache.release()

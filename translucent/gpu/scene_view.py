@@ -1,4 +1,4 @@
-"""A scene as one camera sees it, ready to be drawn: what a frame and a light's view have in common."""
+"""View of a scene from one camera, ready to be drawn: the common base of a frame and a light's view."""
 
 from __future__ import annotations
 

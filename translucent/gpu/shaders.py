@@ -1,4 +1,4 @@
-"""From files in ``shaders/`` to programs: includes, constants from Python, and compiler messages with file and line."""
+"""Programs from files in ``shaders/``: includes, constants from Python, and compiler messages with file and line."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int
 
 
 class Gathered:
-    """The lines of a file and of what it includes, and the switches that they ask for."""
+    """Lines of a file and of its includes, and the switches that they use."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -80,7 +80,7 @@ class Gathered:
         self.switches: set[str] = set()
 
     def add(self, name: str, parents: tuple[str, ...]) -> None:
-        """Take a file, which files named before have included, and what it includes."""
+        """Add a file, reached through includes from `parents`, and the files that it includes."""
         if name in parents:
             raise RenderError(
                 f"shader {parents[0]!r}", f"includes go in circles: {' -> '.join([*parents, name])}", "cut one"
@@ -169,7 +169,7 @@ def build_program(
 
 
 def _stage(name: str, defines: Mapping[str, int], version: int) -> ShaderSource:
-    """The stage with those of the defines that it asks for."""
+    """Preprocessed stage, with those of the defines that it uses."""
     asked = gather(name).switches
     return preprocess(name, {key: value for key, value in defines.items() if key in asked}, version)
 

@@ -11,7 +11,7 @@ from translucent.gpu.ledger import before_making
 
 
 class Storage:
-    """Buffers by name, made when first asked for, that only grow.
+    """Named buffers, made on first use, that only grow.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ class Storage:
 
     @property
     def size(self) -> int:
-        """Bytes of all of them."""
+        """Total size of the buffers in bytes."""
         return sum(buffer.size for buffer in self._buffers.values())
 
     def release(self) -> None:
-        """Free all of them."""
+        """Free all buffers."""
         for buffer in self._buffers.values():
             buffer.release()
         self._buffers.clear()

@@ -1,4 +1,4 @@
-"""In which order a picture is drawn, one sample of some pixels after the other."""
+"""Order in which the pixels and samples of a progressive picture are drawn."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ STRIDES = (1, 2, 4, 8)
 
 @lru_cache(maxsize=4)
 def shifts(samples: int) -> npt.NDArray[np.float64]:
-    """(samples, 2): where in a pixel its later samples are."""
+    """(samples, 2): sub-pixel shifts of a pixel's later samples."""
     return sample_shifts(samples)
 
 
 @lru_cache(maxsize=4)
 def places(stride: int) -> list[tuple[tuple[int, int], int]]:
-    """Places within stride x stride pixels, in the order in which they are drawn, and how far each one's color goes."""
+    """Places within stride x stride pixels, in drawing order, and the side of the square that each fills."""
     order: list[tuple[tuple[int, int], int]] = [((0, 0), stride)]
     block = stride // 2
     while block:

@@ -26,7 +26,7 @@ class Targets:
         self.buffers = Storage(gl, f"frame size {size[0]}x{size[1]}")
 
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:
-        """Where thickness passes add up: RG32F (path, count), or RGBA32F (optical depth, count) and R32F (path)."""
+        """Accumulator of thickness passes: RG32F (path, count), or RGBA32F (optical depth, count) and R32F (path)."""
         return self._get(f"{name}-{spectral}", (4, 1) if spectral else (2,))
 
     def nearest_and_farthest(self) -> moderngl.Framebuffer:
@@ -34,7 +34,7 @@ class Targets:
         return self._get("nearest_and_farthest", (4,))
 
     def opaque(self) -> moderngl.Framebuffer:
-        """R32F place and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
+        """R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
         return self._get("opaque", (1, 4), with_depth=True)
 
     def entered(self) -> moderngl.Framebuffer:
@@ -58,11 +58,11 @@ class Targets:
         return self._get(f"peeled-{number}", (4,), with_depth=True, depth_of="peeled-0" if number else None)
 
     def peel_state(self, number: int) -> moderngl.Framebuffer:
-        """Two walks along each ray while peeling goes on: five RGBA32F and two RGBA32UI."""
+        """State of the two walks along each ray during peeling: five RGBA32F and two RGBA32UI."""
         return self._get(f"peel_state-{number}", (4, 4, 4, 4, 4), windings=2)
 
     def nothing(self) -> moderngl.Framebuffer:
-        """Something to draw into for passes that write to buffers only.
+        """Framebuffer for passes that write to buffers only.
 
         Its colors are masked. Else llvmpipe takes a face that fills a tile of 64 x 64 pixels for one that hides what
         has been drawn there, and leaves that out with all that it would have written to buffers.
@@ -76,7 +76,7 @@ class Targets:
         return self._get("steepest", (1,))
 
     def result(self) -> moderngl.Framebuffer:
-        """What a frame holds: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
+        """Arrays of a frame: radiance, transmittance, optical depth (RGBA32F), thickness (R32F) and flags (R8)."""
         return self._get("result", (4, 4, 4, 1, -1))
 
     def average(self) -> moderngl.Framebuffer:
@@ -88,18 +88,18 @@ class Targets:
         return self._get("layers", (4, 4))
 
     def fronts(self) -> moderngl.Framebuffer:
-        """R32F place where a ray first meets a body, with a depth buffer."""
+        """R32F depth at which a ray first meets a body, with a depth buffer."""
         return self._get("fronts", (1,), with_depth=True)
 
     def view(self, name: str, attachment: int) -> moderngl.Framebuffer:
-        """One attachment of the framebuffer of this name alone, to draw into."""
+        """Framebuffer with only one attachment of the framebuffer of this name."""
         if (name, attachment) not in self._views:
             texture = self._framebuffers[name].color_attachments[attachment]
             self._views[name, attachment] = self._gl.framebuffer([texture])
         return self._views[name, attachment]
 
     def depth_only(self) -> moderngl.Framebuffer:
-        """A depth buffer and nothing else."""
+        """Framebuffer with a depth buffer and nothing else."""
         if "depth_only" not in self._framebuffers:
             self._framebuffers["depth_only"] = self._gl.framebuffer(depth_attachment=self._gl.depth_texture(self.size))
         return self._framebuffers["depth_only"]

@@ -1,4 +1,4 @@
-"""Textures on the GPU: uploaded once, shared by all passes, gone when the texture is."""
+"""Textures on the GPU: uploaded once, shared by all passes, freed with the texture."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
 from translucent.scene.texture import Texture
 
-#: In place of a texture: all values as they are, and a normal straight out.
+#: Neutral texels in place of a missing texture: factors of 1, and an unperturbed normal.
 _WHITE = Texture(np.ones((1, 1, 3), dtype=np.float32))
 _STRAIGHT = Texture(np.full((1, 1, 3), (0.5, 0.5, 1.0), dtype=np.float32))
 
@@ -34,7 +34,7 @@ def reflectance_table(gl: moderngl.Context) -> moderngl.Texture:
 
 
 class TextureCache:
-    """Each texture that has been drawn and is still alive, with mipmaps.
+    """Cache of each texture that has been drawn and is still alive, with mipmaps.
 
     Half floats hold 11 bits, more than pictures have, in half the room.
     """
@@ -44,7 +44,7 @@ class TextureCache:
         self._textures: WeakKeyDictionary[Texture, moderngl.Texture] = WeakKeyDictionary()
 
     def bind(self, surface: Surface, program: moderngl.Program, first_unit: int) -> None:
-        """Give a surface's textures to a program that includes ``shade/surface_textures.glsl``."""
+        """Bind a surface's textures for a program that includes ``shade/surface_textures.glsl``."""
         rows = []
         for unit, name in enumerate(TEXTURE_FIELDS, first_unit):
             texture = getattr(surface, name) or (_STRAIGHT if name == "normal_texture" else _WHITE)
@@ -54,7 +54,7 @@ class TextureCache:
         set_uniform(program, "texture_rows", rows[: program["texture_rows"].array_length])
 
     def bind_holes(self, surface: Surface, program: moderngl.Program, unit: int) -> None:
-        """Give what tells where a sheet has holes to a program that includes ``thickness/holes.glsl``."""
+        """Bind the textures of a sheet's holes for a program that includes ``thickness/holes.glsl``."""
         texture = surface.color_texture or _WHITE
         self[texture].use(unit)
         set_uniform(program, "color_rows", [tuple(row) for row in texture.rows])

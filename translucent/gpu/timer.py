@@ -25,11 +25,11 @@ class PassTimer:
         texture.release()
 
     def begin_frame(self) -> None:
-        """Forget the previous frame's times."""
+        """Discard the previous frame's times."""
         self._seconds.clear()
 
     def measure(self, name: str) -> moderngl.Query:
-        """A query that times what is drawn within; what a name is given to more than once in a frame adds up."""
+        """Context manager that times the draws within; times of the same name in a frame add up."""
         if name not in self._queries:
             self._queries[name] = self._gl.query(time=True)
         query = self._queries[name]
@@ -37,7 +37,7 @@ class PassTimer:
         return query
 
     def stop(self) -> None:
-        """End what is being measured, where it is not known whether anything is."""
+        """End the running measurement, if there is one."""
         for query in self._queries.values():
             with suppress(moderngl.Error):  # it was not begun
                 query.mglo.end()

@@ -1,4 +1,4 @@
-"""Uniform buffers of a picture: what its camera decides, body by body, and what stays the same for all its samples."""
+"""Uniform buffers of a picture: those that depend on its camera, body by body, and those shared by all samples."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class UniformBuffers:
         self.bind()
 
     def add(self, block: UniformBlock, content: bytes) -> None:
-        """Take in another block that is alike for all samples; `bind` makes it known."""
+        """Add a block that is the same for all samples; `bind` binds it."""
         if block in self._constant:
             self._constant[block].release()
         self._constant[block] = self._gl.buffer(content)
@@ -66,7 +66,7 @@ class UniformBuffers:
             buffer.bind_to_uniform_block(block.binding)
 
     def bind_body(self, number: int) -> None:
-        """Let the next draw be of the object of this number."""
+        """Bind the uniforms of one object for the next draw."""
         self._bodies.bind_to_uniform_block(BODY.binding, offset=number * _STRIDE, size=BODY.dtype.itemsize)
 
     def release(self) -> None:

@@ -1,4 +1,4 @@
-"""Contents of the uniform blocks: what the shaders are told about a frame and its bodies."""
+"""Contents of the uniform blocks: values that shaders read about a frame and its bodies."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
 
 @dataclass(frozen=True, eq=False)
 class LightLookup:
-    """Numbers by which shaders find points in the views from the lights that media scatter.
+    """Lookup data of the views from the lights that media scatter.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
 
 
 def slot_bits(count: int) -> int:
-    """Bits that tell `count` slots apart."""
+    """Number of bits that tell `count` slots apart."""
     return max(count - 1, 0).bit_length()
 
 
@@ -170,7 +170,7 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:
-    """Contents of the Shade block; the first body's medium stands for all where they are alike."""
+    """Contents of the Shade block; the first body's medium stands for all where they are the same."""
     medium = scene.bodies[0].medium
     assert medium is not None
     return SHADE.pack(

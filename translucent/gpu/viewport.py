@@ -1,4 +1,4 @@
-"""A picture that is looked at while it is drawn: at once and coarse, then sharp, then smooth, without reading it back.
+"""Progressive rendering for a window: at first coarse, then sharp, then smooth, without reading pixels back.
 
 A step draws a frame whose pixels have their centers on one of `stride` x `stride` pixels of the picture, so that no
 step takes long on a slow machine, and that after `stride`^2 of them each pixel is what a frame of the full size shows.
@@ -36,7 +36,7 @@ RIGHT_SIDES = ("same", "second", "difference")
 
 @dataclass(frozen=True)
 class Shown:
-    """How a picture is shown.
+    """Display settings of a picture.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Probe:
-    """What a pixel holds.
+    """Values of one pixel.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Probe:
 
 
 class _Side:
-    """The sums of one frame: radiance, optical depth and thickness, flags."""
+    """Accumulated samples of one side of the comparison: radiance, optical depth and thickness, flags."""
 
     def __init__(self, gl: moderngl.Context, size: Size) -> None:
         self.size = size
@@ -94,7 +94,7 @@ class _Side:
         self.step, self.stride = 0, 1
 
     def known(self) -> list[int]:
-        """Which place of the stride x stride ones stands in for each, and for those that no stride has, 0."""
+        """Drawn place, of the stride x stride ones, that stands in for each place; 0 for the rest."""
         order = places(self.stride)
         found = [0] * STRIDES[-1] ** 2
         for (x, y), block in order[: max(self.step, 1)]:
@@ -104,7 +104,7 @@ class _Side:
         return found
 
     def kept(self, x: int, y: int) -> Size:
-        """Where a pixel is kept, once all of them are drawn."""
+        """Position at which pixel (x, y) is kept, once all of them are drawn."""
         part = self.size[0] // self.stride, self.size[1] // self.stride
         return x % self.stride * part[0] + x // self.stride, y % self.stride * part[1] + y // self.stride
 
@@ -115,7 +115,7 @@ class _Side:
 
 
 class Viewport:
-    """The picture of a window, in a texture; a second frame beside it, to compare.
+    """Progressive picture of a window, in a texture, with a second frame beside it to compare.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class Viewport:
 
     @property
     def framebuffer(self) -> moderngl.Framebuffer:
-        """What draws into `texture`."""
+        """Framebuffer of `texture`."""
         chosen = self._coarse if self._at_once and self._coarse is not None else self._screen
         assert chosen is not None
         return chosen
@@ -221,7 +221,7 @@ class Viewport:
         self._screen, self.size = screen, size
 
     def restart(self) -> None:
-        """Begin anew: something else is to be seen."""
+        """Begin anew, with another scene or other settings."""
         for side in self._sides:
             if side is not None:
                 side.step = 0
@@ -246,12 +246,12 @@ class Viewport:
         chosen.step += 1
 
     def steps(self, side: int) -> int:
-        """How many samples a side has."""
+        """Number of samples that a side has."""
         found = self._sides[side]
         return 0 if found is None else found.step
 
     def put(self, frame: Frame) -> None:
-        """Let a frame, such as the reference, be the second side."""
+        """Show a frame, such as the reference, as the second side."""
         side = self._side(1, frame.size)
         height, width = frame.thickness.shape
         light = np.ones((height, width, 4), dtype=np.float32)
@@ -264,7 +264,7 @@ class Viewport:
         side.step = side.stride = 1
 
     def present(self, shown: Shown) -> None:
-        """Develop what there is into the texture."""
+        """Tone-map the samples so far into the texture."""
         first, second = self._side(0, self.size), self._sides[1]
         other = first if second is None or not second.step else second
         for unit, texture in enumerate([*first.textures, *other.textures, self._colors]):
@@ -303,7 +303,7 @@ class Viewport:
         return self._variants[key]
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
-        """What a pixel holds, counted from the top left; None if it is outside, or nothing is drawn yet."""
+        """Values of a pixel, counted from the top left; None if it is outside, or nothing is drawn yet."""
         found = self._sides[side]
         if found is None or not found.step or not (0 <= x < self.size[0] and 0 <= y < self.size[1]):
             return None
@@ -321,7 +321,7 @@ class Viewport:
         return np.frombuffer(data, np.uint8).reshape(shown.height, shown.width, 3)[::-1].copy()
 
     def release(self) -> None:
-        """Free everything; the engine is somebody else's."""
+        """Free all OpenGL objects except the engine, which belongs to the caller."""
         self._release_pictures()
         for resource in (
             self._gathering,
@@ -371,7 +371,7 @@ class Viewport:
         return side
 
     def _add(self, job: FrameJob, side: _Side, origin: Size, *, first: bool) -> None:
-        """Keep the frame of a job: in place of what there was, or adding to its radiance."""
+        """Store the frame of a job: in place of the last one, or added to its radiance."""
         result = job.targets.result()
         radiance = job.picture.color_attachments[0]
         for unit, texture in enumerate([radiance, *result.color_attachments[2:5]]):

@@ -1,1 +1,1 @@
-"""What fills bodies: coefficients, presets, densities, and the ways from colors to them."""
+"""Participating media: coefficients, presets, densities, and conversions from colors."""

@@ -1,4 +1,4 @@
-"""Single-scattering albedo from the color that a thick, scattering body shows, and back.
+"""Conversion between single-scattering albedo and the diffuse color of a thick, scattering body.
 
 The color C is the reflectance of a half space under white light: after many events, not one. Two maps are in use:
 
@@ -98,7 +98,7 @@ def scattering_medium(
     ior: float = 1.0,
     model: Model = "hulst",
 ) -> Medium:
-    """Medium that looks `color` when it is thick: absorption and scattering from the diffuse color.
+    """Scattering medium with the diffuse color `color` where it is thick.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def scattering_medium(
 
 
 def _similarity(color: npt.ArrayLike) -> Array:
-    """s in 0..1: the smaller root of 0.139 s^2 - (1.139 + 1.17 C) s + (1 - C) = 0."""
+    """Similarity parameter s in 0..1: the smaller root of 0.139 s^2 - (1.139 + 1.17 C) s + (1 - C) = 0."""
     c = _share("color", color)
     b = 1.139 + 1.17 * c
     with np.errstate(under="ignore"):

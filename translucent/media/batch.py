@@ -1,4 +1,4 @@
-"""Color at a distance to extinction for whole tables of materials; a bad row does not stop the others."""
+"""Conversion of tables of colors at distances to extinction; a bad row does not stop the others."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from translucent.media.medium import Medium
 from translucent.media.tables import Row, check_cells, read_table
 from translucent.units import metres_per_unit
 
-#: Rows of a table of swatches.
+#: Largest number of rows in a table of swatches.
 MOST_SHOWN = 30
 
 _TRIPLES = ("color", "extinction", "mean_free_path", "half_value_thickness", "condition_number", "extinction_per_unit")
@@ -25,7 +25,7 @@ _TRIPLES = ("color", "extinction", "mean_free_path", "half_value_thickness", "co
 
 @dataclass(frozen=True)
 class Batch:
-    """What became of a table.
+    """Result of converting a table.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ def convert_table(path: str | Path, unit: str = "m", unit_out: str = "m", clamp:
 
 
 def check_batch_output(path: Path) -> None:
-    """Raise before any work is done where a table could not be written to `path`."""
+    """Raise before any work is done if a table could not be written to `path`."""
     if path.suffix.lower() not in (".json", ".csv"):
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .json or .csv")
     require_place(path, f"output {str(path)!r}")

@@ -1,4 +1,4 @@
-"""A medium stated as a color at a distance, which is how glTF, OpenPBR, Unity and Unreal store it.
+"""Media as a color at a distance, which is how glTF, OpenPBR, Unity and Unreal store them.
 
 Formula: T = exp(-sigma_t d) per channel, with sigma_t = sigma_a + sigma_s. The same sigma_t has a color at every
 distance; the choice matters only for rounding. A color of 1/e in the densest channel is well conditioned: nearer to
@@ -17,7 +17,7 @@ from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.media.medium import Medium
 
-#: Darkest channel that is written, and what a channel of 0 is read as: no finite extinction makes black.
+#: Darkest channel that is written, and the value that a channel of 0 is read as: no finite extinction makes black.
 BLACKEST = 1e-5
 
 

@@ -17,7 +17,7 @@ from translucent.media.pixel import pixel_color
 
 ColorLike = str | npt.ArrayLike
 
-#: What to do about a color that a shell has dropped.
+#: Advice about a color that a shell has dropped.
 QUOTE_HINT = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"
 
 _BARE_HEX = re.compile(r"\s*[0-9a-fA-F]{6}\s*")
@@ -26,7 +26,7 @@ _PIXEL = re.compile(r"(.+)@\s*(\d+)\s*,\s*(\d+)\s*")
 
 
 def parse_color(color: str | npt.ArrayLike) -> Array:
-    """Linear Rec.709 triple of a color.
+    """Parse a color into a linear Rec.709 triple.
 
     Parameters
     ----------

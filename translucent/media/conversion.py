@@ -1,4 +1,4 @@
-"""From colors at a distance to extinction and back, over whole arrays, and what to doubt about the result.
+"""Conversion of colors at a distance to extinction and back, over whole arrays, with warnings about the result.
 
 Symbols: transmitted linear color t_c in 0 < t_c <= 1, distance d in m, extinction sigma_t in 1/m. Beer-Lambert:
 t_c = exp(-sigma_t d) for white light in a medium without in-scattering.
@@ -18,13 +18,13 @@ from translucent.formulas import optics
 from translucent.media.swatches import html_swatches
 from translucent.units import metres_per_unit
 
-#: What a channel of 0 becomes where clamping is asked for: an optical depth of 9.2.
+#: Value to which a channel of 0 is clamped if that is asked for: an optical depth of 9.2.
 CLAMP = 1e-4
 
 #: Multiples of the distance at which a medium's colors are shown.
 FACTORS = (0.1, 0.5, 1.0, 2.0, 10.0)
 
-#: Distances in m between which a color at a distance describes an object of every-day size.
+#: Range of distances in m of a color at a distance for objects of everyday size.
 USUAL_DISTANCES = (1e-5, 1e2)
 
 NEAR_BLACK, NEAR_WHITE = 1e-3, 0.98
@@ -74,7 +74,7 @@ def extinction_from_colors(colors: npt.ArrayLike, distances: npt.ArrayLike) -> A
 
 
 def clamp_colors(colors: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Colors whose channels of 0 became `CLAMP` (1e-4), which has an extinction, and which channels those were.
+    """Clamp channels of 0 to `CLAMP` (1e-4), which has a finite extinction; returns colors and mask of these channels.
 
     Parameters
     ----------
@@ -108,20 +108,20 @@ def condition_number(colors: npt.ArrayLike) -> Array:
 
 
 def mean_free_path(extinction: npt.ArrayLike) -> Array:
-    """1 / sigma_t in m, the mean distance to the first event, after which 1/e (37 %) is left; inf where sigma_t = 0."""
+    """Mean free path 1 / sigma_t in m, after which 1/e (37 %) of the light is left; inf where sigma_t = 0."""
     with np.errstate(divide="ignore", over="ignore"):
         return 1.0 / np.asarray(extinction, dtype=np.float64)
 
 
 def half_value_thickness(extinction: npt.ArrayLike) -> Array:
-    """ln 2 / sigma_t in m, after which half the light is left; inf where sigma_t = 0."""
+    """Half-value thickness ln 2 / sigma_t in m, after which half the light is left; inf where sigma_t = 0."""
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray(np.log(2.0) / np.asarray(extinction, dtype=np.float64))
 
 
 @dataclass(frozen=True)
 class DistanceMatch:
-    """Where a medium has a color.
+    """Distance at which a medium best matches a color.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> Dista
 
 
 def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:
-    """What an artist should know about a color at a distance: ill-conditioned channels, a unit that looks wrong.
+    """Warnings about a color at a distance: ill-conditioned channels, a unit that looks wrong.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:
 
 
 def summary(color: npt.ArrayLike, distance: float, extinction: npt.ArrayLike, unit: str = "m") -> dict[str, Any]:
-    """All of this for one color, as JSON can hold it: None stands for infinity. Lengths in metres.
+    """Summary of one color at a distance as values that JSON can hold: None stands for infinity. Lengths in metres.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Relative density inside a body: what scales its medium from place to place.
+"""Relative density inside a body, which scales its medium from place to place.
 
 Positions are in the unit box of the body: 0 to 1 along each axis of the mesh's bounds in object space, as in a 3D
 texture. An affine transform keeps straight lines straight, so means along them hold in the world as well.
@@ -23,7 +23,7 @@ from translucent.frozen import Frozen
 #: Largest relative density: its products with extinctions and lengths of any scene stay within float32.
 MAX_DENSITY = 1e12
 
-#: Pieces of segments that a grid integrates at a time: the working arrays stay below 100 MB.
+#: Number of pieces of segments that a grid integrates at a time: the working arrays stay below 100 MB.
 CHUNK = 1 << 18
 
 #: Gauss-Legendre points of [0, 1] that integrate cubics exactly, and trilinear density is cubic along a line.
@@ -32,7 +32,7 @@ _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 @dataclass(frozen=True, eq=False)
 class DensityGrid(Frozen):
-    """Density from samples: trilinear between the centers of the voxels, constant from there to the boundary.
+    """Density from a voxel grid: trilinear between the centers of the voxels, constant from there to the boundary.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class DensityGrid(Frozen):
 
 
 def _cuts(begin: Array, stop: Array, count: int) -> tuple[Integers, Array]:
-    """Lines, and where on each, 0 to 1, the coordinate between `begin` and `stop` (k,) is one of 0 to count - 1."""
+    """Cuts of lines at grid planes: line index, and place 0 to 1 at which the coordinate is one of 0 to count - 1."""
     low, high = np.minimum(begin, stop), np.maximum(begin, stop)
     first = np.clip(np.floor(low) + 1, 0, count).astype(np.int64)
     number = np.maximum(np.clip(np.ceil(high), 0, count).astype(np.int64) - first, 0)
@@ -278,7 +278,7 @@ def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> 
 
 
 def _along(points: npt.ArrayLike, axis: int) -> Array:
-    """Positions on one axis of the unit box; what rounding puts outside is on the boundary."""
+    """Positions on one axis of the unit box; positions that rounding puts outside are clamped to the boundary."""
     return np.clip(np.asarray(points, dtype=np.float64)[..., axis], 0.0, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""The absorbing medium that explains measured colors best: a photographed wedge, or swatches of known thickness."""
+"""Fit of an absorbing medium to measured colors: a photographed wedge, or swatches of known thickness."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def fit_medium(
     weights: npt.ArrayLike | None = None,
     ior: float = 1.0,
 ) -> Fit:
-    """Absorbing medium for colors at distances: weighted least squares in log space, per channel.
+    """Fit an absorbing medium to colors at distances: weighted least squares in log space, per channel.
 
     The sigma_a >= 0 that minimizes sum w (log t + sigma_a d)^2. The line goes through white at distance 0, so
     reflection at the surface should be divided out first.
@@ -85,7 +85,7 @@ def fit_medium(
 
 
 def fit_wedge(path: str | Path, unit: str = "m") -> Fit:
-    """Fit to a table of a photographed wedge: CSV, or a JSON list of objects.
+    """Fit an absorbing medium to a table of a photographed wedge: CSV, or a JSON list of objects.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def fit_wedge(path: str | Path, unit: str = "m") -> Fit:
 
 
 def _least_squares(d: Array, depth: Array, w: Array) -> tuple[Array, Array, Array | None]:
-    """Best slopes (3,), residuals (n, 3) to those of 0 and above, and the slopes' standard errors (3,)."""
+    """Least-squares slopes (3,), residuals (n, 3) to those of 0 and above, and the slopes' standard errors (3,)."""
     longest = d.max()
     share = (d / longest)[:, None]  # of the longest distance, so that no square overflows
     with np.errstate(under="ignore"):

@@ -1,4 +1,4 @@
-"""Homogeneous media: what light meets between the entry and the exit of a body."""
+"""Homogeneous participating media."""
 
 from __future__ import annotations
 

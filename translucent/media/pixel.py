@@ -56,7 +56,7 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
 
 
 def _read(what: str, path: str | Path) -> tuple[Image, Image | None]:
-    """The image, and a second one with the low bytes of its channels where they have 16 bits."""
+    """Read an image, and a second one with the low bytes of its channels if they have 16 bits."""
     from PIL import ImageOps
 
     do = "give an image file and a pixel, for example photo.png@120,45"

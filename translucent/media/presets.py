@@ -1,4 +1,4 @@
-"""Named media with their sources, from ``presets.toml``, and what an absorption-only view of them is worth."""
+"""Named media with their sources, from ``presets.toml``, and how well absorption alone describes them."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ PAPERS = {
 #: Distances in m at which colors are listed.
 COLOR_DISTANCES = {"1 mm": 1e-3, "1 cm": 1e-2, "10 cm": 1e-1}
 
-#: Size in m of the body that `Preset.regime` speaks of.
+#: Size in m of the body of `Preset.regime`.
 BODY_SIZE = 1e-2
-#: Scattering is left out of account if its share of all events is less than this ...
+#: Albedo below which scattering is neglected ...
 NEGLIGIBLE_ALBEDO = 0.1
-#: ... or if it befalls less than this share of the light that crosses the body.
+#: ... or share of the light that crosses the body below which scattering is neglected.
 NEGLIGIBLE_SCATTERING = 0.05
-#: Scattering dominates from this reduced albedo on.
+#: Smallest reduced albedo at which scattering dominates.
 DOMINANT_ALBEDO = 0.5
 
 _ALWAYS = {"kind", "source", "ior"}
@@ -130,7 +130,7 @@ class Preset:
 
     @property
     def regime(self) -> Regime:
-        """What light does in a body of 1 cm (`BODY_SIZE`); the channel that scatters most decides.
+        """Regime of light transport in a body of 1 cm (`BODY_SIZE`); the channel that scatters most decides.
 
         "scattering dominated"
             In some channel, scattering that counts is as frequent as absorption (reduced albedo >= 0.5), and the
@@ -150,7 +150,7 @@ class Preset:
 
     @property
     def warning(self) -> str:
-        """What a user of absorption alone must know about a scattering dominated medium; empty for others."""
+        """Warning about a scattering-dominated medium for users of absorption alone; empty for others."""
         if self.regime != "scattering dominated":
             return ""
         lengths = [f"{1e3 * v:.3g} mm" if np.isfinite(v) else "no end" for v in self.diffusion_length.tolist()]
@@ -160,11 +160,11 @@ class Preset:
         )
 
     def colors(self) -> dict[str, str]:
-        """What is left of white light after 1 mm, 1 cm and 10 cm, absorption and scattering counted as lost: hex."""
+        """Hex colors of white light after 1 mm, 1 cm and 10 cm, with absorption and scattering counted as lost."""
         return {text: _hex(self.medium.transmittance(metres)) for text, metres in COLOR_DISTANCES.items()}
 
     def absorption_colors(self) -> dict[str, str]:
-        """The same as `colors`, of absorption alone."""
+        """Hex colors as in `colors`, of absorption alone."""
         absorbing = Medium(absorption=self.absorption)
         return {text: _hex(absorbing.transmittance(metres)) for text, metres in COLOR_DISTANCES.items()}
 
@@ -201,7 +201,7 @@ def presets() -> dict[str, Preset]:
 
 
 def preset(name: str) -> Preset:
-    """The preset of this name or alias, in any case, words apart as you like; raises `InputError` if there is none."""
+    """Preset of this name or alias, in any case and with any separators; raises `InputError` if there is none."""
     known = _names()
     key = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     if key in known:
@@ -246,7 +246,7 @@ def read_presets(text: str, file: str = "presets.toml") -> dict[str, Preset]:
 
 
 class _Entry:
-    """One table of the file, read key by key."""
+    """Reader of one table of the file, key by key."""
 
     def __init__(self, file: str, name: str, entry: object) -> None:
         self.where, self.name = f"{file}, [{name}]", name
@@ -349,7 +349,7 @@ def _names() -> dict[str, Preset]:
 
 
 def _speaks_of(one: Preset, word: str) -> bool:
-    """Whether the note has the word, as that of merlot speaks of wine."""
+    """Whether the note contains the word, as that of merlot contains wine."""
     return len(word) >= LEAST_PART and word in re.findall(r"[a-z]+", one.note.lower())
 
 

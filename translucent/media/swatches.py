@@ -1,4 +1,4 @@
-"""Colors to look at: strips for terminals and notebooks."""
+"""Swatches of colors for terminals and notebooks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def terminal_strip(colors: npt.ArrayLike) -> str:
 
 
 def html_swatches(swatches: Iterable[tuple[npt.ArrayLike, str]]) -> str:
-    """Linear colors (3,) side by side, each with its label and its hex color below."""
+    """HTML of linear colors (3,) side by side, each with its label and its hex color below."""
     cells = []
     for color, label in swatches:
         text = to_hex(color)

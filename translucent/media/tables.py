@@ -1,4 +1,4 @@
-"""Small tables that people write: rows of a CSV file or of a JSON list, each with its place for error messages."""
+"""Tables written by hand: rows of a CSV file or of a JSON list, each with its place for error messages."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class Row:
     cells: dict[str, Any]
 
     def need(self, column: str) -> Any:
-        """The value of a column, which must be there."""
+        """Value of a required column."""
         if column not in self.cells:
             raise InputError(column, "missing", "fill it in")
         return self.cells[column]
 
     def length(self, column: str, unit: str) -> float:
-        """Metres of a column's length, in `unit` where it names none."""
+        """Length of a column in metres, read in `unit` if it names none."""
         return parse_length(str(self.need(column)), unit)
 
     def color(self) -> Any:

@@ -1,1 +1,1 @@
-"""From a scene to the passes that it needs, each with its reason; needs no GPU."""
+"""Planning of the passes that a scene needs, each with its reason; needs no GPU."""

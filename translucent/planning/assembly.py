@@ -26,7 +26,7 @@ from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.slots import MAX_SLOTS, medium_slots
 from translucent.scene.scene import Scene, object_names
 
-#: An open mesh that was declared solid is drawn, where it is not closed, as a sheet of this share of its diagonal.
+#: Thickness, as a share of its diagonal, of the sheet that replaces an open mesh declared solid where it is not closed.
 FALLBACK_SHEET = 0.01
 
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasterizer
@@ -64,7 +64,7 @@ def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities
 
 
 def with_unlit_marked(scene: Scene, chosen: RenderPlan) -> RenderPlan:
-    """The plan with a pass that finds the pixels in which media scatter light that this OpenGL cannot follow."""
+    """Add a pass that marks the pixels in which media scatter light that this OpenGL version cannot follow."""
     media = ((i, scene.objects[i].medium) for i in solids_of(scene))
     scattering = tuple(i for i, medium in media if medium is not None and medium.scatters)
     reason = "paths in media that scatter: this OpenGL cannot follow lights there, so their pixels are marked invalid"
@@ -93,7 +93,7 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
 
 
 def _touching(scene: Scene, method: Method) -> tuple[Note, ...]:
-    """That a method which does not tell where a ray leaves all bodies bends it between those that touch."""
+    """Note for a method that does not find where rays leave all bodies, and so refracts them between touching ones."""
     if method.finds_exits or method.makes_sheets or (touching := touching_interfaces(scene)) is None:
         return ()
     text = f"{touching}; {type(method).__name__} does not find it, and takes the interface between them for the last"
@@ -101,7 +101,7 @@ def _touching(scene: Scene, method: Method) -> tuple[Note, ...]:
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
-    """Where the thickness that a method finds in this scene is not exact."""
+    """Notes on where the thickness that a method finds in this scene is not exact."""
     limits = [] if method.makes_sheets else open_limits(scene)
     limits += layer_limits(scene, method) + method.limits(scene)
     if method.ordered:
@@ -116,7 +116,7 @@ def _declared_sheets(scene: Scene) -> tuple[PassSpec, ...]:
 
 
 def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
-    """What a pixel shows that enters and leaves unequally often: open bodies as sheets, all others as ever."""
+    """Passes for pixels with unequal entry and exit counts: open bodies drawn as sheets, all others as usual."""
     leaky = open_bodies(scene)
     if not leaky:
         return ()
@@ -135,7 +135,7 @@ def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
 
 
 def _light_views(scene: Scene, method: Method) -> tuple[PassSpec, ...]:
-    """The pass that looks from the lights, where the method follows them into media that scatter."""
+    """Pass that renders views from the lights, if the method follows light into scattering media."""
     if not method.samples_lights or not scatters(scene):
         return ()
     lights = len(scene.lights)
@@ -165,7 +165,7 @@ def _opaque_passes(scene: Scene) -> tuple[PassSpec, ...]:
 
 
 def _shading(scene: Scene, method: Method) -> str:
-    """How the paths become light, in words."""
+    """Description of how path lengths become radiance."""
     if not any(body.medium is not None and body.medium.emits for body in scene.bodies):
         return "Beer-Lambert: what is behind, through exp(-optical depth)"
     if method.ordered:

@@ -1,4 +1,4 @@
-"""The bodies of a scene as planning sorts them: solids, sheets, and those that are not closed."""
+"""Classification of the bodies of a scene for planning: solids, sheets, and those that are not closed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from translucent.scene.scene import Object, Scene
 
 
 def indices(scene: Scene, keep: Callable[[Object], bool]) -> tuple[int, ...]:
-    """Indices of the objects that are kept."""
+    """Indices of the objects that satisfy a condition."""
     return tuple(i for i, item in enumerate(scene.objects) if keep(item))
 
 
@@ -29,16 +29,16 @@ def open_bodies(scene: Scene) -> tuple[int, ...]:
 
 
 def media_differ(scene: Scene) -> bool:
-    """Whether not all bodies are filled with the same medium."""
+    """Whether any two bodies have different media."""
     return any(not same_medium(scene.bodies[0], body) for body in scene.bodies[1:])
 
 
 def scatters(scene: Scene) -> bool:
-    """Whether a solid scatters, and there are lights whose light it can."""
+    """Whether any solid scatters, and the scene has lights."""
     media = (scene.objects[i].medium for i in solids_of(scene))
     return bool(scene.lights) and any(medium is not None and medium.scatters for medium in media)
 
 
 def count_of(items: tuple[int, ...], one: str, many: str) -> str:
-    """How many there are, in words."""
+    """Count with its noun, in words."""
     return f"{len(items)} {one if len(items) == 1 else many}"

@@ -1,4 +1,4 @@
-"""What a scene asks for and no pass of a plan renders."""
+"""Effects that a scene asks for and no pass of a plan renders."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from translucent.scene.scene import Object, Scene, object_names
 
 
 def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: bool = False) -> tuple[Note, ...]:
-    """What the scene asks for and a plan does not render.
+    """Notes on effects that the scene asks for and a plan does not render.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: bool = Fal
 
 
 def with_ambient_told(plan: RenderPlan) -> RenderPlan:
-    """The plan of a scene in which media emit what they scatter of the ambient radiance, made to say so."""
+    """Add a note to the plan that media emit the ambient radiance that they would scatter."""
     told = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
     shading = (PassName.TRANSMITTANCE, PassName.SHADE)
     passes = tuple(
@@ -55,7 +55,7 @@ def with_ambient_told(plan: RenderPlan) -> RenderPlan:
 
 
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
-    """What is left out of the light that media scatter."""
+    """Notes on scattered light that is not rendered."""
     if interfaces and any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
         text = (
             "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
@@ -83,7 +83,7 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
 
 
 def _refraction_effects(scene: Scene, interfaces: bool) -> list[Note]:
-    """What is left out of the light that interfaces bend and mirror."""
+    """Notes on refracted and reflected light that is not rendered."""
     if not any(body.has_interface for body in scene.bodies):
         return []
     if not interfaces:

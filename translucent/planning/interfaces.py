@@ -1,4 +1,4 @@
-"""What a plan adds where light changes at the interfaces of bodies: they bend, mirror, tint or spread it."""
+"""Passes for interfaces of bodies that refract, reflect, tint or scatter light."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.planning.render_plan import Interfaces, RenderPlan
 from translucent.planning.slots import overlapping_pair
 from translucent.scene.scene import Object, Scene, object_names
 
-#: What a plan says in which rays bend at the front interface alone.
+#: Note of a plan in which rays refract at the front interface alone.
 ONE_INTERFACE = Note(
     NoteKind.ONE_INTERFACE,
     'interfaces="front": bends once, where a ray enters; leaves without bending: rays leave curved bodies in wrong '
@@ -28,7 +28,7 @@ _FRONT_COST = {PassName.INTERFACES: 0.4, PassName.SURFACES: 0.45}
 
 
 def interface_passes(scene: Scene, method: Method, draw_cost: float, shade_cost: float) -> tuple[PassSpec, ...]:
-    """The pass that finds interfaces, and the one that shades them; none where nothing happens at an interface."""
+    """Passes that find and shade interfaces; none where no interface changes light."""
     objects = tuple(i for i, body in enumerate(scene.objects) if body.has_interface)
     if not objects:
         return ()
@@ -61,7 +61,7 @@ def interface_passes(scene: Scene, method: Method, draw_cost: float, shade_cost:
 
 
 def check_interfaces(interfaces: str) -> None:
-    """Raise `InputError` for what is no choice of interfaces."""
+    """Raise `InputError` for an unknown choice of interfaces."""
     if interfaces not in get_args(Interfaces):
         raise InputError(f"interfaces {interfaces!r}", "not known", f"use one of {', '.join(get_args(Interfaces))}")
 
@@ -123,7 +123,7 @@ def picture_cuts(scene: Scene, body: Object) -> bool:
 
 
 def touching_interfaces(scene: Scene) -> str | None:
-    """Why the order of surfaces tells more where bodies with interfaces may touch; None if none do."""
+    """Reason why touching bodies with interfaces need ordered surfaces; None if none may touch."""
     solids = [body for body in scene.bodies if body.sheet_thickness is None]
     bends = np.array([body.has_interface for body in solids])
     if not bends.any() or (found := overlapping_pair(solids, lambda one, other: bends[one] | bends[other])) is None:
@@ -138,7 +138,7 @@ def _names(scene: Scene, objects: Iterable[int]) -> str:
 
 
 def _effects(scene: Scene, *, bends: bool = True) -> str:
-    """What happens at the interfaces of this scene, in words."""
+    """Effects of the interfaces of this scene, in words."""
     bodies = [body for body in scene.bodies if body.has_interface]
     surfaces = [body.surface for body in bodies if body.surface is not None]
     effects = []

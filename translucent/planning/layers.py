@@ -1,4 +1,4 @@
-"""What a plan adds for layers that cover a share of what is behind them, for surfaces that glow, and for holes."""
+"""Passes for partly transparent layers, emissive surfaces and holes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from translucent.scene.scene import Object, Scene
 
 
 def layer_passes(scene: Scene, cost: float) -> tuple[PassSpec, ...]:
-    """The pass that paints layers, and what interfaces of bodies glow; none where nothing covers or glows."""
+    """Pass that draws layers and the emission of interfaces; none where a scene has neither."""
     layers, glowing = (indices(scene, keep) for keep in (_covers, _glows))
     if not layers and not glowing:
         return ()
@@ -26,7 +26,7 @@ def layer_passes(scene: Scene, cost: float) -> tuple[PassSpec, ...]:
 
 
 def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
-    """What is not rendered of them; `interfaces` as for `unmodelled_effects`."""
+    """Notes on effects of layers that are not rendered; `interfaces` as for `unmodelled_effects`."""
     effects = []
     if layers := _names(scene, indices(scene, _covers)):
         text = (

@@ -1,4 +1,4 @@
-"""What any plan has to admit of its thickness: what is wrong with the meshes of a scene, and what float32 loses."""
+"""Limits of thickness that hold for every method: defects of the meshes of a scene, and rounding in float32."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from translucent.planning.notes import Note, NoteKind
 from translucent.planning.render_plan import Capabilities
 from translucent.scene.scene import Scene, object_names
 
-#: Lights that are followed into media.
+#: Largest number of lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
 
 #: Optical depth across a scene beyond which float32 places are too coarse for where light is scattered.
 DENSE = 1e5
 
-#: Steps through an interval of varying density, at least, where nobody says how many.
+#: Smallest number of steps through an interval of varying density, unless told otherwise.
 LEAST_STEPS = 64
 
-#: What limits a plan for an OpenGL that cannot follow lights into media.
+#: Note of a plan for an OpenGL version that cannot follow lights into media.
 UNLIT = Note(
     NoteKind.UNLIT, "pixels with media that scatter are marked invalid: their light takes OpenGL 4.3, or the reference"
 )
 
 
 def open_limits(scene: Scene) -> list[Note]:
-    """For each open body, what is wrong with it and what to do."""
+    """Notes on each open body: its defects, and what to do."""
     return [
         Note(
             NoteKind.OPEN_MESH,
@@ -41,7 +41,7 @@ def open_limits(scene: Scene) -> list[Note]:
 
 
 def layer_limits(scene: Scene, method: Method) -> list[Note]:
-    """What is left out where a ray can cross more surfaces than the method keeps."""
+    """Notes on rays that may cross more surfaces than the method keeps."""
     if (most := method.layer_limit) is None:
         return []
     meshes = [body.mesh for body in scene.bodies if body.sheet_thickness is None]
@@ -53,7 +53,7 @@ def layer_limits(scene: Scene, method: Method) -> list[Note]:
 
 
 def marching_method(scene: Scene, method: Method | None, capabilities: Capabilities) -> Method:
-    """How rays march where the density varies: as asked for, or with a step for each voxel, and 64 at least.
+    """Ray marching for varying densities: as asked for, or with a step for each voxel, and at least 64.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[Note]:
-    """What duplicated faces, and parts or lobes inside out, do to a thickness."""
+    """Notes on errors of thickness from duplicated faces, and from parts or lobes that are inside out."""
     limits = []
     for body in scene.bodies:
         diagnosis = body.mesh.diagnosis
@@ -101,7 +101,7 @@ def mesh_limits(scene: Scene, method: Method) -> list[Note]:
 
 
 def scattering_limits(scene: Scene) -> list[Note]:
-    """Where float32 cannot tell how far light gets into a medium that scatters it."""
+    """Notes on scattering media too dense for float32 to resolve how far light gets into them."""
     if not scatters(scene):
         return []
     dense = [
@@ -116,7 +116,7 @@ def scattering_limits(scene: Scene) -> list[Note]:
 
 
 def sheet_limits(scene: Scene) -> list[Note]:
-    """What sheets among intervals in order leave out."""
+    """Notes on what sheets among ordered intervals leave out."""
     if not sheets_of(scene) or not any(body.medium is not None and body.medium.emits for body in scene.bodies):
         return []
     text = (

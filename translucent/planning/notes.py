@@ -1,4 +1,4 @@
-"""What a plan says of itself beside its passes: where it is not exact, and what it does not render."""
+"""Notes of a plan: where it is not exact, and what it does not render."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class NoteKind(StrEnum):
-    """What a note is about; its text is for people alone."""
+    """Subject of a note, by which programs know it; its text is for people alone."""
 
     # Where thickness, transmittance or emission are not exact.
     OPEN_MESH = "open mesh"
@@ -45,7 +45,7 @@ class NoteKind(StrEnum):
 
 
 class Note(str):
-    """A sentence of a plan: the text that it is, and its kind, by which programs know it.
+    """Note of a plan: a string with a kind, by which programs know it.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Note(str):
     kind: NoteKind
 
     def __new__(cls, kind: NoteKind, text: str) -> Self:
-        """A note of this kind that reads so."""
+        """Make a note of this kind with this text."""
         note = super().__new__(cls, text)
         note.kind = kind
         return note

@@ -1,4 +1,4 @@
-"""When a sum over each ray does not tell the picture, so that the order of the surfaces on it has to be found."""
+"""Need for ordered surfaces: scenes in which a sum over each ray does not determine the picture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from translucent.scene.scene import Scene
 
 
 def why_order_matters(scene: Scene, method: Method | None, interfaces: Interfaces) -> str | None:
-    """Why a sum over each ray, found by the method, does not tell the picture of this scene; None if it does."""
+    """Reason why this scene needs ordered surfaces rather than a sum over each ray; None if a sum suffices."""
     bodies = scene.bodies
     if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
         return "emission among several media: what is in front dims what is behind"
@@ -38,7 +38,9 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
 
 
 def _inside_out(scene: Scene) -> str | None:
-    """Which body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals cannot."""
+    """Reason that a body is inside out in places, so that a sum cannot tell its pixels apart; None where intervals
+    cannot.
+    """
     broken = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.inside_out]
     if not broken or len(medium_slots(scene)) > MAX_SLOTS:
         return None

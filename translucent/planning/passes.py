@@ -1,4 +1,4 @@
-"""The passes that a plan is made of, each with its reason and its expected cost."""
+"""Passes of a plan, each with its reason and its expected cost."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 
 
 class PassName(StrEnum):
-    """What a pass is called in plans, in their JSON and in `Frame.seconds`."""
+    """Name of a pass in plans, in their JSON and in `Frame.seconds`."""
 
     OPAQUE = "opaque"
     BACKDROP = "backdrop"

@@ -86,7 +86,7 @@ def _choice(
 
 
 def _ordered_method(scene: Scene, method: Method | None, capabilities: Capabilities, why: str) -> Method:
-    """The method for a scene that only ordered intervals can tell; refuses any other that was asked for."""
+    """Method for a scene that needs ordered intervals; refuses any other that was asked for."""
     if not solids_of(scene):
         raise InputError(
             f"rendering {object_names(scene.bodies)}",
@@ -101,7 +101,7 @@ def _ordered_method(scene: Scene, method: Method | None, capabilities: Capabilit
 
 
 def _cheapest_ordered(scene: Scene, capabilities: Capabilities) -> Method:
-    """Of the methods that find all intervals, the one that is expected to be fastest."""
+    """Method with the lowest expected cost of those that find all intervals."""
     # Of two that cost the same the lists come first: peeling waits for a count before it goes on.
     candidates: list[Method] = [FragmentLists()] if capabilities.shader_storage else []
     candidates.append(DepthPeeling())
@@ -115,7 +115,7 @@ def plan_over_backdrop(
     *,
     interfaces: Interfaces = "both",
 ) -> RenderPlan:
-    """The plan for a scene before a `Backdrop`, which somebody else has drawn.
+    """Plan for a scene before a `Backdrop`, which another renderer has drawn.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def plan_over_backdrop(
 
 
 def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities) -> RenderPlan:
-    """The plan of a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
+    """Plan for a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
     chosen = method or FragmentLists()
     sheets = chosen.makes_sheets
     reason = "no OpenGL: all surfaces on each ray, in float64"

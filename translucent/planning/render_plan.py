@@ -1,4 +1,4 @@
-"""The plan of a frame: its method, passes and notes; and what the machine can do that it is made for."""
+"""The plan of a frame: its method, passes and notes; and the capabilities of the machine that it is made for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Interfaces: TypeAlias = Literal["both", "front"]
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What the machine that a plan is made for can do.
+    """Capabilities of the machine that a plan is made for.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Capabilities:
 
 @dataclass(frozen=True)
 class RenderPlan:
-    """What runs and why.
+    """Plan of a frame: the method and passes that run, each with its reason.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class RenderPlan:
 
     @property
     def runs(self) -> str:
-        """What finds the thickness, in words: the method, or what is traced in place of it."""
+        """Description of how thickness is found: the method, or the ray tracing in place of it."""
         if not self.traced:
             return str(self.method)
         what = "all surfaces on each ray, in float64"
@@ -94,15 +94,15 @@ class RenderPlan:
         return sum(step.cost for step in self.passes)
 
     def has(self, *names: PassName) -> bool:
-        """Whether any of the passes has one of these names."""
+        """Whether the plan has a pass with one of these names."""
         return any(step.name in names for step in self.passes)
 
     def says(self, kind: NoteKind) -> bool:
-        """Whether there is a note of this kind among its limits, or among what it does not model."""
+        """Whether the plan has a note of this kind among its limits or the effects that it does not model."""
         return any(note.kind is kind for note in (*self.limits, *self.unmodelled))
 
     def summary(self) -> dict[str, object]:
-        """The plan in values that JSON can hold."""
+        """Plan as values that JSON can hold."""
         return {
             "method": self.runs,
             "exact": self.exact,

@@ -1,4 +1,4 @@
-"""What the intervals of a ray tell apart: bodies grouped into slots, one winding number for each."""
+"""Slots: groups of bodies that share one winding number in the intervals of a ray."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from translucent.media.medium import Medium
 from translucent.scene.overlaps import first_overlap
 from translucent.scene.scene import Object, Scene
 
-#: Winding numbers that a ray keeps apart.
+#: Largest number of winding numbers that a ray keeps apart.
 MAX_SLOTS = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Bodies whose intervals need not be told apart.
+    """Group of bodies that share one winding number, as their intervals need not be told apart.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Slot:
 
 
 def medium_slots(scene: Scene) -> tuple[Slot, ...]:
-    """The slots of a scene, of the highest priority first.
+    """Slots of a scene, sorted by descending priority.
 
     Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
     often, and whether at all, the medium fills a place. An open body keeps a slot of its own, lest its holes cancel
@@ -58,7 +58,7 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
 
 
 def require_clear_priorities(scene: Scene) -> None:
-    """Raise where two bodies of different media and equal priority may claim the same place."""
+    """Raise `InputError` where bodies with different media and equal priority may overlap."""
     bodies = [i for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None]
     priorities = np.unique([scene.objects[i].priority for i in bodies], return_inverse=True)[1]
     known: dict[Hashable, int] = {}
@@ -79,7 +79,7 @@ def require_clear_priorities(scene: Scene) -> None:
 
 
 def same_medium(a: Object, b: Object) -> bool:
-    """Whether two bodies are filled alike, as far as thickness, absorption and emission go."""
+    """Whether two bodies have the same medium, as far as thickness, absorption and emission go."""
     if a.medium is None or b.medium is None or a.medium is b.medium:
         return a.medium is b.medium
     return np.array_equal(a.medium.extinction, b.medium.extinction) and np.array_equal(
@@ -91,7 +91,7 @@ def overlapping_pair(
     bodies: Sequence[Object],
     matters: Callable[[npt.NDArray[np.intp], npt.NDArray[np.intp]], npt.NDArray[np.bool_]] | None = None,
 ) -> tuple[int, int] | None:
-    """Places of two bodies whose bounds share more than their boundary; bodies that touch there share no volume.
+    """Positions of two bodies whose bounding boxes overlap in more than a face; touching bodies share no volume.
 
     `matters` gets the places of many pairs, and says which of them count; default: all.
     """
@@ -105,7 +105,7 @@ def _never_negative(body: Object) -> bool:
 
 
 def _filling(scene: Scene, i: int) -> Hashable:
-    """What an object fills a place with: equal for two of them where it makes no difference which of the two does."""
+    """Key of an object's medium: equal for two objects where it makes no difference which of them fills a place."""
     medium, varies = scene.objects[i].medium, scene.objects[i].density is not None
     if medium is None or varies:
         return i

@@ -1,1 +1,1 @@
-"""What is in a picture: bodies and their surfaces, cameras, lights and environments."""
+"""Contents of a picture: bodies and their surfaces, cameras, lights and environments."""

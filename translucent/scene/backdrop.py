@@ -15,7 +15,7 @@ from translucent.scene.lights import MAX_RADIANCE
 
 @dataclass(frozen=True, eq=False)
 class Backdrop(Frozen):
-    """What is opaque in a frame: rays through the media end at its depth, and its radiance is seen there.
+    """Picture of everything opaque in a frame: rays through the media end at its depth, and its radiance is seen there.
 
     The camera is that of the scene, and each pixel belongs to the ray through its center. Row 0 is the top row.
 

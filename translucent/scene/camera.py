@@ -11,16 +11,16 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 
-#: A framed object is smaller than the picture by this factor.
+#: Factor by which a picture is larger than the objects that it frames.
 FRAMING_MARGIN = 1.12
 
-#: Largest coordinate in metres of an eye or target, as for meshes.
+#: Largest coordinate of an eye or target in metres, as for meshes.
 MAX_COORDINATE = 1e18
 
 
 @dataclass(frozen=True, eq=False)
 class Camera(Frozen):
-    """A perspective or orthographic view.
+    """Camera with a perspective or orthographic view.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Camera(Frozen):
         fov_y: float = 30.0,
         up: npt.ArrayLike = (0.0, 1.0, 0.0),
     ) -> Camera:
-        """Perspective camera that sees all points, looking along `direction`, with a small margin.
+        """Perspective camera that frames all points, looking along `direction`, with a small margin.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class Camera(Frozen):
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
-    """`size` as two ints; raises `InputError` where it is not a positive (width, height)."""
+    """`size` as two ints; raises `InputError` if it is not a positive (width, height)."""
     try:
         width, height = (int(v) for v in size)
         exact = (width, height) == tuple(size)
@@ -204,7 +204,7 @@ def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Ar
 def view_ray(
     pixel: npt.ArrayLike, size: npt.ArrayLike, right: npt.ArrayLike, up: npt.ArrayLike, forward: npt.ArrayLike
 ) -> Array:
-    """Ray through points of a picture, not normalised: it advances 1 m along `forward`.
+    """Ray through points of a picture, not normalized: it advances 1 m along `forward`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What lights everything from far away, and what is seen behind it.
+"""Environments: light from far away, and the background of a picture.
 
 `gradient_share`, `gradient_irradiance_share`, `checkerboard_share` and `equirectangular_uv` have twins in
 ``shaders/lib/environment.glsl``.
@@ -24,7 +24,7 @@ from translucent.scene.lights import positive_triple
 
 EnvironmentKind = Literal["constant", "gradient", "checkerboard", "image"]
 
-#: Stops beyond which no exposure makes sense: the radiance of any image stays far below `lights.MAX_RADIANCE`.
+#: Largest exposure in stops, of either sign: the radiance of any image stays far below `lights.MAX_RADIANCE`.
 MAX_EXPOSURE = 32.0
 
 _WHAT = "environment radiance"
@@ -32,7 +32,8 @@ _WHAT = "environment radiance"
 
 @dataclass(frozen=True, eq=False)
 class Environment(Frozen):
-    """Radiance from far behind everything. Made by `constant`, `gradient`, `checkerboard`, `image` or `studio`.
+    """Environment: radiance from infinitely far away in all directions. Made by `constant`, `gradient`, `checkerboard`,
+    `image` or `studio`.
 
     It lights, it is reflected, and it is seen behind everything, unless `with_background` gives it something else to
     be seen there.
@@ -90,26 +91,26 @@ class Environment(Frozen):
 
     @classmethod
     def constant(cls, radiance: ColorLike) -> Environment:
-        """The same radiance from everywhere."""
+        """Environment with the same radiance from all directions."""
         return cls("constant", parse_radiance(_WHAT, radiance), parse_radiance(_WHAT, radiance))
 
     @classmethod
     def gradient(cls, bottom: ColorLike, top: ColorLike) -> Environment:
-        """From `bottom` for rays straight down (-Y) to `top` for rays straight up (+Y), linear in the sine between."""
+        """Vertical gradient from `bottom` (rays along -Y) to `top` (rays along +Y), linear in the sine of elevation."""
         return cls("gradient", parse_radiance(_WHAT, bottom), parse_radiance(_WHAT, top))
 
     @classmethod
     def checkerboard(
         cls, first: ColorLike = (0.9, 0.9, 0.9), second: ColorLike = (0.6, 0.6, 0.6), tiles: float = 8.0
     ) -> Environment:
-        """A backdrop of squares, fixed to the picture: it shows what a body lets through."""
+        """Checkerboard backdrop, fixed to the picture: it shows the transmission of a body."""
         return cls("checkerboard", parse_radiance(_WHAT, first), parse_radiance(_WHAT, second), tiles)
 
     @classmethod
     def image(
         cls, source: str | Path | npt.ArrayLike | EnvironmentMap, rotation: float = 0.0, exposure: float = 0.0
     ) -> Environment:
-        """A picture of all directions in equirectangular projection.
+        """Environment from a picture of all directions in equirectangular projection.
 
         Row 0 is straight up (+Y), the center of the picture is straight ahead (-Z), and +X is to the right of it.
 
@@ -137,13 +138,13 @@ class Environment(Frozen):
 
     @classmethod
     def studio(cls, rotation: float = 0.0, exposure: float = 0.0) -> Environment:
-        """A photographer's studio made by a formula: soft boxes, dark cards and a warm floor, which flatter glass."""
+        """Procedural photographer's studio: soft boxes, dark cards and a warm floor, which flatter glass."""
         from translucent.scene.studio import studio_map
 
         return cls.image(studio_map(), rotation, exposure)
 
     def with_background(self, background: Environment) -> Environment:
-        """This environment as light and in reflections, and another one to be seen behind everything."""
+        """Copy with another environment as the visible background; light and reflections stay."""
         if not isinstance(background, Environment):
             raise InputError(
                 f"background {background!r}", f"of type {type(background).__name__}", "give a tl.Environment"
@@ -152,7 +153,7 @@ class Environment(Frozen):
 
     @property
     def seen(self) -> Environment:
-        """The environment that is seen: the background if there is one, else itself."""
+        """Environment that is visible: the background if there is one, else itself."""
         return self.background or self
 
     @property
@@ -162,7 +163,7 @@ class Environment(Frozen):
 
     @property
     def turn(self) -> float:
-        """The rotation in turns, as `equirectangular_uv` takes it."""
+        """Rotation in turns, as `equirectangular_uv` takes it."""
         return self.rotation / 360.0
 
     @property
@@ -172,7 +173,7 @@ class Environment(Frozen):
 
     @cached_property
     def light_map(self) -> EnvironmentMap:
-        """What it lights with as a picture, before rotation and exposure; a checkerboard lights like its mean."""
+        """Map of its light, before rotation and exposure; a checkerboard lights like its mean."""
         if self.map is not None:
             return self.map
         if self.kind == "gradient":
@@ -195,7 +196,7 @@ class Environment(Frozen):
         return seen.first + (seen.second - seen.first) * checkerboard_share(backdrop, seen.tiles)[..., None]
 
     def lighting(self, directions: npt.ArrayLike) -> Array:
-        """Radiance that arrives from unit vectors (..., 3) as light, (..., 3), whatever is seen there.
+        """Radiance (..., 3) that arrives as light from unit vectors (..., 3), whatever the background.
 
         A backdrop fixed to the picture lights like the mean of its squares.
         """
@@ -256,7 +257,7 @@ def gradient_irradiance_share(normal: npt.ArrayLike) -> Array:
 
 
 def checkerboard_share(backdrop: npt.ArrayLike, tiles: npt.ArrayLike) -> Array:
-    """1 in the second squares of a checkerboard at backdrop (..., 2), else 0; the top left square is a first one."""
+    """Checkerboard pattern at backdrop (..., 2): 0 in the top left square and every second one, 1 in the others."""
     cell = np.floor(np.asarray(backdrop, dtype=np.float64) * np.asarray(tiles, dtype=np.float64)[..., None])
     return np.asarray(np.mod(cell[..., 0] + cell[..., 1], 2.0))
 

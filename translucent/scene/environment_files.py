@@ -21,7 +21,7 @@ Pixels = npt.NDArray[Any]
 
 
 def read_environment_map(path: str | Path) -> EnvironmentMap:
-    """The pixels of a file.
+    """Read an environment map from a picture file.
 
     Parameters
     ----------

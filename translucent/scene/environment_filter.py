@@ -1,4 +1,4 @@
-"""Environments blurred as rough surfaces reflect them and as matt ones receive them."""
+"""Prefiltered environments for rough reflection and for diffuse irradiance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ LEVEL_SIZE = (128, 256)
 
 @dataclass(frozen=True, eq=False)
 class FilteredEnvironment:
-    """What an environment sends to surfaces, before its rotation and exposure. Row 0 is straight up (+Y).
+    """Prefiltered environment: blurred reflections and irradiance, before its rotation and exposure. Row 0 is straight
+    up (+Y).
 
     Attributes
     ----------
@@ -41,7 +42,7 @@ class FilteredEnvironment:
 
 
 def filtered(environment: Environment) -> FilteredEnvironment:
-    """The environment blurred for surfaces: made once for each picture, in less than a second.
+    """Prefilter an environment for surfaces: done once for each picture, in less than a second.
 
     The lobe is that of the split-sum approximation (Karis 2013, "Real Shading in Unreal Engine 4", section on image
     based lighting): seen along the normal and the reflected direction at once (n = v = r), GGX half vectors h, whose
@@ -67,7 +68,7 @@ def _filtered(source: EnvironmentMap) -> FilteredEnvironment:
 
 
 def ggx_lobe(cosine: npt.ArrayLike, alpha: float) -> Array:
-    """Weight of light from an angle of this cosine to the reflected direction, up to a factor: D(h) n.l, n = v = r.
+    """GGX weight of light at an angle of this cosine to the reflected direction, up to a factor: D(h) n.l, n = v = r.
 
     The half vector has half the angle: (n.h)^2 = (1 + cos) / 2. Walter et al. 2007, eq. 33, for D.
     """

@@ -19,7 +19,7 @@ from translucent.scene.lights import MAX_RADIANCE
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentMap(Frozen):
-    """Linear radiance from all directions.
+    """Equirectangular map of linear radiance from all directions.
 
     Row 0 is straight up (+Y), the center of the picture is -Z, and +X is to the right of it. Pixels are samples at
     their centers; between them lookups are bilinear, around the sides without a seam, and constant beyond the first
@@ -63,7 +63,7 @@ class EnvironmentMap(Frozen):
 
     @classmethod
     def from_formula(cls, radiance: Callable[[Array], npt.ArrayLike], height: int) -> EnvironmentMap:
-        """The picture of a function from unit vectors (n, 2n, 3) to radiance (n, 2n, 3), n rows high."""
+        """Map from a function of unit vectors (n, 2n, 3) to radiance (n, 2n, 3), n rows high."""
         return cls(np.asarray(radiance(texel_directions(height, 2 * height))).astype(np.float32))
 
     @property
@@ -108,7 +108,7 @@ class EnvironmentMap(Frozen):
 
 
 def row_blocks(height: int, width: int) -> Iterator[slice]:
-    """Rows of a picture that are worked on at a time: about a million pixels."""
+    """Slices of rows to be processed at a time: about a million pixels."""
     step = max(1, (1 << 20) // max(width, 1))
     return (slice(row, row + step) for row in range(0, height, step))
 
@@ -146,7 +146,7 @@ def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], share: Array) -> Arr
 
 
 def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]]:
-    """The pixels with all that is no radiance replaced, and what was replaced, in words.
+    """Pixels with all values that are no radiance replaced, and a description of the replacements.
 
     In blocks of rows: a large picture is in memory once, and not once for each step.
     """

@@ -1,4 +1,4 @@
-"""What shines from a place or a direction: point and directional lights."""
+"""Point and directional lights."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of all directions, blurred by lobes; and the irradiance that they give.
+"""Convolution of pictures of all directions with lobes, and their irradiance.
 
 A lobe around a direction is a zonal kernel on the sphere: it depends on the angle alone. Between two rows of an
 equirectangular picture it is a circular convolution over longitude, so the picture is blurred exactly, pixel by pixel,
@@ -15,19 +15,19 @@ import scipy.fft
 from translucent.arrays import Array
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles
 
-#: Rows and columns of the irradiance, which changes slowly.
+#: Rows and columns of the irradiance map, which changes slowly.
 IRRADIANCE_SIZE = (64, 128)
 
-#: Rounds of `_balanced`: each halves what is out of balance.
+#: Rounds of `_balanced`: each halves the imbalance.
 BALANCING_ROUNDS = 50
 
-#: Pictures whose blurred ones are kept.
+#: Number of pictures whose blurred versions are cached.
 KEPT = 8
 
 
 @lru_cache(maxsize=KEPT)
 def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
-    """Irradiance by normal as a picture: the integral over all directions of radiance times cosine; made once.
+    """Irradiance map by normal: the integral over all directions of radiance times cosine; made once.
 
     Its lookups differ from the integral by a thousandth of the contrast, and within 1.4 degrees of a pole, where all
     that is known are the pixels around it, by a hundredth.
@@ -37,7 +37,7 @@ def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
 
 
 def sized(source: EnvironmentMap, size: tuple[int, int]) -> Array:
-    """The picture in this height and width: the means of smaller pixels, lookups between larger ones."""
+    """Resample a picture to this height and width: the means of smaller pixels, lookups between larger ones."""
     height, width = size
     if source.size[0] >= width and source.size[1] >= height:
         return source.reduced(height, width)

@@ -1,4 +1,4 @@
-"""Boxes that share volume, found without a look at every pair of them: a sweep along one axis."""
+"""Overlapping boxes, found by a sweep along one axis instead of a test of every pair."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_PAIRS = 1 << 20
 def first_overlap(
     boxes: Array, matters: Callable[[Indices, Indices], npt.NDArray[np.bool_]] | None = None
 ) -> tuple[int, int] | None:
-    """Two boxes that share more than their boundary, the earlier one first; None if there are none.
+    """Indices of two boxes that share volume, the earlier one first; None if there are none.
 
     Of few boxes, the pair whose later box comes first. The time grows as n log n and with the pairs that overlap along
     the axis where the fewest do.
@@ -60,7 +60,7 @@ def _candidates(boxes: Array) -> Iterator[tuple[Indices, Indices]]:
 
 
 def _along(ends: Array) -> tuple[Indices, Indices]:
-    """The order in which boxes begin along an axis, and for each how many begin later and before it ends."""
+    """Order in which boxes begin along an axis, and for each the number that begin later and before it ends."""
     order = np.argsort(ends[:, 0], kind="stable")
     begin, end = ends[order].T
     return order, np.maximum(np.searchsorted(begin, end, side="left") - np.arange(len(order)) - 1, 0)

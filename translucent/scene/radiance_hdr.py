@@ -19,14 +19,14 @@ from translucent.scene.environment_map import row_blocks
 
 Bytes = npt.NDArray[np.uint8]
 
-#: Rows of these widths may be encoded channel by channel.
+#: Widths of rows that may be encoded channel by channel.
 CHANNEL_WIDTHS = range(8, 32768)
 
 _RESOLUTION = re.compile(rb"([+-])([XY]) +(\d{1,10}) +([+-])([XY]) +(\d{1,10})\s*")
 
 
 class _Header(NamedTuple):
-    """Rows and columns as they are stored, which way they run, and the exposure that was multiplied in."""
+    """Header of a Radiance picture: rows and columns as stored, their directions, and the exposure multiplied in."""
 
     rows: int
     columns: int
@@ -103,7 +103,7 @@ def _pixels(path: str | Path, data: Bytes, rows: int, columns: int) -> Bytes:
 
 
 def _by_channel(path: str | Path, data: Bytes, rows: int, columns: int) -> Bytes:
-    """Rows of four channels each, in runs (more than 128: of one byte) and literal bytes."""
+    """Decode rows of four channels each, in runs (more than 128: of one byte) and literal bytes."""
     source = data.tobytes()
     stored, at = np.empty((rows, 4, columns), dtype=np.uint8), 0
     marker = bytes((2, 2, columns >> 8, columns & 255))
@@ -131,7 +131,7 @@ def _by_channel(path: str | Path, data: Bytes, rows: int, columns: int) -> Bytes
 
 
 def _by_pixel(path: str | Path, data: Bytes, count: int) -> Bytes:
-    """Pixels of four bytes, where (1, 1, 1, n) stands for n more of the last one; several in a row are digits of n."""
+    """Decode pixels of four bytes; (1, 1, 1, n) repeats the last n times, several in a row are digits of n."""
     words = data[: len(data) // 4 * 4].reshape(-1, 4)
     repeats = (words[:, :3] == 1).all(axis=1)
     times = np.ones(len(words), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Scenes: bodies, a camera, lights and what is behind."""
+"""Scenes: bodies, a camera, lights and an environment."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from translucent.scene.surface import Surface
 Overlap = Literal["add", "union", "priority"]
 Light = PointLight | DirectionalLight
 
-#: What opaque objects reflect unless told otherwise: a light grey, as of clay.
+#: Default reflectance of opaque objects: a light gray, as of clay.
 OPAQUE_COLOR = (0.6, 0.6, 0.6)
 
-#: Names that a message lists.
+#: Largest number of names that a message lists.
 MOST_NAMES = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Object(Frozen):
-    """A mesh in the scene, filled with a medium.
+    """Object of a scene: a mesh filled with a medium, or opaque.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ class Object(Frozen):
 
     @property
     def base_color(self) -> Array:
-        """(3,): what an opaque object reflects: the color of its surface, if it has one."""
+        """(3,): diffuse reflectance of an opaque object: the color of its surface, if it has one."""
         return np.asarray(self.color if self.surface is None else self.surface.color)
 
     @property
     def has_interface(self) -> bool:
-        """Whether light changes where it crosses the interface of the medium: is bent, mirrored, tinted or spread."""
+        """Whether its interface changes light: refracts, reflects, tints or scatters it."""
         return (
             self.medium is not None
             and not self.covers
@@ -133,7 +133,7 @@ class Object(Frozen):
 
     @property
     def has_holes(self) -> bool:
-        """Whether it is a thin sheet in which alpha may make holes."""
+        """Whether the object is a thin sheet in which alpha may make holes."""
         return (
             self.sheet_thickness is not None
             and self.surface is not None
@@ -143,12 +143,12 @@ class Object(Frozen):
 
     @property
     def covers(self) -> bool:
-        """Whether it is a layer that covers a share of what is behind it; see `Surface.opacity`."""
+        """Whether the object is a partly transparent layer; see `Surface.opacity`."""
         return self.surface is not None and self.surface.opacity is not None
 
     @property
     def _plain(self) -> bool:
-        """Whether neither its surface nor the colors of its vertices change what passes."""
+        """Whether neither its surface nor its vertex colors change light that passes."""
         assert self.surface is not None
         return self.surface.plain and self.mesh.colors is None
 
@@ -159,12 +159,12 @@ class Object(Frozen):
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether the transform turns the winding around."""
+        """Whether the transform reverses the winding."""
         return bool(np.linalg.det(self.matrix[:3, :3]) < 0)
 
     @cached_property
     def faces_inwards(self) -> bool:
-        """Whether the faces, as drawn, look into the body: mirrored, or inverted, but not both."""
+        """Whether the faces, as drawn, face into the body: mirrored, or inverted, but not both."""
         return self.mirrored != self.mesh.diagnosis.inverted
 
     @cached_property
@@ -186,7 +186,7 @@ class Object(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Scene(Frozen):
-    """Everything that a picture needs.
+    """Scene: the objects, camera, lights and environment of a picture.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ class Scene(Frozen):
 
     @cached_property
     def opaque(self) -> tuple[Object, ...]:
-        """Objects that nothing is seen through."""
+        """Objects without a medium, which are opaque."""
         return tuple(item for item in self.objects if item.medium is None)
 
     @cached_property
@@ -281,7 +281,7 @@ class Scene(Frozen):
 
     @cached_property
     def with_ambient_emitted(self) -> Scene:
-        """The scene in which media emit what they scatter of the ambient radiance; this one if that is none."""
+        """Copy in which media emit the ambient radiance that they scatter; the scene itself if there is none."""
         if not self.scatters_ambient:
             return self
         objects = [
@@ -297,7 +297,7 @@ class Scene(Frozen):
 
 
 def object_names(items: Iterable[Object]) -> str:
-    """What messages call objects: the names of their meshes, each once, and of many the first ones."""
+    """Names of objects for messages: those of their meshes, each once, and only the first of many."""
     names = list(dict.fromkeys(repr(item.mesh.name) for item in items))
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES + 1 else ""
     return ", ".join(names[:MOST_NAMES] if more else names) + more

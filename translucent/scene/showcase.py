@@ -1,4 +1,4 @@
-"""Sensible defaults: a mesh, framed, in a medium that suits its size, before a bright backdrop."""
+"""Default scenes: a mesh, framed, in a medium that suits its size, before a bright backdrop."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
-#: Linear color that the default medium keeps of white light after `DEFAULT_REACH` of the mesh's diagonal.
+#: Linear color of white light in the default medium after `DEFAULT_REACH` of the mesh's diagonal.
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
 #: The default environment: white above and light grey below.
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
 
-#: What `named_environment` calls environments that are neither a color nor a picture.
+#: Names of environments for `named_environment`, besides colors and pictures.
 ENVIRONMENT_NAMES = ("light-table", "studio", "checkerboard")
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
@@ -41,7 +41,7 @@ def showcase(
     environment: Environment | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
-    """A scene that shows one mesh well.
+    """Scene that shows one mesh well, with defaults for everything else.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def showcase(
 
 
 def named_environment(name: str, rotation: float = 0.0) -> Environment:
-    """light-table, studio, checkerboard, a color, or a file with a picture of all directions.
+    """Environment by name: light-table, studio, checkerboard, a color, or a file with a picture of all directions.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def named_environment(name: str, rotation: float = 0.0) -> Environment:
 def framing(
     objects: Sequence[Object], size: tuple[int, int], fov_y: float = 30.0, up: npt.ArrayLike = (0.0, 1.0, 0.0)
 ) -> Camera:
-    """The camera of `Camera.framing` that sees these objects, all of each."""
+    """Camera of `Camera.framing` that sees all of these objects."""
     corners = [
         item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
         for item in objects
@@ -106,7 +106,7 @@ def framing(
 
 
 def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
-    """The scene with interfaces as a picture needs them.
+    """Scene with interfaces as a picture needs them.
 
     Media that scatter give back, and let through, what they scatter many times: without that milk would be black. A
     roughness replaces that of all surfaces of media.
@@ -127,7 +127,7 @@ def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
 
 
 def filled(scene: AnyScene, medium: Medium) -> AnyScene:
-    """The scene with this medium in all its translucent objects, or in all objects if none is translucent.
+    """Scene with this medium in all its translucent objects, or in all objects if none is translucent.
 
     Thin sheets become bodies: they had no inside that a medium could fill.
     """
@@ -143,7 +143,7 @@ def filled(scene: AnyScene, medium: Medium) -> AnyScene:
 
 
 def fillable(scene: Scene) -> tuple[Object, ...]:
-    """The objects that a medium fills for which no object is named: those that light enters, or else all.
+    """Objects to fill with a medium if none is named: those that light enters, or else all.
 
     Layers that cover a share of what is behind them are among them only where there is nothing else.
     """

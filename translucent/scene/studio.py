@@ -1,4 +1,4 @@
-"""A photographer's studio as an environment, made by a formula."""
+"""Procedural photographer's studio as an environment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STUDIO_HEIGHT = 512
 
 
 class Panel(NamedTuple):
-    """A rectangle that hangs around the subject and faces it.
+    """Panel: a rectangle that faces the subject.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Panel(NamedTuple):
     softness: float = 0.03
 
 
-#: In the order in which they hang, the farthest first. A camera usually looks along -Z, so +Z is behind it.
+#: Panels of the studio, the farthest first. A camera usually looks along -Z, so +Z is behind it.
 PANELS = (
     Panel(0, 10, 126, 70, (0.98, 0.98, 1.0), falloff=0.4, softness=0.6),  # the backdrop, lit from below
     Panel(138, 40, 44, 36, (9.5, 9.15, 8.55), falloff=0.35),  # key light, a large soft box to the right of the camera
@@ -59,7 +59,7 @@ WALL, CEILING = (0.50, 0.51, 0.53), (0.13, 0.135, 0.15)
 
 @lru_cache(maxsize=1)
 def studio_map() -> EnvironmentMap:
-    """The studio as a picture of all directions; made once."""
+    """Environment map of the studio; made once."""
     return EnvironmentMap.from_formula(studio_radiance, STUDIO_HEIGHT)
 
 
@@ -83,7 +83,7 @@ def _room(height: Array) -> Array:
 
 
 def _panel(towards: Array, panel: Panel) -> tuple[Array, Array]:
-    """How much of a panel is seen in each direction, (..., 1), and its brightness there."""
+    """Coverage (..., 1) of each direction by a panel, and the panel's brightness there."""
     azimuth, elevation = np.radians(panel.azimuth), np.radians(panel.elevation)
     center = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)])
     right = np.array([np.cos(azimuth), 0.0, np.sin(azimuth)])
@@ -97,7 +97,7 @@ def _panel(towards: Array, panel: Panel) -> tuple[Array, Array]:
 
 
 def _edge(place: Array, softness: float) -> Array:
-    """1 in the middle, 0 beyond the edges at -1 and 1, and smooth between."""
+    """Smooth window: 1 in the middle, 0 beyond the edges at -1 and 1."""
     return _smooth((1.0 - np.abs(place)) / softness)
 
 

@@ -1,4 +1,4 @@
-"""What the interface of a body, or an opaque object, does to light: how rough it is, how it tints, what enters."""
+"""Surfaces of bodies and opaque objects: roughness, tint, transmission and emission."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _RANGES = (
     ("opacity", 0.0, 1.0),
 )
 
-#: Where a layer covers less than this share, there is none.
+#: Smallest opacity of a layer; anything less counts as none.
 LEAST_COVER = 1e-4
 
 #: Fields that hold a texture.
@@ -44,7 +44,7 @@ TEXTURE_FIELDS = (
 
 @dataclass(frozen=True, eq=False)
 class Surface(Frozen):
-    """The interface between a medium and the air around it; or what an opaque object shows instead of a plain grey.
+    """Interface between a medium and the air around it, or the surface of an opaque object.
 
     What does not pass the interface by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
     paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission and
@@ -151,7 +151,7 @@ class Surface(Frozen):
 
     @property
     def glows(self) -> bool:
-        """Whether it sends out light of its own."""
+        """Whether the surface emits light."""
         return bool((np.asarray(self.emissive) > 0).any())
 
     @property

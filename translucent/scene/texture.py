@@ -1,4 +1,4 @@
-"""Pictures that vary a surface over the texture coordinates of its mesh."""
+"""Textures that vary a surface over the texture coordinates of its mesh."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Wrap = Literal["repeat", "clamp"]
 
 @dataclass(frozen=True, eq=False)
 class Texture(Frozen):
-    """Numbers over texture coordinates 0 to 1, with bilinear interpolation.
+    """Texture: values over texture coordinates 0 to 1, with bilinear interpolation.
 
     The coordinates of the mesh are multiplied by `scale`, turned by `rotation` about (0, 0), then moved by `offset`.
 
@@ -68,7 +68,7 @@ class Texture(Frozen):
 
     @property
     def rows(self) -> npt.NDArray[np.float64]:
-        """(2, 3): the picture's own coordinates, v upwards, are this times (u, v, 1) of the mesh."""
+        """(2, 3): matrix from (u, v, 1) of the mesh to the picture's own coordinates, v upwards."""
         c, s = np.cos(np.radians(self.rotation)), np.sin(np.radians(self.rotation))
         turned = np.array([[c, -s], [s, c]]) * np.asarray(self.scale)
         return np.column_stack([turned, np.asarray(self.offset)])

@@ -1,4 +1,4 @@
-"""A scene from all around, as on a turntable."""
+"""Turntables: views of a scene from all around."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
 
-#: Heights that a model is cut into, and points around each, to know what room it takes as it turns.
+#: Slices of a model, and points around each, that enclose it as it turns.
 CUTS, POINTS_AROUND = 32, 48
 
 
 def turntable(scene: Scene, count: int) -> Iterator[Scene]:
-    """The scene from `count` sides: its camera goes once around the center of the objects, about +Y.
+    """Scenes of a turntable from `count` sides: the camera orbits the center of the objects once, about +Y.
 
     Seen from above it goes counterclockwise. Environment and background go with it, so that the model seems to turn
     before them; lights stay with the model.
@@ -39,7 +39,7 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
 
 
 def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
-    """The scene with its camera as far away as it must be to see all objects from every side of a `turntable`.
+    """Scene with its camera far enough away to see all objects from every side of a `turntable`.
 
     An orthographic camera stays where it is.
     """
@@ -53,7 +53,7 @@ def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
 
 
 def swept_points(scene: Scene) -> Array:
-    """(n, 3): points around all that the objects reach as they turn about +Y through the center of their bounds."""
+    """(n, 3): points that enclose the objects as they turn about +Y through the center of their bounds."""
     center = scene.bounds.mean(axis=0)
     offsets = np.concatenate(
         [

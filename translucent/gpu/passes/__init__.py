@@ -1,4 +1,4 @@
-"""One technique per file; the table maps a plan's pass names to them."""
+"""Passes, one technique per file, and the table that maps a plan's pass names to them."""
 
 from __future__ import annotations
 
@@ -24,12 +24,14 @@ from translucent.planning.passes import PassName, PassSpec
 
 
 class Pass(Protocol):
-    """A step of a plan. It compiles its shaders when made, and sets all state that it relies on when run."""
+    """Protocol of a pass: one step of a plan. It compiles its shaders when made, and sets all state that it relies on
+    when run.
+    """
 
     def __init__(self, gl: moderngl.Context) -> None: ...
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Do what `spec` says."""
+        """Run the pass as `spec` says."""
 
 
 PASSES: dict[PassName, type[Pass]] = {

@@ -12,7 +12,7 @@ from translucent.planning.passes import PassSpec
 
 
 class BackFaceDepthPass:
-    """Keeps the extreme distances by maximum blending and counts the faces, so that concave pixels are found out."""
+    """Extreme distances by maximum blending, with a count of faces that finds concave pixels."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._faces = Variants(gl, "geometry/body.vert", "thickness/back_face_depth.frag", opaque_place=0)

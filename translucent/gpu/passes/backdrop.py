@@ -1,4 +1,4 @@
-"""The backdrop: what is opaque comes as a picture that another renderer has drawn."""
+"""Backdrop pass: opaque objects come as a picture that another renderer has drawn."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from translucent.gpu.shaders import set_uniform
 from translucent.planning.passes import PassSpec
 from translucent.scene.backdrop import Backdrop
 
-#: Place of what is infinitely far: behind everything, and yet seen.
+#: Depth of infinitely far pixels: behind everything, and yet seen.
 _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
 
 _COLOR, _DEPTH = range(2)
 
 
 class BackdropPass:
-    """Puts the job's backdrop where opaque objects would be drawn; see ``shaders/shade/backdrop.frag``."""
+    """Copy of the job's backdrop into the target of opaque objects; see ``shaders/shade/backdrop.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(
@@ -54,7 +54,7 @@ class BackdropPass:
 
 
 def _upload(job: FrameJob, backdrop: Backdrop) -> None:
-    """Write the arrays; metres become places in float64, or those of far scenes would lose digits."""
+    """Upload the arrays; distances are converted to depths in float64, so that far scenes lose no digits."""
     with np.errstate(under="ignore"):
         place = np.minimum((backdrop.depth - job.placed.media.near) / job.placed.media.length, _BEHIND_ALL)
         place = place.astype(np.float32)

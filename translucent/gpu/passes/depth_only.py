@@ -1,4 +1,4 @@
-"""Depth only: the floor that every other cost is measured against."""
+"""Depth-only pass: the baseline that every other cost is measured against."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from translucent.gpu.shaders import build_program
 
 
 class DepthOnlyPass:
-    """Draws objects, both sides, into a depth buffer. The job must be placed ``with_depth``."""
+    """Drawing of objects, both sides, into a depth buffer. The job must be placed ``with_depth``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._program = build_program(
@@ -17,7 +17,7 @@ class DepthOnlyPass:
         )
 
     def run(self, job: FrameJob, objects: tuple[int, ...]) -> None:
-        """Draw them with the depth test on."""
+        """Draw the objects with the depth test on."""
         framebuffer = job.targets.depth_only()
         framebuffer.use()
         job.gl.enable_only(moderngl.DEPTH_TEST)

@@ -1,4 +1,4 @@
-"""Depth peeling: every pass over the geometry finds the next crossings of each ray, and walks go along them."""
+"""Depth peeling: every pass over the geometry finds the next crossings of each ray, which are then walked in order."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from translucent.planning.passes import PassSpec
 
 _STATE = ("near_depth", "near_emitted", "layers", "far_depth", "far_emitted", "near_winding", "far_winding")
 
-#: Texture unit of what the previous pass has found, and of where rays end, for shaders that draw bodies.
+#: Texture units of the previous pass's result, and of the ends of rays, for shaders that draw bodies.
 _PREVIOUS, _OPAQUE = 0, 1
 
 
 class DepthPeelingPass:
-    """Peels from one end of the rays or from both; see ``shaders/intervals/peel.frag``.
+    """Depth peeling from one end of the rays or from both; see ``shaders/intervals/peel.frag``.
 
     The first pass counts the crossings of each pixel, which tells when all are found: then a depth mask keeps the pixel
     out of further passes.
@@ -70,7 +70,7 @@ class DepthPeelingPass:
     def _find(
         self, job: FrameJob, spec: PassSpec, batch: list[moderngl.Framebuffer], ends: dict[str, bool], number: int
     ) -> None:
-        """Draw what a pass finds; after the first, only where it is not known already."""
+        """Draw one peeling pass; after the first, only where crossings remain."""
         gl, target = job.gl, batch[-1]
         # Before any state is set: the frame may be postponed here.
         switches = {"FIRST": number == 0, "OPAQUE": job.features.has_opaque, **ends}
@@ -97,7 +97,7 @@ class DepthPeelingPass:
         target.depth_mask = True
 
     def _passes_needed(self, job: FrameJob, first: moderngl.Framebuffer, both: bool) -> int:
-        """After how many passes everything is known of every pixel, by the count of the first pass."""
+        """Number of passes that complete every pixel, from the crossing count of the first pass."""
         width, height = (-(-length // PEEL_TILE) for length in first.size)
         tiles = job.targets.peeled(1)
         tiles.scissor = 0, 0, width, height
@@ -126,7 +126,7 @@ class DepthPeelingPass:
         walked: int,
         last: bool,
     ) -> None:
-        """Walk along the crossings of the first passes of a batch, `walked` of them."""
+        """Walk along the crossings of the first `walked` passes of a batch."""
         (job.targets.ordered() if last else job.targets.peel_state(folds % 2)).use()
         # Samplers of passes that this batch is short of must not stay with what is drawn into.
         for unit in range(PEEL_BATCH):

@@ -21,12 +21,12 @@ _NODE = 8
 #: Nodes for each pixel in the first buffer; frames that need more get a larger one, and keep it.
 _FIRST_NODES_PER_PIXEL = 2
 
-#: Room beyond what a frame needed, so that the next one does not have to grow again.
+#: Factor of spare room in a buffer that grows, so that the next frame does not have to grow it again.
 _SLACK = 1.25
 
 
 class FragmentListsPass:
-    """An A-buffer that never drops a fragment; see ``shaders/intervals/fragment_lists.frag``."""
+    """A-buffer that never drops a fragment; see ``shaders/intervals/fragment_lists.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
@@ -77,7 +77,7 @@ class FragmentListsPass:
         return job.targets.buffers.get("nodes", max(first, _NODE))
 
     def _draw(self, job: FrameJob, spec: PassSpec, first: int, last: int) -> int:
-        """Make the lists of some rows; returns how many nodes they need."""
+        """Build the lists of some rows; returns the number of nodes that they need."""
         gl = job.gl
         width, height = job.targets.size
         count, heads = job.targets.buffers.get("count", 4), job.targets.buffers.get("heads", 4 * width * height)

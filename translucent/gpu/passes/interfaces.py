@@ -1,4 +1,4 @@
-"""Interfaces of bodies: where each ray first enters one and, unless it leaves unbent, where it first leaves another."""
+"""Interfaces: where each ray first enters a body, and, if exits refract, where it first leaves one beyond."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _UNITS = {"opaque_place": 0, "entered": 1, "ordered_layers": 2} | texture_units(
 
 
 class InterfacesPass:
-    """Nearest interface towards the eye, then the nearest away from it; see ``shaders/shade/interface.frag``."""
+    """Nearest interface that faces the eye, then the nearest that faces away; see ``shaders/shade/interface.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/interface.vert", "shade/interface.frag", **_UNITS)

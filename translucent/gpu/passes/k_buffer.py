@@ -1,4 +1,4 @@
-"""k-buffer: one draw, of which each pixel keeps the k nearest crossings in order."""
+"""k-buffer: one draw in which each pixel keeps the k nearest crossings in order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.planning.passes import PassSpec
 
 
 class KBufferPass:
-    """Inserts every crossing with atomic minima; see ``shaders/intervals/k_buffer.frag``."""
+    """k-buffer filled with atomic minima; see ``shaders/intervals/k_buffer.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", 430, opaque_place=0)
@@ -25,7 +25,7 @@ class KBufferPass:
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Draw the bodies, then walk along what is kept."""
+        """Draw the bodies, then walk along the crossings that were kept."""
         gl, k = job.gl, cast(KBuffer, job.plan.method).k
         width, height = job.targets.size
         words = job.targets.buffers.get("words", 4 * (k + 1) * width * height)

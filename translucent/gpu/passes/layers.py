@@ -1,4 +1,4 @@
-"""Layers that cover a share of what is behind them, and light that interfaces of bodies add."""
+"""Partly transparent layers, and the emission of interfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SAMPLERS = ("layers_in_front", "layers_behind", "straight_transmittance", "shad
 
 
 class LayersPass:
-    """Paints the layers, far objects first, and puts them over the picture; see ``shaders/shade/layer.frag``."""
+    """Layers, drawn far objects first and composited over the picture; see ``shaders/shade/layer.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         units = FINISH_UNITS | {name: len(FINISH_UNITS) + i for i, name in enumerate(_OWN)}
@@ -31,7 +31,9 @@ class LayersPass:
         self._maps = FinishMaps(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Draw and put over; for a job of several samples, add the sample's radiance and transmittance."""
+        """Draw the layers over the picture; for a job of several samples, add the sample's radiance
+        and transmittance.
+        """
         bodies = tuple(i for i, item in enumerate(job.scene.objects) if item.medium is not None and not item.covers)
         if bodies:
             self._find_fronts(job, bodies)
@@ -39,7 +41,7 @@ class LayersPass:
         self._put_over(job, job.sums_after(spec.name))
 
     def _find_fronts(self, job: FrameJob, bodies: tuple[int, ...]) -> None:
-        """Where each ray first meets a body: at once, if it starts inside one."""
+        """Draw the depth at which each ray first meets a body: at once, if it starts inside one."""
         framebuffer = job.targets.fronts()
         framebuffer.use()
         nothing = float(CONSTANTS["NOTHING"])

@@ -1,4 +1,4 @@
-"""Views from the lights: how deep in the media each point is, seen from each light."""
+"""Views from the lights: the optical depth from each light to each point in the media."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
 
-#: Bytes of a node, and of what is recorded at each.
+#: Bytes of a node, and of the record at each.
 _NODE, _MEDIUM = 16, 16
 
 #: Texels along a side of a light's view, and twice those of each of the six of a cube: the first that fit are taken.
 _SIDES = (1024, 512, 256, 128)
 
-#: Buffers that shaders read once they are made.
+#: Buffers that shaders read once they are filled.
 _READ = ("light_heads", "light_nodes", "light_media", "light_ends")
 
 #: Nodes in the first buffers, for each texel: enough for most bodies. Frames that need more get larger ones, and keep
 #: them.
 _FIRST_SHARE = 1.25
 
-#: Room beyond what a frame needed, so that the next one does not have to grow again.
+#: Factor of spare room in a buffer that grows, so that the next frame does not have to grow it again.
 _SLACK = 1.25
 
 
 class LightViewsPass:
-    """Lists of crossings from each light, with optical depths; see ``shaders/volume/light_views.glsl``."""
+    """Views from each light: lists of crossings with optical depths; see ``shaders/volume/light_views.glsl``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
@@ -51,7 +51,7 @@ class LightViewsPass:
         self._held: tuple[object, LightLookup] | None = None
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Make the lists of all views, and tell the shaders where the lights are."""
+        """Build the lists of all views, and write the uniforms of the lights."""
         # Lights see the same from frame to frame, wherever the camera is.
         seen = _seen(job)
         if self._held is None or self._held[0] != seen:
@@ -64,7 +64,7 @@ class LightViewsPass:
                 job.resources.light_lists.get(name, 1).bind_to_storage_buffer(STORAGE_BINDINGS[name])
 
     def _look(self, job: FrameJob, spec: PassSpec) -> LightLookup:
-        """What all lights see, in the largest views that fit."""
+        """Build the views of all lights, in the largest size that fits."""
         for side in _SIDES:
             if (found := self._look_closely(job, spec, side)) is not None:
                 return found
@@ -76,7 +76,7 @@ class LightViewsPass:
         )
 
     def _look_closely(self, job: FrameJob, spec: PassSpec, side: int) -> LightLookup | None:
-        """What all lights see, in views of some size; None if no buffer holds it."""
+        """Build the views of all lights in a given size; None if no buffer holds them."""
         groups = [self._views(job, light, side) for light in job.scene.lights]
         views = [view for group in groups for view in group]
         try:
@@ -93,7 +93,7 @@ class LightViewsPass:
         return [LightView(job, camera, self._targets[side]) for camera in cameras]
 
     def _fill(self, job: FrameJob, spec: PassSpec, views: list[LightView]) -> bool:
-        """Make all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
+        """Build all lists; once more, with larger buffers, if they did not fit. False if none are large enough."""
         lists = job.resources.light_lists
         cells = sum(view.texels for view in views)
         # Where a light is inside, each of its lists begins with a crossing of its own.
@@ -165,7 +165,7 @@ class LightViewsPass:
 
 
 def _seen(job: FrameJob) -> object:
-    """Equal for frames in which lights see the same; keeps nothing alive."""
+    """Key of the views, equal for frames in which lights see the same; keeps nothing alive."""
     scene = job.scene
     objects = tuple(
         (

@@ -1,4 +1,4 @@
-"""Opaque objects: where rays through the media end, and what is seen there."""
+"""Opaque objects: the ends of rays through the media, and the radiance there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FINISH_UNITS = {name: unit for unit, name in enumerate(_MAPS)} | texture_units(_
 
 
 class OpaquePass:
-    """Draws the nearest opaque surface of each pixel; see ``shaders/shade/opaque.frag``."""
+    """Nearest opaque surface of each pixel; see ``shaders/shade/opaque.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._plain = Variants(gl, "geometry/body.vert", "shade/opaque.frag", **FINISH_UNITS)
@@ -54,14 +54,14 @@ class OpaquePass:
 
 
 class FinishMaps:
-    """What ``shaders/shade/opaque_surface.glsl`` reads: maps of the environment, and how an object is finished."""
+    """Inputs of ``shaders/shade/opaque_surface.glsl``: maps of the environment, and the surface of an object."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._reflectance: moderngl.Texture | None = None
 
     def bind(self, view: SceneView) -> None:
-        """Give the environment's maps to the texture units of `FINISH_UNITS`."""
+        """Bind the environment's maps to the texture units of `FINISH_UNITS`."""
         if self._reflectance is None:
             self._reflectance = reflectance_table(self._gl)
         environment = view.scene.environment
@@ -71,7 +71,7 @@ class FinishMaps:
             texture.use(unit)
 
     def set_finish(self, view: SceneView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
-        """Tell a program the surface of an object; there is a hole where alpha is less than `hole_below`."""
+        """Set the uniforms of an object's surface; there is a hole where alpha is less than `hole_below`."""
         view.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         finish = surface.metallic, surface.roughness, surface.ior, hole_below
@@ -83,7 +83,7 @@ class FinishMaps:
 
 
 def _clear(framebuffer: moderngl.Framebuffer) -> None:
-    """No surface anywhere, and no light, which is blurred where refraction is."""
+    """Clear the attachments to no surface and no radiance."""
     on, off = (True,) * 4, (False,) * 4
     framebuffer.color_mask = on, off
     framebuffer.clear(float(CONSTANTS["NOTHING"]), 0.0, 0.0, 0.0, depth=1.0)

@@ -1,4 +1,4 @@
-"""A finished frame on a display."""
+"""Tone mapping of a finished frame for display."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shortcuts that others take, drawn and timed like the methods that they are compared with; in no plan."""
+"""Shortcuts of other renderers, drawn and timed like the methods that they are compared with; in no plan."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.planning.passes import PassName, PassSpec
 
 
 class Shortcut(Protocol):
-    """A way to fill the accumulator that no plan takes."""
+    """Base class of shortcuts: fills the accumulator in a way that no plan uses."""
 
     with_depth: bool  # how the job has to be placed
 
@@ -24,11 +24,11 @@ class Shortcut(Protocol):
         """Draw the bodies."""
 
     def hand_over(self, job: FrameJob) -> None:
-        """Put the result where the shading looks for it, if it is elsewhere."""
+        """Copy the result to the accumulator, if it is elsewhere."""
 
 
 class NearestFacePass:
-    """The nearest face alone: a constant thickness, or that of a ball; see ``shaders/thickness/nearest_face.frag``.
+    """Thickness from the nearest face alone, constant or that of a ball; see ``shaders/thickness/nearest_face.frag``.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class NearestFacePass:
 
 
 class UnmarkedBackFacePass:
-    """Farthest back face minus nearest front face, and no word of the pixels where there is a gap between them."""
+    """Farthest back face minus nearest front face, without marking pixels that have a gap in between."""
 
     with_depth = False
 
@@ -85,7 +85,7 @@ class UnmarkedBackFacePass:
         self._pass.run(job, PassSpec(PassName.BACK_FACE_DEPTH, "for comparison", _bodies(job), 2))
 
     def hand_over(self, job: FrameJob) -> None:
-        """Wipe the count of entries and exits, where the method keeps its doubts."""
+        """Clear the count of entries and exits, which would mark pixels invalid."""
         framebuffer = job.accumulator()
         framebuffer.use()
         framebuffer.color_mask = (False, True, False, False)
@@ -127,7 +127,7 @@ class HalfFloatPass:
             job.gl.copy_framebuffer(target, source)
 
     def _half(self, job: FrameJob) -> list[moderngl.Framebuffer]:
-        """All attachments in one framebuffer, and each in one of its own."""
+        """Framebuffers of the float16 target: one with all attachments, and one for each."""
         made = self._halves.setdefault(job.targets, {})
         if job.plan.spectral not in made:
             components = (4, 1) if job.plan.spectral else (2,)

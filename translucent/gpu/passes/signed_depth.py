@@ -10,7 +10,7 @@ from translucent.planning.passes import PassSpec
 
 
 class SignedDepthPass:
-    """Adds sign * distance and sign of every face to the accumulator; see ``shaders/thickness/signed_depth.frag``."""
+    """Sum of sign * distance, and of sign, over all faces; see ``shaders/thickness/signed_depth.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_place=0)

@@ -1,4 +1,4 @@
-"""Light at the interfaces of bodies, over the whole picture."""
+"""Shading of interfaces, over the whole picture."""
 
 from __future__ import annotations
 

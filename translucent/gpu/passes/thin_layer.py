@@ -12,7 +12,7 @@ from translucent.scene.surface import LEAST_COVER
 
 
 class ThinLayerPass:
-    """Adds the path through each sheet; see ``shaders/thickness/thin_layer.frag``.
+    """Sum of the paths through each sheet; see ``shaders/thickness/thin_layer.frag``.
 
     As ``thin_layer_fallback`` it fills a target of its own, from which pixels that do not balance take their path.
     """

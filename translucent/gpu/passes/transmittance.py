@@ -1,4 +1,4 @@
-"""From accumulated paths to radiance, and the mask of what can be trusted."""
+"""Radiance from accumulated path lengths, and the mask of valid pixels."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ _SAMPLERS = (
 
 
 class TransmittancePass:
-    """Beer-Lambert over what is behind, per pixel; see ``shaders/shade/transmittance.frag``."""
+    """Beer-Lambert transmittance over the background, per pixel; see ``shaders/shade/transmittance.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         units = {name: unit for unit, name in enumerate(_SAMPLERS)}
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/transmittance.frag", **units)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Resolve the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
+        """Shade the frame from its accumulated paths; for a job of several samples, add a sample's radiance and
+        transmittance instead.
+        """
         gl, plan, features = job.gl, job.plan, job.features
         inputs = {
             "accumulated": job.accumulator() if features.accumulates else None,

@@ -1,4 +1,4 @@
-"""Programs of one pair of shaders, by their switches; each is compiled when a scene first needs it."""
+"""Variants of one pair of shaders, by their switches; each is compiled when a scene first needs it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Variants:
         self._fullscreen: dict[int, moderngl.VertexArray] = {}
 
     def program(self, **switches: bool | int) -> moderngl.Program:
-        """The program with these switches; `PostponedError` if the context's ledger says so."""
+        """The program with these switches; raises `PostponedError` if the context's compile budget is spent."""
         key = tuple(sorted((name, int(value)) for name, value in switches.items()))
         if key not in self._programs:
             before_making(self._gl, (self._files, key))
@@ -50,7 +50,7 @@ class Variants:
 
 
 def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
-    """Switches of ``shaders/intervals/walk.glsl`` for a frame: what fills segments, and how many slots there are."""
+    """Switches of ``shaders/intervals/walk.glsl`` for a frame: the kinds of media, and the number of slots."""
     return {
         # Powers of two, so that scenes which differ by a medium share programs.
         "SLOTS": 1 << max(len(features.slots) - 1, 0).bit_length(),
@@ -67,7 +67,7 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
 
 
 def look_switches(body: Object) -> dict[str, bool]:
-    """Switches of ``geometry/interface.vert`` and ``shade/surface_textures.glsl``: what few objects have."""
+    """Switches of ``geometry/interface.vert`` and ``shade/surface_textures.glsl``: features that few objects have."""
     occluded = body.surface is not None and body.surface.occlusion_texture is not None
     return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
 

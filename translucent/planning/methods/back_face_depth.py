@@ -35,7 +35,7 @@ class BackFaceDepth(Method):
         return (PassSpec(PassName.BACK_FACE_DEPTH, reason, solids_of(scene), 2, cost=self.cost),)
 
     def limits(self, scene: Scene) -> list[Note]:
-        """Which pixels enter a body more than once, or more than one."""
+        """Notes on pixels whose ray enters a body more than once, or more than one body."""
         limits = []
         if len(scene.bodies) > 1:
             text = "several bodies: pixels that cross more than one are marked invalid"

@@ -1,4 +1,4 @@
-"""What a method of finding thickness is: a frozen configuration, the passes that it needs, and traits to choose by."""
+"""Base class of thickness methods: a frozen configuration, the passes that it needs, and traits to choose by."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from translucent.planning.notes import Note
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
 
-#: More points in an interval change nothing that float32 could show.
+#: Largest number of points in an interval: more change nothing that float32 could show.
 MAX_LIGHT_POINTS = 16
 
 
@@ -62,17 +62,19 @@ class Method:
 
     @property
     def layer_limit(self) -> int | None:
-        """Surfaces that a ray may cross; None where there is no limit. Pixels with more are marked invalid."""
+        """Largest number of surfaces on a ray; None where there is no limit. Pixels with more are marked
+        invalid.
+        """
         return None
 
     @property
     def light_points(self) -> int:
-        """Points at which each interval looks at each light, where a medium scatters light."""
+        """Number of points in each interval at which light from each light is evaluated, where a medium scatters."""
         return 1
 
     @property
     def usual_thickness(self) -> float | None:
-        """Metres through every face that declares none, where the method makes sheets."""
+        """Thickness in metres of faces that declare none, where the method makes sheets."""
         return None
 
     @property
@@ -81,14 +83,16 @@ class Method:
         return False
 
     def check(self, scene: Scene) -> None:
-        """Raise `InputError` where the method cannot find the thickness of this scene, whatever its passes."""
+        """Raise `InputError` if the method cannot find the thickness of this scene."""
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """The passes of its own, each with its reason; `why` tells why this method was chosen."""
+        """Passes of the method, each with its reason; `why` tells why this method was chosen."""
         raise NotImplementedError
 
     def limits(self, scene: Scene) -> list[Note]:
-        """Where its thickness is not exact, beside what any method leaves out: see `translucent.planning.limits`."""
+        """Notes on where its thickness is not exact, beyond the limits of every method: see
+        `translucent.planning.limits`.
+        """
         return []
 
     def with_thickness(self, thickness: float) -> Method:

@@ -11,7 +11,7 @@ from translucent.planning.methods.base import Method, check_count
 from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene
 
-#: Passes over the geometry that anybody would wait for.
+#: Largest number of passes over the geometry.
 MAX_LAYERS = 4096
 
 #: Layers of a body that is not convex, for want of a better guess: cost estimates are made before anything is drawn.
@@ -49,11 +49,11 @@ class DepthPeeling(Method):
 
     @property
     def layer_limit(self) -> int:
-        """Surfaces that a ray may cross."""
+        """Largest number of surfaces that a ray may cross."""
         return self.max_layers
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """As many draws of all solids as it is expected to take."""
+        """Passes: as many draws of all solids as are expected to be needed."""
         solids = solids_of(scene)
         bodies = [scene.objects[i] for i in solids]
         expected = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)

@@ -34,6 +34,6 @@ class FragmentLists(Method):
         check_count("FragmentLists light_points", self.light_points, MAX_LIGHT_POINTS)
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """One draw of all solids."""
+        """Passes: one draw of all solids."""
         reason = f"{why}; one draw into a list for each pixel, sorted afterwards"
         return (PassSpec(PassName.FRAGMENT_LISTS, reason, solids_of(scene), 1, cost=self.cost),)

@@ -10,7 +10,7 @@ from translucent.planning.methods.base import MAX_LIGHT_POINTS, Method, check_co
 from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene
 
-#: A pixel's surfaces must fit into the memory of a frame.
+#: Largest number of surfaces for each pixel, which must fit into the memory of a frame.
 MAX_K = 256
 
 
@@ -42,10 +42,10 @@ class KBuffer(Method):
 
     @property
     def layer_limit(self) -> int:
-        """Surfaces that a ray may cross."""
+        """Largest number of surfaces that a ray may cross."""
         return self.k
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """One draw of all solids."""
+        """Passes: one draw of all solids."""
         reason = f"{why}; one draw, of which each pixel keeps the {self.k} nearest surfaces"
         return (PassSpec(PassName.K_BUFFER, reason, solids_of(scene), 1, cost=self.cost),)

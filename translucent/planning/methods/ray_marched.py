@@ -13,10 +13,10 @@ from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene
 
-#: Steps of a ray through one interval that anybody would wait for.
+#: Largest number of steps of a ray through one interval.
 MAX_STEPS = 65536
 
-#: Gauss-Legendre points of an interval; smooth sources need far fewer for all digits of float64.
+#: Largest number of Gauss-Legendre points in an interval; smooth sources need far fewer for all digits of float64.
 MAX_GAUSS_POINTS = 256
 
 #: Where less than this share of the light of every channel gets through, a march on the GPU looks for no more sources.
@@ -92,22 +92,22 @@ class RayMarched(Method):
 
     @property
     def light_points(self) -> int:
-        """Points at which each interval looks at each light: its steps."""
+        """Number of points in each interval at which light from each light is evaluated: its steps."""
         return self.steps
 
     def check(self, scene: Scene) -> None:
-        """Refuse more Gauss-Legendre points than shaders hold."""
+        """Raise `InputError` for more Gauss-Legendre points than shaders hold."""
         if self.quadrature == "gauss" and self.steps > MAX_LIGHT_POINTS:
             raise InputError(f"{self}", f"shaders hold {MAX_LIGHT_POINTS} Gauss-Legendre points", "use fewer steps")
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """One draw of all solids, and the steps."""
+        """Passes: one draw of all solids, and the steps."""
         reason = f"{why}; one draw into a list for each pixel, then {self.steps} steps through each interval"
         cost = self.cost + self.step_cost * self.steps
         return (PassSpec(PassName.FRAGMENT_LISTS, reason, solids_of(scene), 1, cost=cost),)
 
     def limits(self, scene: Scene) -> list[Note]:
-        """What a sum over steps leaves out."""
+        """Notes on the error of a sum over steps."""
         what = (
             "optical depth, and what is emitted and scattered, are"
             if scene.varies

@@ -38,11 +38,11 @@ class SignedDepth(Method):
 
     @classmethod
     def cost_for(cls, *, spectral: bool) -> float:
-        """Time of its pass, which is longer where it adds up the optical depth of each channel."""
+        """Cost of its pass, higher where it adds up the optical depth of each channel."""
         return cls.spectral_cost if spectral else cls.cost
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """One draw of all solids."""
+        """Passes: one draw of all solids."""
         if not (solids := solids_of(scene)):
             return ()
         spectral = media_differ(scene)
@@ -55,7 +55,7 @@ class SignedDepth(Method):
         return (PassSpec(PassName.SIGNED_DEPTH, reason, solids, 1, cost=self.cost_for(spectral=spectral)),)
 
     def limits(self, scene: Scene) -> list[Note]:
-        """What distances from the camera lose."""
+        """Notes on digits lost in distances from the camera."""
         if self.anchored:
             return []
         text = "distances count from the camera: float32 loses digits with distance"

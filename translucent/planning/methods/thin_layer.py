@@ -38,7 +38,7 @@ class ThinLayer(Method):
 
     @property
     def usual_thickness(self) -> float:
-        """Metres through every face that declares none."""
+        """Thickness in metres of faces that declare none."""
         return self.thickness
 
     def with_thickness(self, thickness: float) -> ThinLayer:
@@ -46,14 +46,14 @@ class ThinLayer(Method):
         return replace(self, thickness=thickness)
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
-        """One draw of all bodies."""
+        """Passes: one draw of all bodies."""
         bodies = indices(scene, lambda body: body.medium is not None)
         return (
             sheet_pass(bodies, f"every face of {count_of(bodies, 'mesh', 'meshes')} is a sheet: their paths add up"),
         )
 
     def limits(self, scene: Scene) -> list[Note]:
-        """What sheets leave out of closed bodies."""
+        """Notes on closed bodies, whose volume sheets leave out."""
         solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
         if not solid:
             return []
