@@ -44,14 +44,14 @@ def extinction_from_color(color: npt.ArrayLike, distance: npt.ArrayLike) -> Arra
     Parameters
     ----------
     color : array_like
-        Transmitted linear colour, 0 < t_c <= 1; t_c = 1 gives exactly 0.
+        Transmitted linear color, 0 < t_c <= 1; t_c = 1 gives exactly 0.
     distance : array_like
         Distance in metres, > 0.
 
     Notes
     -----
     Conditioning: a relative error e in t_c is an absolute error e / d in sigma_t, that is e / -log(t_c) relative.
-    A colour near white therefore says little about sigma_t.
+    A color near white therefore says little about sigma_t.
     """
     # Adding 0 turns the -0 of a white channel into 0.
     return -np.log(np.asarray(color, dtype=np.float64)) / np.asarray(distance, dtype=np.float64) + 0.0
@@ -84,7 +84,7 @@ def opacity_for_step(opacity_at_reference: npt.ArrayLike, step_ratio: npt.ArrayL
 
 @np.errstate(under="ignore")
 def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: npt.ArrayLike) -> Array:
-    """Front over behind for associated (premultiplied) colours: F + (1 - alpha) B (Porter & Duff 1984)."""
+    """Front over behind for associated (premultiplied) colors: F + (1 - alpha) B (Porter & Duff 1984)."""
     return np.asarray(front, np.float64) + (1.0 - np.asarray(front_opacity, np.float64)) * np.asarray(
         behind, np.float64
     )
@@ -92,7 +92,7 @@ def composite_over(front: npt.ArrayLike, front_opacity: npt.ArrayLike, behind: n
 
 @np.errstate(under="ignore")
 def fresnel_dielectric(cos_incident: npt.ArrayLike, ior: npt.ArrayLike) -> Array:
-    """Unpolarised reflectance of a smooth dielectric boundary; 1 under total internal reflection.
+    """Unpolarized reflectance of a smooth dielectric boundary; 1 under total internal reflection.
 
     Parameters
     ----------

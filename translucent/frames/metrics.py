@@ -16,7 +16,7 @@ Quantity = Literal["thickness", "transmittance", "optical_depth", "radiance"]
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of one quantity, result minus truth, over the pixels of a mask (and the channels of a colour).
+    """Errors of one quantity, result minus truth, over the pixels of a mask (and the channels of a color).
 
     Attributes
     ----------
@@ -111,9 +111,9 @@ def compare(
 
 
 def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """(h, w) bool: pixels whose 3 x 3 neighbourhood has equal hit counts, away from every silhouette.
+    """(h, w) bool: pixels whose 3 x 3 neighborhood has equal hit counts, away from every silhouette.
 
-    At a silhouette a rasteriser decides coverage on a grid of sub-pixels, so it and a ray tracer may disagree there
+    At a silhouette a rasterizer decides coverage on a grid of sub-pixels, so it and a ray tracer may disagree there
     about which surfaces a pixel center sees: a matter of coverage, not of thickness.
     """
     padded = np.pad(hit_counts, 1, mode="edge")

@@ -204,7 +204,7 @@ def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Ar
 def view_ray(
     pixel: npt.ArrayLike, size: npt.ArrayLike, right: npt.ArrayLike, up: npt.ArrayLike, forward: npt.ArrayLike
 ) -> Array:
-    """Ray through points of a picture, not normalised: it advances 1 m along `forward`.
+    """Ray through points of a picture, not normalized: it advances 1 m along `forward`.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from translucent.scene.surface import Surface
 Overlap = Literal["add", "union", "priority"]
 Light = PointLight | DirectionalLight
 
-#: What opaque objects reflect unless told otherwise: a light grey, as of clay.
+#: What opaque objects reflect unless told otherwise: a light gray, as of clay.
 OPAQUE_COLOR = (0.6, 0.6, 0.6)
 
 #: Names that a message lists.

@@ -44,7 +44,7 @@ TEXTURE_FIELDS = (
 
 @dataclass(frozen=True, eq=False)
 class Surface(Frozen):
-    """The interface between a medium and the air around it; or what an opaque object shows instead of a plain grey.
+    """The interface between a medium and the air around it; or what an opaque object shows instead of a plain gray.
 
     What does not pass the interface by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
     paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission and
