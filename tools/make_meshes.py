@@ -139,7 +139,7 @@ def gummy_bear() -> Mesh:
         for part, blend in parts:
             value = smooth_min(value, part(p), blend)
         value = smooth_max(value, -inner_ear(p), 0.09)
-        # Cast in an open mould: a flat back, and it stands.
+        # Cast in an open mold: a flat back, and it stands.
         value = smooth_max(value, -p[..., 2] - 0.30, 0.14)
         return smooth_max(value, 0.03 - p[..., 1], 0.08)
 
@@ -417,7 +417,7 @@ def readme(made: dict[str, Shape]) -> str:
     return f"""# Meshes
 
 Small meshes for examples and tests, all made by `tools/make_meshes.py`, which also writes this page: edit that file and
-run it again. They are part of the project and under its MIT licence.
+run it again. They are part of the project and under its MIT license.
 
 Unit: metre. y is up; each stands on y = 0, but for the wine, which stands in its glass, and for wick and flame, which
 are on their candle. Binary PLY, positions in float32, faces counter-clockwise seen from outside.

@@ -66,7 +66,7 @@ vec3 composite_over(vec3 front, float front_opacity, vec3 behind) {
     return front + (1.0 - front_opacity) * behind;
 }
 
-// Unpolarised reflectance of a smooth dielectric; ior is relative to the side that the ray comes from.
+// Unpolarized reflectance of a smooth dielectric; ior is relative to the side that the ray comes from.
 // Multiplied out, each amplitude holds n^2 - 1 as a factor, so that nothing cancels where ior is near 1.
 float fresnel_dielectric(float cos_incident, float ior) {
     float ior_squared_minus_1 = (ior - 1.0) * (ior + 1.0);

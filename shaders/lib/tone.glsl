@@ -22,7 +22,7 @@ vec3 tone_neutral(vec3 linear) {
     return mix(vec3(shown), color * (shown / peak), kept);
 }
 
-// From 0 at 0 to 1 at 1: middle grey becomes 1/2, and the slope there is AGX_SLOPE.
+// From 0 at 0 to 1 at 1: middle gray becomes 1/2, and the slope there is AGX_SLOPE.
 float agx_sigmoid(float place) {
     float pivot = -AGX_LOW / (AGX_HIGH - AGX_LOW);
     float x = place - pivot;
@@ -32,12 +32,12 @@ float agx_sigmoid(float place) {
     return 0.5 + AGX_SLOPE * x * pow(1.0 + bend, -1.0 / power);
 }
 
-// 16.5 stops, in a gamut narrowed towards grey; bright colors fade to white.
+// 16.5 stops, in a gamut narrowed towards gray; bright colors fade to white.
 vec3 tone_agx(vec3 linear) {
     vec3 color = max(linear, 0.0);
     float own = 1.0 - dot(AGX_MIX, vec3(1.0));
     vec3 narrowed = own * color + dot(AGX_MIX, color);
-    vec3 stops = log2(clamp(narrowed / AGX_MIDDLE_GREY, exp2(AGX_LOW), exp2(AGX_HIGH)));
+    vec3 stops = log2(clamp(narrowed / AGX_MIDDLE_GRAY, exp2(AGX_LOW), exp2(AGX_HIGH)));
     vec3 places = (stops - AGX_LOW) / (AGX_HIGH - AGX_LOW);
     vec3 encoded = vec3(agx_sigmoid(places.r), agx_sigmoid(places.g), agx_sigmoid(places.b));
     vec3 widened = (encoded - dot(AGX_MIX, encoded)) / own;

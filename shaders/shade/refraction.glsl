@@ -1,7 +1,7 @@
 // Light along rays that bend at the interface of a body: through its first interval, and out into what is behind.
 // Positions count from the center of the media, so that float32 resolves them. Needs <View>, <Surfaces> and background.glsl.
 // After Wyman 2005, "An approximate image-space approach for interactive refraction", whose guess of the path's length a
-// search along the bent ray replaces.
+// search along the refracted ray replaces.
 
 uniform sampler2D entered;      // interface towards the eye: normal, place
 #if !ONE_INTERFACE

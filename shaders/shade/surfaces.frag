@@ -1,5 +1,5 @@
 // Light at the interfaces of bodies: what they reflect, what enters and bends, and what paint and many scattering events
-// give back. What the media absorb and emit on straight rays has been found; the first interval of a bent ray is as long
+// give back. What the media absorb and emit on straight rays has been found; the first interval of a refracted ray is as long
 // as it is bent. Row 0 of the output is the top row. ONE_INTERFACE: rays bend where they enter, and leave without bending.
 
 #include <constants>
@@ -136,7 +136,7 @@ vec3 paint(Finish finish, vec3 point, vec3 normal) {
 
 struct Crossing {
     vec3 light;
-    vec3 passed;      // transmittance along the bent ray
+    vec3 passed;      // transmittance along the refracted ray
     float thickness;  // metres inside media along it
 };
 
@@ -158,7 +158,7 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     return Crossing(light, passed, straight.thickness);
 }
 #else
-// Light that crosses the first interval along a bent ray; the media there are taken to be mixed as along the straight one.
+// Light that crosses the first interval along a refracted ray; the media there are taken to be mixed as along the straight one.
 Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, bool enters, Straight straight) {
     vec3 inside = enters ? refracted_direction(ray, normal, ior) : ray;
     Exit leaving = find_exit(point, inside, finish.longest, -inside);

@@ -248,7 +248,7 @@ def test_banners() -> None:
     plain = of(software=False, renderer="A GPU")
     assert "A GPU" in plain
     for words, text in (
-        ("Software rasteriser", of(software=True)),
+        ("Software rasterizer", of(software=True)),
         ("Not complete.", of(software=False, complete=False)),
         ("A quick run", of(software=False, quick=True)),
     ):
@@ -335,7 +335,7 @@ def test_the_figure_names_its_methods_and_is_a_file_of_its_own() -> None:
     svg = overview_svg(report(cases=(case(convex=True, title="A sphere"), case())))
     root = ElementTree.fromstring(svg)
     text = "".join(root.itertext())
-    assert "A knot, 640 × 480, software rasteriser" in text
+    assert "A knot, 640 × 480, software rasterizer" in text
     assert "SignedDepth, 4 of them" in text
     assert "on the processor" not in text
     assert "prefers-color-scheme: dark" in text

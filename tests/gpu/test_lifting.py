@@ -142,7 +142,10 @@ def test_a_shader_is_found_by_its_name_alone(name: str, found: str) -> None:
     [
         ("opticz", "no such shader; did you mean optics?"),
         ("zzz", "no such shader; 'translucent shader' lists all"),
-        ("interface", "several files are called so; use one of lib/interface.glsl, shade/interface.frag"),
+        (
+            "interface",
+            "several files are called so; use one of geometry/interface.vert, lib/interface.glsl, shade/interface.frag",
+        ),
     ],
 )
 def test_a_shader_that_is_none_is_told(name: str, message: str) -> None:

@@ -56,7 +56,7 @@ def test_what_takes_no_light_cannot_be_told_from_white_surroundings(
     surface = tl.Surface(roughness=roughness, metallic=metallic, diffuse_transmission=passed)
     camera = tl.Camera.look_at((0, 0, 6), (0, 0, 0), fov_y=25)
     found = picture(renderer, plate(surface, BALL), camera=camera, environment=WHITE)
-    # The filters and the table are normalised; float32 textures and sums leave 1e-5.
+    # The filters and the table are normalized; float32 textures and sums leave 1e-5.
     np.testing.assert_allclose(found, 1.0, atol=1e-5)
 
 
@@ -169,7 +169,7 @@ def test_a_texture_is_turned_and_moved_as_on_the_cpu(
     columns, rows = np.meshgrid(np.arange(4, 28), np.arange(24))
     uv = np.stack([0.5 + (columns + 0.5 - 16) / 24, 1 - (rows + 0.5) / 24], axis=-1)
     expected = texture.sample(uv)
-    # Rasterisers place texels to 1/256, and pixels hold half floats.
+    # Rasterizers place texels to 1/256, and pixels hold half floats.
     np.testing.assert_allclose(found[:, 4:28], expected, atol=8e-3)
 
 

@@ -14,7 +14,7 @@ BOX = Box(low=(-0.5, -0.4, -0.3), high=(0.5, 0.4, 0.3))
 EPS = float(np.finfo(np.float32).eps)
 
 
-#: A pixel at the bodies, in metres. Rasterisers decide coverage on a grid of 1/256 pixel: a center that lies nearer
+#: A pixel at the bodies, in metres. Rasterizers decide coverage on a grid of 1/256 pixel: a center that lies nearer
 #: than that to an edge may get the neighboring face, extended. Faces of these bodies bend by less than slope 4.
 SNAP = 4 / 256 * 2 * float(np.tan(np.radians(25))) / SIZE[1] * 4.5
 

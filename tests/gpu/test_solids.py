@@ -1,9 +1,9 @@
 """Analytic solids x methods x cameras: every pixel between two exact chords.
 
-A tessellated, rasterised surface differs from the true one by an offset of at most
+A tessellated, rasterized surface differs from the true one by an offset of at most
   sagitta            (the mesh is not the solid)
 + 16 eps diagonal    (float32: position, interpolation and sum, a few roundings each)
-+ 1/256 pixel        (rasterisers snap silhouettes to a sub-pixel grid),
++ 1/256 pixel        (rasterizers snap silhouettes to a sub-pixel grid),
 so its chord lies between those of the solid shrunk and grown by that offset. No pixel is left out, grazing or not.
 """
 
@@ -147,4 +147,4 @@ def test_back_face_depth_marks_pixels_with_more_than_one_entry(renderer: tl.Rend
     kept = inner & frame.valid
     difference = np.abs(frame.thickness - truth.thickness)[kept]
     assert np.quantile(difference, 0.99) <= 1e-6 * mesh.diagonal
-    assert difference.max() <= 1e-4 * mesh.diagonal  # 1/256 pixel, where the rasteriser took the neighboring face
+    assert difference.max() <= 1e-4 * mesh.diagonal  # 1/256 pixel, where the rasterizer took the neighboring face

@@ -15,16 +15,16 @@ from translucent.geometry.solids import Box, Sphere
 SIZE = (96, 72)
 BALL = Sphere().tessellate(64)
 CAMERA = tl.Camera.look_at((0, 0, 5), (0, 0, 0), fov_y=40)
-GREY = tl.Medium(absorption=0.4, ior=1.5)
+GRAY = tl.Medium(absorption=0.4, ior=1.5)
 
 
 @pytest.fixture
 def scene() -> tl.Scene:
     wall = tl.Object(Box((-2, -2, -2), (0, 0, -1.5)).tessellate())
-    return tl.Scene([tl.Object(BALL, GREY), wall], CAMERA, environment=tl.Environment.gradient((0.1,) * 3, (0.9,) * 3))
+    return tl.Scene([tl.Object(BALL, GRAY), wall], CAMERA, environment=tl.Environment.gradient((0.1,) * 3, (0.9,) * 3))
 
 
-def test_before_any_grey_it_is_the_frame_with_that_background(renderer: tl.Renderer, scene: tl.Scene) -> None:
+def test_before_any_gray_it_is_the_frame_with_that_background(renderer: tl.Renderer, scene: tl.Scene) -> None:
     """Where nothing tints, radiance = alone + (1 - alpha) behind."""
     alone = renderer.render(scene, SIZE, samples=4, transparent=True)
     assert alone.alpha is not None
@@ -53,7 +53,7 @@ def test_files_hold_alpha(renderer: tl.Renderer, scene: tl.Scene, tmp_path: Path
 
 
 def test_a_backdrop_is_refused(renderer: tl.Renderer) -> None:
-    body = tl.Scene([tl.Object(BALL, GREY)], CAMERA)
+    body = tl.Scene([tl.Object(BALL, GRAY)], CAMERA)
     backdrop = tl.Backdrop(np.zeros((72, 96, 3)), np.full((72, 96), np.inf))
     with pytest.raises(tl.InputError, match="a transparent frame; a backdrop is behind it"):
         renderer.render(body, SIZE, backdrop=backdrop, transparent=True)

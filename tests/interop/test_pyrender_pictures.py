@@ -156,7 +156,7 @@ def test_our_depth_of_opaque_objects_is_that_of_pyrender(
     both = seen & np.isfinite(ours)
     found, metres = ours[both], theirs[both]
     # What a step of 24 bits is in metres. pyrender rounds to one, and on the way there and back to float32, of which
-    # a unit in the last place is as much, half a dozen times. Rasterisers move vertices by up to 1/512 pixel.
+    # a unit in the last place is as much, half a dozen times. Rasterizers move vertices by up to 1/512 pixel.
     step = 2.0**-24 * ((far - near) if camera == "orthographic" else metres**2 * (far - near) / (near * far))
     roundings = 4.0 * step + 4.0 * EPS * metres
     if camera == "orthographic":

@@ -22,8 +22,8 @@ from translucent.preview import compiling
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
-from translucent.preview.elsewhere import Companion
 from translucent.preview.stage import Stage
+from translucent.preview.worker import Companion
 from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import showcase
 from translucent.scene.texture import Texture

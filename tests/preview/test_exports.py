@@ -15,7 +15,7 @@ import translucent as tl
 from tests.preview.waiting import wait
 from translucent.files.paths import write_atomically
 from translucent.geometry.solids import Box
-from translucent.preview import elsewhere
+from translucent.preview import worker
 from translucent.preview.document import Document, Model
 from translucent.preview.exports import write_picture, write_turntable
 from translucent.preview.workspace import Workspace
@@ -123,8 +123,8 @@ def hard(report: Callable[[float | None, str], None], path: str) -> None:
 def test_what_a_killed_process_has_left_is_removed(
     work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(elsewhere, "PARTING", 0.3)
-    monkeypatch.setattr(elsewhere._Running, "stop", lambda _: False)
+    monkeypatch.setattr(worker, "PARTING", 0.3)
+    monkeypatch.setattr(worker._Running, "stop", lambda _: False)
     work.export(str(tmp_path / "a.png"), hard)
     task = work.lanes["write"].task
     assert task is not None

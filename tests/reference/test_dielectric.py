@@ -1,4 +1,4 @@
-"""Bent rays against closed forms: slabs, spheres, prisms, furnaces; and what cannot be followed."""
+"""Refracted rays against closed forms: slabs, spheres, prisms, furnaces; and what cannot be followed."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Sphere
 from translucent.media.medium import Medium
-from translucent.reference import bent_light, render
-from translucent.reference.bent import FAINTEST
+from translucent.reference import refracted_light, render
+from translucent.reference.refracted import FAINTEST
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
@@ -38,7 +38,7 @@ def test_a_slab_reflects_between_its_faces_without_end(degrees: float) -> None:
 
 
 def test_what_is_seen_through_a_slab_is_shifted() -> None:
-    """By h (tan i - tan t): a target of that width stands just where the bent ray comes to, not the straight one."""
+    """By h (tan i - tan t): a target of that width is just where the refracted ray ends, not the straight one."""
     angle, inside = math.radians(60), math.asin(math.sin(math.radians(60)) / 1.5)
     shift = math.tan(angle) - math.tan(inside)
     # The straight ray, through the origin, is at x = -1.5 tan(angle) at the target's height.
@@ -198,7 +198,7 @@ def test_all_light_is_accounted_for(name: str, roughness: float) -> None:
     ]  # fmt: skip
     camera = Camera.look_at((0.3, 0.8, 5), (0, 0, 0), fov_y=32)
     scene = Scene(bodies, camera, environment=WHITE, overlap="priority" if name == "bubble" else "add")
-    found, _ = bent_light(scene, (8, 8), bounces=20, paths=4)
+    found, _ = refracted_light(scene, (8, 8), bounces=20, paths=4)
     assert found.valid.all()
     # Of each path, every part ends in the environment or among what is dropped; a few hundred roundings.
     np.testing.assert_allclose(found.radiance + found.residual, 1.0, rtol=0, atol=1e-13)
@@ -240,5 +240,5 @@ def test_light_in_an_open_body_is_invalid() -> None:
     mesh = box((-1, -1, -1), (1, 1, 1))
     bottom = (mesh.vertices[mesh.faces][..., 1] == -1).all(axis=1)
     scene = Scene([Object(Mesh(mesh.vertices, mesh.faces[~bottom]), Medium(ior=1.5))], oblique(0), environment=WHITE)
-    found, _ = bent_light(scene, (1, 1))
+    found, _ = refracted_light(scene, (1, 1))
     assert not found.valid.any()

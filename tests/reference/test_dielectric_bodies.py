@@ -1,4 +1,4 @@
-"""What bent rays are in: walls at one place, priorities, bubbles, an eye in glass, and index one."""
+"""What refracted rays are in: walls at one place, priorities, bubbles, an eye in glass, and index one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tests.reference.dielectrics import BLACK, GLASS, UP_AND_DOWN, WHITE, box, o
 from translucent.frames.frame import Frame
 from translucent.geometry.solids import Sphere
 from translucent.media.medium import Medium
-from translucent.reference import bent_light, render
-from translucent.reference.bent import FAINTEST
+from translucent.reference import refracted_light, render
+from translucent.reference.refracted import FAINTEST
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight
@@ -29,7 +29,7 @@ def test_walls_at_one_place_are_one_interface() -> None:
     a, b = (pixel(Scene(bodies, oblique(50), environment=UP_AND_DOWN)) for bodies in (both, one))
     np.testing.assert_allclose(a, b, rtol=1e-12)
     apart = [Object(slab(0.0, 0.5), Medium(ior=1.5)), Object(slab(-0.5, 0.0), Medium(ior=2.0))]
-    found, _ = bent_light(Scene(apart, oblique(0), environment=WHITE), (1, 1), bounces=2)
+    found, _ = refracted_light(Scene(apart, oblique(0), environment=WHITE), (1, 1), bounces=2)
     r = [reflectance(0, 1.5), reflectance(0, 2 / 1.5)]
     # Two interfaces on the way: first light back from them is r0 and (1 - r0)^2 r1, of which the second needs a third.
     assert found.radiance[0, 0] == pytest.approx(r[0], abs=1e-14)
@@ -74,7 +74,7 @@ def test_an_eye_in_glass_looks_out_through_a_window() -> None:
     for degrees, black in ((0.0, 0.96), (35.0, 1 - reflectance(1.5 * math.sin(math.radians(35)), 1.5)), (50.0, 0.0)):
         direction = np.array([math.sin(math.radians(degrees)), -math.cos(math.radians(degrees)), 0.0])
         camera = Camera.look_at((0, 0.1, 0), (0, 0.1, 0) + direction, (0, 0, 1), fov_y=1e-3)
-        found, _ = bent_light(Scene([body], camera, environment=environment), (1, 1), bounces=30)
+        found, _ = refracted_light(Scene([body], camera, environment=environment), (1, 1), bounces=30)
         assert found.radiance[0, 0] + found.residual[0, 0] == pytest.approx(1 - black, abs=3 * FAINTEST)
 
 
@@ -92,7 +92,7 @@ def picture(bodies: Sequence[Object], refraction: bool | None) -> Frame:
     return render(Scene([*bodies, opaque], camera, lights, environment), (12, 9), None, 1e-4, refraction)
 
 
-def test_straight_rays_are_bent_rays_of_index_one() -> None:
+def test_straight_rays_are_refracted_rays_of_index_one() -> None:
     bodies = [
         Object(box((-1, -1, -1), (1, 1, 1)), SCATTERING),
         Object(Sphere().tessellate(12), Medium(absorption=1.0), np.diag([0.5, 0.5, 0.5, 1.0])),

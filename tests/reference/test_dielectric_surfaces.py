@@ -11,8 +11,8 @@ from tests.reference.dielectrics import UP_AND_DOWN, WHITE, WIDE, Array, box, ob
 from translucent.formulas import interface
 from translucent.geometry.solids import Sphere
 from translucent.media.medium import Medium
-from translucent.reference import bent_light
-from translucent.reference.bent import FAINTEST
+from translucent.reference import refracted_light
+from translucent.reference.refracted import FAINTEST
 from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
@@ -53,7 +53,7 @@ def test_a_sheet_glows_as_its_source_function() -> None:
     wall = Object(box((-WIDE, -1, -WIDE), (WIDE, 0, WIDE)), glow, sheet_thickness=0.01)
     for roughness in (0.0, 0.4):
         body = Object(wall.mesh, glow, sheet_thickness=0.01, surface=Surface(roughness=roughness))
-        found, _ = bent_light(Scene([body], oblique(50), environment=WHITE), (1, 1), bounces=30, paths=50)
+        found, _ = refracted_light(Scene([body], oblique(50), environment=WHITE), (1, 1), bounces=30, paths=50)
         np.testing.assert_allclose(found.radiance + found.residual, 1.0, atol=3 * FAINTEST)
 
 

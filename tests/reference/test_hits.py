@@ -27,8 +27,8 @@ def voxels(filled: npt.NDArray[np.bool_]) -> Mesh:
         u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
         square = np.array([0 * u, u, u + v, v])
         for side in (0, 1):
-            neighbour = np.roll(padded, 1 - 2 * side, axis=axis)
-            corner = np.argwhere(padded & ~neighbour) - 1 + side * np.eye(3)[axis]
+            neighbor = np.roll(padded, 1 - 2 * side, axis=axis)
+            corner = np.argwhere(padded & ~neighbor) - 1 + side * np.eye(3)[axis]
             quads.append(corner[:, None] + (square if side else square[::-1]))
     points, index = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
     quad = index.reshape(-1, 4)
@@ -54,7 +54,7 @@ def signed_sums(hits: Hits, size: tuple[int, int]) -> tuple[npt.NDArray[np.float
 
 
 def lattice_camera(cells: int, size: int) -> Camera:
-    """Looks down on the cells' lattice, with `size` pixels whose centres are 1 / 2 or 1 apart, on its lines."""
+    """Looks down on the cells' lattice, with `size` pixels whose centers are 1 / 2 or 1 apart, on its lines."""
     # An odd number of pixels has one in the middle: the height makes pixels 1/2 apart, from -1/2 to cells + 1/2.
     height = size * (cells + 1) / (size - 1)
     return Camera.orthographic((cells / 2, cells / 2, cells + 5.0), (cells / 2, cells / 2, 0.0), height=height)
@@ -70,7 +70,7 @@ def test_vertices_and_edges_on_pixel_centers(kind: str) -> None:
     }[kind]
     camera = lattice_camera(cells, size)
     xy = camera.rays((size, size))[0][..., :2]
-    assert np.abs(2 * xy - np.rint(2 * xy)).max() < 1e-12, "every pixel centre is on a lattice line or in a middle"
+    assert np.abs(2 * xy - np.rint(2 * xy)).max() < 1e-12, "every pixel center is on a lattice line or in a middle"
     count, thickness = signed_sums(camera_hits(voxels(filled), IDENTITY, camera, (size, size)), (size, size))
     assert not count.any()
     # On a tie the ray moves right and up, so a ray on a vertex belongs to the column of cells there.
@@ -105,7 +105,7 @@ def test_perspective_through_a_sponge_is_balanced(eye: tuple[float, float, float
 
 @pytest.mark.parametrize("distance", [3.0, 1e6])
 def test_rays_at_the_pole_of_a_sphere(distance: float) -> None:
-    mesh = Sphere().tessellate(256)  # needles meet at the pole, in the centre of the picture
+    mesh = Sphere().tessellate(256)  # needles meet at the pole, in the center of the picture
     camera = Camera.look_at((0.0, 0.0, distance), (0.0, 0.0, 0.0), fov_y=1e-4 / distance)
     hits = camera_hits(mesh, IDENTITY, camera, (9, 9))
     count, thickness = signed_sums(hits, (9, 9))

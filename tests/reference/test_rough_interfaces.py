@@ -10,7 +10,7 @@ import pytest
 from tests.reference.dielectrics import BLACK, UP_AND_DOWN, Array, oblique, slab
 from translucent.formulas import interface, optics
 from translucent.media.medium import Medium
-from translucent.reference import bent_light, microfacets
+from translucent.reference import microfacets, refracted_light
 from translucent.reference.microfacets import scattered_at_interface
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
@@ -89,7 +89,9 @@ def test_a_nearly_polished_slab_is_a_polished_one(sheet: float | None) -> None:
 
     def seen(roughness: float) -> tuple[Array, Array]:
         body = Object(slab(-0.5, 0.5), medium, sheet_thickness=sheet, surface=Surface(roughness=roughness))
-        light, error = bent_light(Scene([body], oblique(65), environment=UP_AND_DOWN), (1, 1), bounces=20, paths=20_000)
+        light, error = refracted_light(
+            Scene([body], oblique(65), environment=UP_AND_DOWN), (1, 1), bounces=20, paths=20_000
+        )
         return light.radiance[0], error[0]
 
     (rough, error), (polished, none) = seen(0.03), seen(0.0)
@@ -112,18 +114,18 @@ def test_highlights_of_lights_in_rough_interfaces() -> None:
         * np.asarray(light.irradiance)
         * to_light[1]
     )
-    found, _ = bent_light(scene, (1, 1), paths=2)
+    found, _ = refracted_light(scene, (1, 1), paths=2)
     np.testing.assert_allclose(found.radiance[0], expected, rtol=1e-10)
 
 
 def test_noise_falls_with_the_number_of_paths_and_is_told() -> None:
     body = Object(slab(-0.5, 0.5), Medium(ior=1.5), surface=Surface(roughness=0.4))
     scene = Scene([body], oblique(30), environment=UP_AND_DOWN)
-    (few, rough), (many, fine) = (bent_light(scene, (2, 2), paths=paths) for paths in (100, 2500))
+    (few, rough), (many, fine) = (refracted_light(scene, (2, 2), paths=paths) for paths in (100, 2500))
     assert (rough / fine).mean() == pytest.approx(5.0, rel=0.3)
     spread = np.abs(few.radiance - many.radiance) / rough
     assert 0.1 < np.sqrt((spread**2).mean()) < 2.5
-    again, _ = bent_light(scene, (2, 2), paths=100)
+    again, _ = refracted_light(scene, (2, 2), paths=100)
     np.testing.assert_array_equal(again.radiance, few.radiance)
-    other, _ = bent_light(scene, (2, 2), paths=100, seed=1)
+    other, _ = refracted_light(scene, (2, 2), paths=100, seed=1)
     assert (other.radiance != few.radiance).any()

@@ -43,7 +43,7 @@ def rows(found: Segments) -> list[tuple[float, ...]]:
     return list(zip(*columns, found.count, strict=True))
 
 
-def test_pieces_lie_between_neighbouring_surfaces_of_all_bodies() -> None:
+def test_pieces_lie_between_neighboring_surfaces_of_all_bodies() -> None:
     inside = intervals((0, 1, 4, 0, 1), (0, 2, 6, 1, 2), (0, 7, 8, 0, 1), (2, 0, 1, 1, 1), (2, 1, 3, 0, 1))
     assert rows(scene_segments(scene("add", A, B), inside, crossings())) == [
         (0, 1, 2, 1, 1, 4, 1),

@@ -1,4 +1,4 @@
-"""Colour encodings against the standard's numbers, and every way to write a colour."""
+"""Color encodings against the standard's numbers, and every way to write a color."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EPS = float(np.finfo(np.float64).eps)
         (0.04, 0.04 / 12.92),  # on the straight part
         (0.041, (0.096 / 1.055) ** 2.4),  # just above it
         (0.5, 0.21404114048223255),  # ((0.5 + 0.055) / 1.055)^2.4
-        (188 / 255, 0.50288646),  # the well-known middle grey, 8 digits
+        (188 / 255, 0.50288646),  # the well-known middle gray, 8 digits
         (-0.5, -0.21404114048223255),
     ],
 )

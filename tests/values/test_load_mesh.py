@@ -38,7 +38,7 @@ from translucent.mesh_files import load_mesh
 
 def test_welding_joins_what_is_within_the_tolerance_and_nothing_else() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [1 + 0.9e-6, 0, 0], [1 + 1.7e-6, 0, 0], [1.1, 0, 0]])
-    # The third to the fifth are a chain: neighbours of neighbours are joined.
+    # The third to the fifth are a chain: neighbors of neighbors are joined.
     assert weld(points, 1e-6).tolist() == [0, 1, 0, 1, 1, 5]
 
 

@@ -193,19 +193,19 @@ def test_a_picture_may_be_anywhere_and_is_decoded(tmp_path: Path, stored: str) -
 
 @pytest.mark.parametrize("kind", ["RGB", "L", "LA", "P", "16 bits", "JPEG"])
 def test_pictures_of_all_kinds_are_read(tmp_path: Path, kind: str) -> None:
-    grey = np.array([[0, 51], [102, 255]], dtype=np.uint8)
+    gray = np.array([[0, 51], [102, 255]], dtype=np.uint8)
     if kind == "16 bits":
-        data = png(grey.astype(np.uint16) * 257)
+        data = png(gray.astype(np.uint16) * 257)
     elif kind == "JPEG":
-        data = png(np.kron(grey, np.ones((8, 8), np.uint8)), "JPEG", quality=95)
+        data = png(np.kron(gray, np.ones((8, 8), np.uint8)), "JPEG", quality=95)
     else:
         buffer = io.BytesIO()
-        Image.fromarray(grey).convert(kind).save(buffer, "PNG")
+        Image.fromarray(gray).convert(kind).save(buffer, "PNG")
         data = buffer.getvalue()
     material = {"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}}}
     found = surface(plate(tmp_path, material, data)).roughness_texture
     assert found is not None
-    expected = np.kron(grey, np.ones((8, 8))) if kind == "JPEG" else grey
+    expected = np.kron(gray, np.ones((8, 8))) if kind == "JPEG" else gray
     # A JPEG of flat blocks of 8 x 8 has only their rounded means.
     np.testing.assert_allclose(found.pixels[..., 1] * 255, expected, atol=1.0 if kind == "JPEG" else 1e-4)
 

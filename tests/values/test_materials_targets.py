@@ -81,7 +81,7 @@ class TestMaterialX:
         assert 'name="transmission_color" type="color3" value="0.18, 0.62, 0.35"' in text
         np.testing.assert_allclose(read(text, unit="mm").extinction, JADE.extinction * 10, rtol=1e-12)
 
-    def test_more_scattering_than_extinction_is_shifted_by_grey(self, surface: Any) -> None:
+    def test_more_scattering_than_extinction_is_shifted_by_gray(self, surface: Any) -> None:
         write, read = surface
         text = write(tl.Medium(absorption=1.0), 1.0)
         text = re.sub('(transmission_color" type="color3" value)="[^"]*"', r'\1="1, 0.5, 0.25"', text)

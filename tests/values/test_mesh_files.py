@@ -120,7 +120,7 @@ def test_the_diagnosis_of_a_nasty_file(assets: Path, name: str, expected: dict[s
     [
         ("fandisk_inverted.obj", "turned 1 closed part outwards", 20.244),
         ("sphere_inverted.obj", "turned 1 closed part outwards", 4.047),
-        ("multibody.stl", "turned 6 of 32 faces to agree with their neighbours; turned 2 closed parts outwards", None),
+        ("multibody.stl", "turned 6 of 32 faces to agree with their neighbors; turned 2 closed parts outwards", None),
         ("openscad-nonmanifold-crash.obj", "turned 1 of 1442 faces to agree", 451.96),
         ("spider_binary.stl", "turned 4 of 1368 faces to agree", None),
     ],

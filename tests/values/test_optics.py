@@ -67,7 +67,7 @@ def test_more_depth_never_passes_more_light(a: float, b: float) -> None:
     assert optics.transmittance(high) <= optics.transmittance(low)
 
 
-# Colour at a distance
+# Color at a distance
 
 
 @given(st.floats(1e-30, 1), st.floats(1e-6, 1e6))

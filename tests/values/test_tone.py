@@ -8,12 +8,12 @@ import pytest
 import translucent as tl
 from translucent.formulas.tone import TONES, agx_sigmoid, tone_agx, tone_curve, tone_neutral
 
-GREYS = np.concatenate([[0.0], np.geomspace(1e-30, 1e6, 2000)])[:, None] * np.ones(3)
+GRAYS = np.concatenate([[0.0], np.geomspace(1e-30, 1e6, 2000)])[:, None] * np.ones(3)
 
 
 @pytest.mark.parametrize("name", TONES)
-def test_greys_stay_grey_in_order_and_within_the_display(name: str) -> None:
-    shown = tone_curve(name)(GREYS)
+def test_grays_stay_gray_in_order_and_within_the_display(name: str) -> None:
+    shown = tone_curve(name)(GRAYS)
     np.testing.assert_allclose(shown, shown[:, :1] * np.ones(3), atol=1e-12)
     assert (np.diff(shown[:, 0]) >= -1e-15).all()
     assert shown[0].tolist() == [0.0, 0.0, 0.0]
@@ -56,7 +56,7 @@ def test_neutral_has_no_step_where_it_begins() -> None:
         assert (above - below).max() < 3e-9
 
 
-def test_agx_shows_middle_grey_at_half_and_ends_where_it_should() -> None:
+def test_agx_shows_middle_gray_at_half_and_ends_where_it_should() -> None:
     assert tone_agx(np.full(3, 0.18)) == pytest.approx(np.full(3, 0.5**2.2), rel=1e-9)
     assert agx_sigmoid([0.0, 20 / 33, 1.0]) == pytest.approx([0.0, 0.5, 1.0], abs=1e-12)
     # As published: coefficients 59.507875 below and 69.86278913545539 above, with powers 3 and 13/4.
@@ -68,7 +68,7 @@ def test_agx_shows_middle_grey_at_half_and_ends_where_it_should() -> None:
     step = 1e-6
     slope = np.diff(agx_sigmoid(20 / 33 + np.array([-step, 0, step]))) / step
     assert slope == pytest.approx([2.0, 2.0], rel=1e-4)
-    # 10 stops below middle grey is black, 6.5 above is white.
+    # 10 stops below middle gray is black, 6.5 above is white.
     assert tone_agx(np.full(3, 0.18 / 1024)).max() < 1e-9
     assert tone_agx(np.full(3, 0.18 * 2**6.5)) == pytest.approx(np.ones(3), abs=1e-9)
 

@@ -1,10 +1,10 @@
 """What a thickness map loses: a body as a glTF viewer shades it with the map, beside the body with its true thickness.
 
-A rasterising viewer looks the thickness up where the view ray meets the front of the surface, and takes it for the way
+A rasterizing viewer looks the thickness up where the view ray meets the front of the surface, and takes it for the way
 of the light: t = map(uv of the first hit), whatever the direction of the view, and nothing for the bodies behind. The
 truth is the path inside along the ray. Both pass light by exp(-sigma_t t), straight on.
 
-Source of the lookup: KHR_materials_volume, "Thickness Texture"; as in rasterisers without refraction, since here too
+Source of the lookup: KHR_materials_volume, "Thickness Texture"; as in rasterizers without refraction, since here too
 light goes straight.
 """
 

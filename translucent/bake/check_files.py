@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def check_output(job: Job, record: Record, results: Results) -> Checks:
-    """A check per map that a job has written, quantised as the file is.
+    """A check per map that a job has written, quantized as the file is.
 
     Parameters
     ----------

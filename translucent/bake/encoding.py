@@ -6,9 +6,9 @@ file           asked        stored                   metres = offset + scale * s
 float          metric       t                        t = 0 + 1 * stored
 float          normalize    t / max                  t = 0 + max * stored
 float          invert       1 - t / max              t = max - max * stored
-16-bit grey    metric,      round(65535 t / max)     t = 0 + (max / 65535) * stored
+16-bit gray    metric,      round(65535 t / max)     t = 0 + (max / 65535) * stored
                normalize
-16-bit grey    invert       65535 - the same         t = max - (max / 65535) * stored
+16-bit gray    invert       65535 - the same         t = max - (max / 65535) * stored
 glTF, G        (none)       round(255 t / max)       t = 0 + (max / 255) * stored
 =============  ===========  =======================  =====================================
 

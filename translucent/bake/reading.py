@@ -66,7 +66,7 @@ def _read_png(path: Path) -> _Stored:
     if f"{PNG_PREFIX}scale" not in text:
         raise InputError(asked, "it does not say its scale", "keep the metadata when copying the image")
     if stored.ndim != 2 or stored.max(initial=0) > PNG_LEVELS:
-        raise InputError(asked, "it is not 16-bit grey", "give the file as it was baked")
+        raise InputError(asked, "it is not 16-bit gray", "give the file as it was baked")
     return float(text[f"{PNG_PREFIX}scale"]), float(text[f"{PNG_PREFIX}offset"]), stored
 
 

@@ -6,7 +6,7 @@ file        holds
 .exr        float32: ``Y`` the values, ``standard_error.Y``, ``coverage.Y``; unit, mode, settings in its header
 .npy        float32: the values
 .npz        ``values``, ``standard_error``, ``coverage``, ``scale``, ``offset``
-.png        16-bit grey; scale, offset, unit and mode in its text chunks
+.png        16-bit gray; scale, offset, unit and mode in its text chunks
 .glb        the mesh with its UVs and a volume material, 8 bits in the G channel of the thickness texture
 .ply        of thickness per vertex: the mesh with a float property ``thickness``
 ==========  =========================================================================================

@@ -18,7 +18,7 @@ def write_png(file: Path | BinaryIO, pixels: npt.NDArray[Any], text: Mapping[str
     ----------
     file : Path or binary file
     pixels : (h, w, 3), (h, w, 4) or (h, w) uint8, or (h, w) uint16
-        Color, color with alpha, or grey.
+        Color, color with alpha, or gray.
     text : mapping, optional
         For the text chunks, by keyword.
     """

@@ -44,14 +44,14 @@ def extinction_from_color(color: npt.ArrayLike, distance: npt.ArrayLike) -> Arra
     Parameters
     ----------
     color : array_like
-        Transmitted linear colour, 0 < t_c <= 1; t_c = 1 gives exactly 0.
+        Transmitted linear color, 0 < t_c <= 1; t_c = 1 gives exactly 0.
     distance : array_like
         Distance in metres, > 0.
 
     Notes
     -----
     Conditioning: a relative error e in t_c is an absolute error e / d in sigma_t, that is e / -log(t_c) relative.
-    A colour near white therefore says little about sigma_t.
+    A color near white therefore says little about sigma_t.
     """
     # Adding 0 turns the -0 of a white channel into 0.
     return -np.log(np.asarray(color, dtype=np.float64)) / np.asarray(distance, dtype=np.float64) + 0.0

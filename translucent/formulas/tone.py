@@ -6,7 +6,7 @@ sRGB-encoded afterwards.
 References
 ----------
 Khronos PBR Neutral Tone Mapper, specification 2024 (KhronosGroup/ToneMapping).
-AgX: Sobotka 2022 (sobotka/AgX), base look: a log2 encoding around middle grey and a sigmoid, in a narrowed gamut.
+AgX: Sobotka 2022 (sobotka/AgX), base look: a log2 encoding around middle gray and a sigmoid, in a narrowed gamut.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ NEUTRAL_F90 = 0.04
 NEUTRAL_START = 0.8 - NEUTRAL_F90
 NEUTRAL_DESATURATION = 0.15
 
-#: AgX: stops below and above middle grey that the curve tells apart, and middle grey itself.
+#: AgX: stops below and above middle gray that the curve tells apart, and middle gray itself.
 AGX_STOPS = (-10.0, 6.5)
-AGX_MIDDLE_GREY = 0.18
+AGX_MIDDLE_GRAY = 0.18
 
 #: AgX: share of each channel mixed into every other, which narrows the gamut towards gray.
 AGX_MIX = (0.04240107095046854, 0.07843650156180276, 0.0791624274877287)
@@ -76,7 +76,7 @@ def tone_agx(linear: npt.ArrayLike) -> Array:
     with np.errstate(under="ignore"):
         narrowed = (1.0 - mix.sum()) * color + (color @ mix)[..., None]
         low, high = AGX_STOPS
-        stops = np.log2(np.clip(narrowed / AGX_MIDDLE_GREY, 2.0**low, 2.0**high))
+        stops = np.log2(np.clip(narrowed / AGX_MIDDLE_GRAY, 2.0**low, 2.0**high))
         encoded = agx_sigmoid((stops - low) / (high - low))
         # The inverse of the mix above: the identity and a matrix of equal rows.
         widened = (encoded - (encoded @ mix)[..., None]) / (1.0 - mix.sum())
@@ -84,9 +84,9 @@ def tone_agx(linear: npt.ArrayLike) -> Array:
 
 
 def agx_sigmoid(place: npt.ArrayLike) -> Array:
-    """AgX's curve from 0 at 0 to 1 at 1: middle grey becomes 1/2, and the slope there is 2.
+    """AgX's curve from 0 at 0 to 1 at 1: middle gray becomes 1/2, and the slope there is 2.
 
-    x / (1 + a |x|^p)^(1/p) on either side of middle grey, with the a that makes it end at 0 and at 1.
+    x / (1 + a |x|^p)^(1/p) on either side of middle gray, with the a that makes it end at 0 and at 1.
     """
     pivot = -AGX_STOPS[0] / (AGX_STOPS[1] - AGX_STOPS[0])
     x = np.asarray(place, dtype=np.float64) - pivot

@@ -97,7 +97,7 @@ def false_colors() -> Pixels:
     """(256, 3) sRGB: from dark violet over blue and green to pale yellow.
 
     Lightness of Oklab (Ottosson 2020, "A perceptual color space for image processing") grows linearly, so that larger
-    is brighter, in grey and to the color-blind, too.
+    is brighter, in gray and to the color-blind, too.
     """
     t = np.linspace(0.0, 1.0, 256)
     hue, chroma = np.radians(310.0 - 200.0 * t), 0.10 - 0.06 * t + 0.10 * t * t  # all of them within sRGB

@@ -113,7 +113,7 @@ def compare(
 def interior(hit_counts: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """(h, w) bool: pixels whose 3 x 3 neighborhood has equal hit counts, away from every silhouette.
 
-    At a silhouette a rasteriser decides coverage on a grid of sub-pixels, so it and a ray tracer may disagree there
+    At a silhouette a rasterizer decides coverage on a grid of sub-pixels, so it and a ray tracer may disagree there
     about which surfaces a pixel center sees: a matter of coverage, not of thickness.
     """
     padded = np.pad(hit_counts, 1, mode="edge")

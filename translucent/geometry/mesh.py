@@ -230,7 +230,7 @@ def mended(raw: Mesh) -> Mesh:
     if (merged := len(raw.vertices) - len(kept)) > 0:
         repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
     if flipped:
-        repairs.append(f"turned {flipped} of {len(faces)} faces to agree with their neighbours")
+        repairs.append(f"turned {flipped} of {len(faces)} faces to agree with their neighbors")
     if turned:
         repairs.append(f"turned {turned} closed part{'s' if turned > 1 else ''} outwards")
     if flipped or turned:

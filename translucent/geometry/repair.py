@@ -15,7 +15,7 @@ Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int32]
 
 #: Welding distance as a share of the bounding-box diagonal. Files store float32 at best, whose last bit is 6e-8 of the
-#: coordinate: CAD exports differ by some of these between neighbouring faces.
+#: coordinate: CAD exports differ by some of these between neighboring faces.
 WELD_TOLERANCE = 1e-6
 
 #: Largest welding distance as a share of the median edge.
@@ -30,7 +30,7 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
     vertices : (n, 3) float64
         Finite positions in metres.
     tolerance : float
-        Distance in metres; neighbours of neighbours are joined too.
+        Distance in metres; neighbors of neighbors are joined too.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
     -------
     faces : (m, 3) int32
     flipped : int
-        Faces turned because their neighbours disagreed.
+        Faces turned because their neighbors disagreed.
     turned : int
         Closed parts turned outwards as a whole.
     """

@@ -45,7 +45,7 @@ class Accessors:
             If there is no such accessor, it is of another kind, has no data, or leaves its buffer.
         """
         values, entry = self._elements(index, kind)
-        with np.errstate(invalid="ignore"):  # a signalling NaN: the mesh that it is part of is refused by name
+        with np.errstate(invalid="ignore"):  # a signaling NaN: the mesh that it is part of is refused by name
             found = values.astype(np.float64)
         if entry.get("normalized") is True and values.dtype.kind in "iu":
             found = np.maximum(found / np.iinfo(values.dtype).max, -1.0)

@@ -148,7 +148,7 @@ class Textures:
         except UnreadableError:
             return None
         try:
-            if opened.mode.startswith("I"):  # 16 bits of grey, which `convert` would clip
+            if opened.mode.startswith("I"):  # 16 bits of gray, which `convert` would clip
                 return Image.fromarray((np.asarray(opened) // 257).astype(np.uint8)).convert("RGBA")
             return opened.convert("RGBA")
         except Exception:  # noqa: BLE001 - each of Pillow's decoders raises its own kinds; it is told as left out

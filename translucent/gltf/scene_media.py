@@ -172,7 +172,7 @@ def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
     asked = f"glTF {str(file.path)!r}: its thickness texture"
     try:
         with open_picture(data, asked, ("PNG", "JPEG"), per_pixel=40, do="export the file again") as image:
-            # Pillow reads 16-bit grey as it is, and 16-bit RGB as 8-bit.
+            # Pillow reads 16-bit gray as it is, and 16-bit RGB as 8-bit.
             deep = image.mode.startswith("I")
             levels = np.asarray(image if deep else image.convert("RGB"), dtype=np.float64)
     except InputError:

@@ -125,7 +125,7 @@ def _normal_matrix(placement: Placement) -> Array:
     matrix = np.eye(4)
     # The inverse transpose keeps outwards outwards under a mirror; only an inverted mesh has its normals inside.
     matrix[:3, :3] = np.linalg.inv(body.matrix[:3, :3]).T * (-1.0 if body.mesh.diagnosis.inverted else 1.0)
-    # The scale of a normal is lost when it is normalised; unit scale keeps it within float32.
+    # The scale of a normal is lost when it is normalized; unit scale keeps it within float32.
     matrix[:3, :3] /= np.abs(matrix[:3, :3]).max()
     return matrix
 

@@ -9,7 +9,7 @@ from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.tone import (
     AGX_DISPLAY,
-    AGX_MIDDLE_GREY,
+    AGX_MIDDLE_GRAY,
     AGX_MIX,
     AGX_SHOULDER,
     AGX_SLOPE,
@@ -75,7 +75,7 @@ CONSTANTS: dict[str, str] = {
     "NEUTRAL_DESATURATION": repr(NEUTRAL_DESATURATION),
     "AGX_LOW": repr(AGX_STOPS[0]),
     "AGX_HIGH": repr(AGX_STOPS[1]),
-    "AGX_MIDDLE_GREY": repr(AGX_MIDDLE_GREY),
+    "AGX_MIDDLE_GRAY": repr(AGX_MIDDLE_GRAY),
     "AGX_MIX": f"vec3{AGX_MIX}",
     "AGX_TOE": repr(AGX_TOE),
     "AGX_SHOULDER": repr(AGX_SHOULDER),

@@ -94,10 +94,10 @@ class GpuContext:
 
     @property
     def renderer(self) -> str:
-        """Name of the driver's device; a software rasteriser is named as such."""
+        """Name of the driver's device; a software rasterizer is named as such."""
         name = str(self.info["GL_RENDERER"])
         software = any(word in name.lower() for word in ("llvmpipe", "softpipe", "swrast"))
-        return f"{name} (software rasteriser)" if software else name
+        return f"{name} (software rasterizer)" if software else name
 
     @property
     def provenance(self) -> dict[str, str]:

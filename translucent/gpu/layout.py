@@ -256,7 +256,7 @@ SURFACES = UniformBlock(
         # Metres ahead of the center of place 0, from place 0 to place 1, ahead of the eye of the center, and ahead of
         # the center of the wall that a checkerboard is.
         ("surface_ahead", "f4", (4,)),
-        ("surface_reach", "f4", ()),  # metres as far as which bent rays look for opaque surfaces
+        ("surface_reach", "f4", ()),  # metres as far as which refracted rays look for opaque surfaces
         ("surface_eye_place", "f4", ()),
     ),
 )

@@ -14,7 +14,7 @@ class PassTimer:
         self._gl = gl
         self._queries: dict[str, moderngl.Query] = {}
         self._seconds: dict[str, float] = {}  # of what was drawn in the frame before what the query has measured last
-        # Mesa's software rasteriser measures the first query of a context from the beginning of time.
+        # Mesa's software rasterizer measures the first query of a context from the beginning of time.
         texture = gl.texture((1, 1), 1)
         framebuffer = gl.framebuffer([texture])
         first = gl.query(time=True)

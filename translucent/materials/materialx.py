@@ -4,7 +4,7 @@ Both store a homogeneous medium alike; the modules `openpbr` and `standard_surfa
 
 Formula, with T the transmission color, S the scatter color and lambda the depth:
 mu_t = -ln(T) / lambda, mu_s = S / lambda, mu_a = mu_t - mu_s; where a channel of mu_a is negative, all are raised by
-the same amount (a shift by grey), so that none is. With T = 1 and S = 0 there is no medium, and nothing is divided by
+the same amount (a shift by gray), so that none is. With T = 1 and S = 0 there is no medium, and nothing is divided by
 it. Written the other way round, mu_a is never negative, so what is written is read back as it was. lambda is chosen so
 that no channel of T is darker than 1e-5 and none of S is above 1.
 Source: OpenPBR Surface 1.1, "Translucent base", and its node graph in MaterialX, which computes just this. Autodesk

@@ -237,7 +237,7 @@ class _Window:
         panel(self.desk)
 
     def _style(self) -> None:
-        """Backgrounds are what the window is cleared to: on a software rasteriser they took most of a frame's time."""
+        """Backgrounds are what the window is cleared to: on a software rasterizer they took most of a frame's time."""
         from imgui_bundle import imgui
 
         style = imgui.get_style()

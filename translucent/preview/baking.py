@@ -15,10 +15,10 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals
 from translucent.media.medium import Medium
 from translucent.preview.document import Orbit
-from translucent.preview.elsewhere import in_a_process
 from translucent.preview.numbers import length_text
 from translucent.preview.orbiting import camera_of
 from translucent.preview.tasks import Report, Task
+from translucent.preview.worker import in_a_process
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface

@@ -29,8 +29,8 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.preview.elsewhere import Companion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
+from translucent.preview.worker import Companion
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.scene import Object, Scene

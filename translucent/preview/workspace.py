@@ -19,7 +19,6 @@ from translucent.preview.actions import Action, Adopt, Open, Replace, View
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
 from translucent.preview.document import Document, Model, Orbit
-from translucent.preview.elsewhere import PARTING, Companion, in_a_process
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
@@ -27,6 +26,7 @@ from translucent.preview.measuring import Crossing, Measured, Truth, crossing, m
 from translucent.preview.scenes import Loaded, load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.tasks import Lane, Task, problem
+from translucent.preview.worker import PARTING, Companion, in_a_process
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable
 

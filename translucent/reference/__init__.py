@@ -5,7 +5,7 @@ from translucent.reference.intervals import Intervals
 from translucent.reference.march import march
 from translucent.reference.path_trace import path_trace
 from translucent.reference.rays import Rays, pixel_rays
-from translucent.reference.refraction import bent_light
+from translucent.reference.refraction import refracted_light
 from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
 
@@ -14,7 +14,6 @@ __all__ = [
     "Hits",
     "Intervals",
     "Rays",
-    "bent_light",
     "camera_hits",
     "hit_counts",
     "line_hits",
@@ -22,6 +21,7 @@ __all__ = [
     "opaque_counts",
     "path_trace",
     "pixel_rays",
+    "refracted_light",
     "render",
     "shade_hits",
     "sheet_thicknesses",

@@ -1,4 +1,4 @@
-"""Where light is bent or reflected: the first interface on each ray at which what it is in changes.
+"""Where light is refracted or reflected: the first interface on each ray at which what it is in changes.
 
 Of several bodies at one place, the one of the highest priority decides what light is in; of equal ones, the one that
 the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries a record of

@@ -1,4 +1,4 @@
-"""Straight parts of rays that bend."""
+"""Ray segments: the straight parts of refracted rays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from translucent.reference.rays import Rays
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """Straight parts of bent rays.
+    """Straight parts of refracted rays.
 
     Attributes
     ----------

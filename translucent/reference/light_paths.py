@@ -76,7 +76,7 @@ class LightPaths:
             return Arrival(travel, irradiance * transmittance, sound)
 
     def transmittance(self, points: Array, travel: Array, distance: Array) -> tuple[Array, Mask]:
-        """What is left of light (k, 3) that has travelled in directions (k, 3) over distances (k,) to points (k, 3).
+        """What is left of light (k, 3) that has traveled in directions (k, 3) over distances (k,) to points (k, 3).
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Pictures along bent rays: all pixels of `BentRays`, and where interfaces are rough, many rays for each."""
+"""Pictures along refracted rays: all pixels of `RefractedRays`, and where interfaces are rough, many rays for each."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.planning.methods import Method
-from translucent.reference.bent import BentLight, BentRays
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays, pixel_rays
+from translucent.reference.refracted import RefractedLight, RefractedRays
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.volume import Volume
 from translucent.scene.scene import Scene
@@ -29,7 +29,7 @@ def bends(scene: Scene) -> bool:
     return any(body.has_interface for body in scene.bodies)
 
 
-def bent_light(
+def refracted_light(
     scene: Scene,
     size: tuple[int, int],
     method: Method | None = None,
@@ -37,8 +37,8 @@ def bent_light(
     bounces: int = BOUNCES,
     paths: int = PATHS,
     seed: int = 0,
-) -> tuple[BentLight, Array]:
-    """What the pixels of a picture see along bent rays, row by row from the top left.
+) -> tuple[RefractedLight, Array]:
+    """What the pixels of a picture see along refracted rays, row by row from the top left.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def bent_light(
 
     Returns
     -------
-    light : BentLight
+    light : RefractedLight
     standard_error : (n, 3) float64
         Of the radiance; 0 if all interfaces are polished.
 
@@ -72,24 +72,24 @@ def bent_light(
     light_paths = LightPaths(scene, sheets) if scene.lights and Volume(scene).scatters else None
     rough = any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
     rng = np.random.default_rng(seed) if rough else None
-    bent = BentRays(scene, sheets, size[0] / size[1], bounces, light_paths, tolerance, rng)
-    return _mean(bent, rays, paths) if rough else (bent.see(rays), np.zeros((len(rays), 3)))
+    refracted = RefractedRays(scene, sheets, size[0] / size[1], bounces, light_paths, tolerance, rng)
+    return _mean(refracted, rays, paths) if rough else (refracted.see(rays), np.zeros((len(rays), 3)))
 
 
-def _mean(bent: BentRays, rays: Rays, paths: int) -> tuple[BentLight, Array]:
+def _mean(refracted: RefractedRays, rays: Rays, paths: int) -> tuple[RefractedLight, Array]:
     """Mean over several rays for each of `rays`, and its standard error."""
     each = max(BATCH // paths, 1)
     parts, spreads = [], []
     for begin in range(0, len(rays), each):
         some = np.arange(begin, min(begin + each, len(rays)))
-        found = bent.see(rays.where(np.repeat(some, paths)))
+        found = refracted.see(rays.where(np.repeat(some, paths)))
         radiance, residual = (array.reshape(len(some), paths, 3) for array in (found.radiance, found.residual))
         valid = found.valid.reshape(len(some), paths).all(axis=1)
         parts.append((radiance.mean(axis=1), residual.mean(axis=1), valid))
         with np.errstate(under="ignore"):
             spreads.append(radiance.std(axis=1, ddof=1))
     columns = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return BentLight(*columns), np.concatenate(spreads) / np.sqrt(paths)
+    return RefractedLight(*columns), np.concatenate(spreads) / np.sqrt(paths)
 
 
 def _check(scene: Scene, bounces: int, paths: int) -> None:

@@ -24,7 +24,7 @@ from translucent.reference.intervals import scene_intervals
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
 from translucent.reference.rays import Rays, pixel_rays
-from translucent.reference.refraction import BOUNCES, PATHS, bends, bent_light
+from translucent.reference.refraction import BOUNCES, PATHS, bends, refracted_light
 from translucent.reference.scattering import scattered_once
 from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
@@ -60,8 +60,8 @@ def render(
     Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
 
     Where light changes at the interfaces of bodies (`Object.has_interface`), radiance is that of rays that bend and
-    split there; see `translucent.reference.bent`. All else is that of the straight rays, also then. Lights reach media
-    straight on. Of `Surface`, multiple scattering is left to `path_trace`, and bodies do not glow. Layers
+    split there; see `translucent.reference.refracted`. All else is that of the straight rays, also then. Lights reach
+    media straight on. Of `Surface`, multiple scattering is left to `path_trace`, and bodies do not glow. Layers
     (`Surface.opacity`) have their place in the order, and what they show is matt.
 
     Parameters
@@ -77,7 +77,7 @@ def render(
     refraction : bool, optional
         Whether rays bend. Default: if some object has an interface.
     bounces : int
-        Interfaces that a bent ray may meet.
+        Interfaces that a refracted ray may meet.
     paths : int
         Rays of each pixel if an interface is rough; the error falls with their square root.
     seed : int
@@ -89,8 +89,8 @@ def render(
         Of float64 arrays; `shade_hits` tells what is valid. Also invalid is a pixel whose scattered light misses the
         tolerance, since its ray meets a point light inside a medium, or comes through the hole of a body. With
         scattered light, ``provenance["scattering error"]`` is the largest estimated error of a valid pixel, relative to
-        its brightest channel. With bent rays, ``provenance["residual"]`` is the largest share of a valid pixel's light
-        that was not followed to its end, and ``provenance["standard error"]`` the largest one of a valid pixel.
+        its brightest channel. With refracted rays, ``provenance["residual"]`` is the largest share of a valid pixel's
+        light that was not followed to its end, and ``provenance["standard error"]`` the largest one of a valid pixel.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def render(
         error = arrays.pop("error")[arrays["valid"]]
         provenance["scattering error"] = f"{error.max(initial=0.0):.1e}"
     if bent:
-        light, noise = bent_light(scene, size, method, tolerance, bounces, paths, seed)
+        light, noise = refracted_light(scene, size, method, tolerance, bounces, paths, seed)
         arrays["radiance"], arrays["valid"] = light.radiance, arrays["valid"] & light.valid
         for name, array in (("residual", light.residual), ("standard error", noise)):
             provenance[name] = f"{array[arrays['valid']].max(initial=0.0):.1e}"

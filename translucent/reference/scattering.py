@@ -16,10 +16,10 @@ from translucent.media.medium import MAX_COEFFICIENT
 from translucent.reference.adaptive import integrate
 from translucent.reference.compositing import _layers
 from translucent.reference.equiangular import equiangular
-from translucent.reference.kinks import kinks, outline_edges
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
+from translucent.reference.shadow_edges import outline_edges, shadow_edges
 from translucent.reference.volume import places
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
@@ -93,7 +93,7 @@ def _rounding(paths: LightPaths, rays: Rays, segments: Segments) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """Parts of segments between kinks of the light's way: flat arrays.
+    """Parts of segments between shadow edges: flat arrays.
 
     Attributes
     ----------
@@ -201,11 +201,11 @@ def depths_before(segments: Segments, pixels: int) -> Array:
 
 
 def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _Spans:
-    """Some segments, cut where the way of a light has kinks."""
+    """Some segments, cut at the shadow edges of a light."""
     seen = np.unique(segments.pixel[chosen])
     light = paths.lights[number]
     edges = np.concatenate([outline_edges(traced, light) for traced in paths.tracer.objects])
-    ray, t = kinks(rays.where(seen), edges, light)
+    ray, t = shadow_edges(rays.where(seen), edges, light)
     # In the order along each ray, a cut belongs to the segment that began last, if it has not ended.
     pixel = np.concatenate([segments.pixel[chosen], seen[ray]])
     t = np.concatenate([segments.t_enter[chosen], t])

@@ -15,7 +15,7 @@ from translucent.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Pieces of rays between neighbouring surfaces: flat arrays, in order along each ray, without overlap.
+    """Pieces of rays between neighboring surfaces: flat arrays, in order along each ray, without overlap.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ from translucent.suggestions import close_names, did_you_mean
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
-#: The default environment: white above and light grey below.
+#: The default environment: white above and light gray below.
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
 
 #: Names of environments for `named_environment`, besides colors and pictures.
@@ -53,7 +53,7 @@ def showcase(
     camera : Camera, optional
         Default: from the front right and above, the whole mesh in view.
     environment : Environment, optional
-        Default: a light table, white above and light grey below. Lights show best before a dark one.
+        Default: a light table, white above and light gray below. Lights show best before a dark one.
     lights : sequence of PointLight or DirectionalLight
         What shines into the medium, if it scatters.
     """

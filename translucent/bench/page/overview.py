@@ -35,7 +35,7 @@ def overview_svg(report: Report) -> str:
     wanted = [case for case in cases if case.closed and case.absorption_only and not case.convex]
     case = (wanted or cases)[0]
     names = {row.method: row.method for row in case.rows}
-    device = "software rasteriser" if report.provenance.software else report.provenance.renderer
+    device = "software rasterizer" if report.provenance.software else report.provenance.renderer
     title = f"{case.title}, {case.size[0]} × {case.size[1]}, {device}"
     return standalone(pareto_svg(case, names, "overview", (900, 520), title))
 

@@ -27,7 +27,7 @@ def viewport_panel(desk: Desk) -> None:
     pixels = max(int(room.x * scale.x), 8), max(int(room.y * scale.y), 8)
     desk.more = desk.draw(pixels)
     if imgui.is_window_docked():
-        # Behind all panels, of which this one is transparent: on a software rasteriser imgui takes long for pictures.
+        # Behind all panels, of which this one is transparent: on a software rasterizer imgui takes long for pictures.
         bottom = imgui.get_io().display_size.y - corner.y - room.y
         desk.stage.place((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
     else:

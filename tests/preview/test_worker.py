@@ -14,9 +14,9 @@ import pytest
 import translucent as tl
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
-from translucent.preview import elsewhere
-from translucent.preview.elsewhere import Companion, in_a_process
+from translucent.preview import worker
 from translucent.preview.tasks import CancelledError, Report, Task
+from translucent.preview.worker import Companion, in_a_process
 
 _seen: list[Mesh] = []
 
@@ -86,7 +86,7 @@ def cancelling(task: Task) -> Callable[..., None]:
 
 
 def test_a_process_that_nobody_waits_for_ends(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(elsewhere, "PARTING", 0.2)
+    monkeypatch.setattr(worker, "PARTING", 0.2)
     monkeypatch.setattr(task, "report", cancelling(task))
     with pytest.raises(CancelledError):
         in_a_process(task, slow)

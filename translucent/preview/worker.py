@@ -1,4 +1,4 @@
-"""Work in a process of its own: libraries that hold the interpreter's lock for seconds would stop the window."""
+"""Work in a worker process: libraries that hold the interpreter's lock for seconds would stop the window."""
 
 from __future__ import annotations
 

@@ -45,8 +45,8 @@ ACROSS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class BentLight:
-    """What bent rays see.
+class RefractedLight:
+    """What refracted rays see.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class BentLight:
     valid: Mask
 
 
-class BentRays:
+class RefractedRays:
     """Rays of the scene's camera that bend at interfaces.
 
     Parameters
@@ -97,9 +97,9 @@ class BentRays:
         dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
         self.channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
 
-    def see(self, rays: Rays) -> BentLight:
+    def see(self, rays: Rays) -> RefractedLight:
         """What rays of the camera see."""
-        found = BentLight(np.zeros((len(rays), 3)), np.zeros((len(rays), 3)), np.ones(len(rays), dtype=bool))
+        found = RefractedLight(np.zeros((len(rays), 3)), np.zeros((len(rays), 3)), np.ones(len(rays), dtype=bool))
         for channel, own in enumerate(self.channels):
             carried = np.eye(3)[channel] if len(self.channels) > 1 else np.ones(3)
             for begin in range(0, len(rays), BATCH):
@@ -126,21 +126,21 @@ class BentRays:
 class _Tree:
     """Follows rays from interface to interface, for light of which all has the same indices of refraction."""
 
-    def __init__(self, bent: BentRays, own: Optics, found: BentLight) -> None:
-        self.bent, self.own, self.found, self.scene = bent, own, found, bent.scene
+    def __init__(self, refracted: RefractedRays, own: Optics, found: RefractedLight) -> None:
+        self.refracted, self.own, self.found, self.scene = refracted, own, found, refracted.scene
 
     def grow(self, rays: Rays, owner: Integers, carried: Array) -> None:
         """Follow rays of the camera to all ends of theirs; each starts with the light `carried` (3,)."""
         everywhere = np.full(len(rays), np.inf)
-        behind = self.bent.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, np.zeros(len(rays))))
+        behind = self.refracted.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, np.zeros(len(rays))))
         never = np.zeros(len(rays), dtype=bool)
         inside = self.own.at_origins(behind, len(rays))
         legs = Legs(rays, owner, np.tile(carried, (len(rays), 1)), inside, never, never)
-        for level in range(self.bent.bounces + 1):
+        for level in range(self.refracted.bounces + 1):
             legs, interfaces = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
             if not len(legs):
                 return
-            outcome = Meetings(self.own, legs, interfaces, self.bent.rng).outcome()
+            outcome = Meetings(self.own, legs, interfaces, self.refracted.rng).outcome()
             self._add(legs, outcome.radiance)
             legs = joined(outcome.branches)
             lost = np.asarray((legs.throughput < FAINTEST).all(axis=1) | ~legs.rays.directions.any(axis=1))
@@ -159,7 +159,7 @@ class _Tree:
         """Add what legs see on their way and at its end. Those that end at interfaces instead, there, and these."""
         rays = legs.rays
         reach = np.full(len(legs), start), np.full(len(legs), np.inf)
-        hits = self.bent.tracer.hits(Lines(rays.origins, rays.directions, *reach))
+        hits = self.refracted.tracer.hits(Lines(rays.origins, rays.directions, *reach))
         wall = nearest_opaque(self.scene, hits, len(legs))
         interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], legs.inside)
         legs = self._through_media(legs, hits, interfaces.distance, wall.distance)
@@ -173,7 +173,7 @@ class _Tree:
 
     def _through_media(self, legs: Legs, hits: Sequence[Hits], interface: Array, wall: Array) -> Legs:
         """Legs with what media leave of them where they end; adds what these emit and scatter."""
-        scene, volume, rays = self.scene, self.bent.volume, legs.rays
+        scene, volume, rays = self.scene, self.refracted.volume, legs.rays
         end = np.minimum(interface, wall)
         none = np.empty(0, np.int64)
         parts = [Intervals(none, np.empty(0), np.empty(0), none, none)]
@@ -181,15 +181,15 @@ class _Tree:
             origin, ahead = legs.inside.windings[:, i].astype(np.int64), hits[i].before(end)
             parts.append(body_intervals(ahead, origin, end, i))
             self.found.valid[legs.owner[unbalanced(ahead, origin, end)]] = False
-        sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.bent.sheets)]
+        sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.refracted.sheets)]
         # A sheet that lies on an interface is met on one side of it only.
         until = np.where(interface < wall, interface - SHEET_ON_OPAQUE * scene.diagonal, wall)
         crossings = scene_crossings(scene, rays, hits, sheets, until)
         segments, filling = volume_segments(scene, volume, rays, merge(parts), crossings)
         segments = emission_of_mixtures(volume, rays, segments, filling)
         emitted, depth = composite(segments, len(legs))
-        if self.bent.paths is not None:
-            light = scattered_once(self.bent.paths, rays, segments, filling, self.bent.tolerance)
+        if self.refracted.paths is not None:
+            light = scattered_once(self.refracted.paths, rays, segments, filling, self.refracted.tolerance)
             emitted = emitted + light.radiance
             self.found.valid[legs.owner[~light.valid]] = False
         self._add(legs, emitted)
@@ -207,7 +207,7 @@ class _Tree:
     def _environment(self, legs: Legs) -> Array:
         """(k, 3): what legs see that nothing stops: in reflections what lights the scene, else its background."""
         environment, rays = self.scene.environment, legs.rays
-        place, ahead = self.bent.on_backdrop(rays)
+        place, ahead = self.refracted.on_backdrop(rays)
         seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], place, rays.backdrop))
         if environment.seen.kind == "checkerboard":
             seen[legs.bent & ~ahead] = environment.seen.mean

@@ -36,19 +36,19 @@ def outline_edges(traced: TracedObject, light: Light) -> Array:
     return np.stack([corners.reshape(-1, 3)[chosen], np.roll(corners, -1, axis=1).reshape(-1, 3)[chosen]], axis=1)
 
 
-def kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
+def shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
     """Numbers of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
     found = [(np.empty(0, np.int64), np.empty(0))]
     each = max(PAIRS // max(len(edges), 1), 1)
     for begin in range(0, len(rays), each):
-        ray, t = _kinks(rays.where(slice(begin, begin + each)), edges, light)
+        ray, t = _shadow_edges(rays.where(slice(begin, begin + each)), edges, light)
         found.append((ray + begin, t))
     return np.concatenate([ray for ray, _ in found]), np.concatenate([t for _, t in found])
 
 
 @np.errstate(all="ignore")
-def _kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
-    """`kinks` of few rays. Where nothing is finite, the ray and the light make no plane: there is no such place."""
+def _shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
+    """`shadow_edges` of few rays. Where nothing is finite, the ray and the light make no plane: there is none."""
     if isinstance(light, DirectionalLight):
         way = np.broadcast_to(np.asarray(light.direction), rays.directions.shape)
     else:
