@@ -1,4 +1,4 @@
-"""Where the light that reaches a view ray changes its way: at the outlines of bodies as the light sees them.
+"""Shadow edges on view rays: kinks of the incoming light at the outlines of bodies as seen from the light.
 
 There its path through a body begins to exist, or a shadow begins. Rules of quadrature take such a place for smooth
 unless an interval ends there, and miss what is between two of them.
@@ -15,7 +15,7 @@ from translucent.reference.tracer import TracedObject
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light
 
-#: Pairs of an edge and a ray that are looked at together: the working arrays stay below 100 MB.
+#: Number of pairs of an edge and a ray that are tested together: the working arrays stay below 100 MB.
 PAIRS = 1 << 18
 
 
@@ -37,7 +37,7 @@ def outline_edges(traced: TracedObject, light: Light) -> Array:
 
 
 def kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
-    """Numbers of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
+    """Indices of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
     found = [(np.empty(0, np.int64), np.empty(0))]
     each = max(PAIRS // max(len(edges), 1), 1)
     for begin in range(0, len(rays), each):
@@ -48,7 +48,9 @@ def kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
 
 @np.errstate(all="ignore")
 def _kinks(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
-    """`kinks` of few rays. Where nothing is finite, the ray and the light make no plane: there is no such place."""
+    """Kinks of a batch of rays. Where nothing is finite, the ray and the light make no plane: there is no such
+    place.
+    """
     if isinstance(light, DirectionalLight):
         way = np.broadcast_to(np.asarray(light.direction), rays.directions.shape)
     else:
