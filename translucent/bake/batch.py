@@ -1,6 +1,4 @@
-"""Batch baking: each asset is a job of its own, in any executor; finished jobs are skipped, and failures stop no
-others.
-"""
+"""Batch baking: each asset is a job of its own, in any executor; finished jobs are skipped, failures isolated."""
 
 from __future__ import annotations
 

@@ -103,9 +103,7 @@ def _do(task: Callable[[Item], Result], item: Item) -> Result:
 
 
 def _begin() -> None:
-    """Set up a worker process: the parent handles Ctrl-C, and ends the worker so that its temporary files are
-    removed.
-    """
+    """Set up a worker process: the parent handles Ctrl-C, and ends the worker so that its files are removed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_follow_parent, daemon=True).start()

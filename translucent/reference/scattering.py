@@ -24,8 +24,8 @@ from translucent.reference.volume import places
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
 
-#: Largest number of cuts near the start of segments: a rule of 15 points then resolves the thin visible layer of a dense
-#: one.
+#: Largest number of cuts near the start of segments: a rule of 15 points then resolves the thin visible layer of a
+#: dense one.
 MOST_CUTS = 60
 
 
