@@ -12,7 +12,7 @@ from translucent.scene.scene import Object, Scene
 #: Light that a sum of one event each does not have; rows say so by their effect.
 _LIT = (NoteKind.SCATTERED_AGAIN,)
 
-#: What changes pictures, and leaves the thickness along straight rays as it is.
+#: Effects that change pictures, but not the thickness along straight rays.
 _BESIDE_THICKNESS = (
     *_LIT,
     NoteKind.LIGHTS_LEFT_OUT,

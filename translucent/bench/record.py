@@ -10,7 +10,7 @@ from typing import Literal
 from translucent.bench.codec import Packed, decode, encode
 from translucent.bench.row import Quantity, Ratio, Row, Timing
 
-#: What a file of ours says that it is, and the version of the fields below. A change of meaning raises the version.
+#: Format name of a report's file, and the version of the fields below. A change of meaning raises the version.
 FORMAT, VERSION = "translucent report", 1
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Below these shares of light, passed straight or scattered back, a picture shows little but black.
 NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
 
-#: Of light that passes, what makes a picture that shows its medium.
+#: Range of the share of light that passes in a picture that shows its medium.
 SHOWS_MEDIUM = (0.05, 0.97)
 
 #: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.

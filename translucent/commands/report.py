@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from translucent.bench.record import CaseRecord, Report
     from translucent.media.medium import Medium
 
-#: How the names of the cases begin that users bring.
+#: Prefix of the names of cases from users' models.
 MODEL_CASE = "model "
 
 PATH = click.Path(path_type=Path)
@@ -211,7 +211,7 @@ def _answer(case: CaseRecord) -> dict[str, Any]:
 
 
 def _tell_seen(answer: dict[str, Any]) -> None:
-    """What an artist's eye would make of the difference, in the model's own medium."""
+    """Print whether the difference is visible, in the model's own medium."""
     if answer["seen"]:
         echo(f"  with it, {answer['seen']}")
     if answer["cheaper_seen"]:
