@@ -81,7 +81,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
 
-#: Where each public name is. It is imported when it is first asked for: SciPy and OpenGL take their time.
+#: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
     "bake.bake": "bake_thickness",
     "bake.baked": "BakeReport",

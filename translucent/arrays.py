@@ -8,7 +8,7 @@ import numpy.typing as npt
 #: Quantities and geometry.
 Array = npt.NDArray[np.float64]
 
-#: What goes to the GPU or comes from it, and what files hold.
+#: Data to and from the GPU, and of files.
 Floats = npt.NDArray[np.float32]
 
 #: Indices and counts.
@@ -16,5 +16,5 @@ Integers = npt.NDArray[np.int64]
 
 Mask = npt.NDArray[np.bool_]
 
-#: Of pictures, 8 bits for each channel.
+#: Pictures with 8 bits for each channel.
 Pixels = npt.NDArray[np.uint8]

@@ -1,1 +1,1 @@
-"""Thickness maps: how thick a mesh is under each texel, or each vertex, in metres."""
+"""Baking of thickness maps: thickness of a mesh under each texel or vertex, in metres."""

@@ -42,7 +42,7 @@ def bake_thickness(
     checkpoint: Path | None = None,
     **given: Any,
 ) -> ThicknessMap:
-    """Bake how thick a mesh is under each texel of its texture coordinates.
+    """Bake the thickness of a mesh under each texel of its texture coordinates.
 
     Each texel shows the point of the mesh at its center, or the nearest point of a triangle that touches it. Rays go
     from there into the mesh, around the inward smooth normal; the mode of
@@ -109,7 +109,7 @@ def bake_thickness(
 
 
 def check_threads(threads: Any) -> int:
-    """How many threads to use; raises `InputError` for less than one."""
+    """Number of threads to use; raises `InputError` for less than one."""
     if threads is None:
         return processors()
     if not (hasattr(threads, "__index__") and threads >= 1):
@@ -118,7 +118,7 @@ def check_threads(threads: Any) -> int:
 
 
 def escape_warnings(escaped: float, closed: bool) -> list[str]:
-    """What to say of rays that found no exit."""
+    """Warnings about rays that found no exit."""
     if escaped == 0:
         return []
     reason = "the mesh has holes" if not closed else "faces are missing or look the wrong way"

@@ -1,4 +1,4 @@
-"""A bake job done: a model read, baked and written, with the record beside it."""
+"""Bake jobs on files: a model is read, baked and written, with the record beside it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from translucent.mesh_files import load_mesh
 
 
 def bake_file(job: Job, progress: Progress | None = None) -> tuple[Record, Results]:
-    """Bake what a job asks for and write it.
+    """Run a bake job and write its files.
 
     Parameters
     ----------

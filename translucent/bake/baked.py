@@ -1,4 +1,4 @@
-"""The numbers of a bake: a map or a value per vertex, how sure it is, and what was found on the way."""
+"""Results of a bake: a map or a value per vertex, its standard error, and a report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from translucent.geometry.mesh import Mesh
 
 @dataclass(frozen=True)
 class BakeReport:
-    """What a bake did and found.
+    """Report of a bake.
 
     Attributes
     ----------
@@ -63,13 +63,13 @@ class BakeReport:
     warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
-        """The report in values that JSON can hold."""
+        """Report as values that JSON can hold."""
         return {**asdict(self), "udim_tiles": list(self.udim_tiles), "warnings": list(self.warnings)}
 
 
 @dataclass(frozen=True, eq=False)
 class BakedMap:
-    """What a `ThicknessMap` holds, for those that write it."""
+    """Data of a `ThicknessMap`, for writers."""
 
     values: Floats
     coverage: Mask
@@ -82,7 +82,7 @@ class BakedMap:
 
 @dataclass(frozen=True, eq=False)
 class BakedVertices:
-    """What a `VertexThickness` holds, for those that write it."""
+    """Data of a `VertexThickness`, for writers."""
 
     values: Floats
     standard_error: Floats

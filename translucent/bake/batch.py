@@ -1,4 +1,4 @@
-"""Many assets: each a job of its own, in any executor; what is done is skipped, and what fails stops nothing else."""
+"""Batch baking: each asset is a job of its own, in any executor; finished jobs are skipped, failures isolated."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from translucent.version import VERSION
 
 Status = Literal["baked", "suspect", "skipped", "failed"]
 
-#: Share of rays without an exit above which a map is suspect.
+#: Largest share of rays without an exit in a map that is not suspect.
 MAX_ESCAPED = 0.05
 
 
 @dataclass(frozen=True)
 class BatchReport:
-    """What became of the jobs of a batch.
+    """Report on the jobs of a batch.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class BatchReport:
     seconds: float
 
     def count(self, status: Status) -> int:
-        """How many have this status."""
+        """Number of jobs with this status."""
         return sum(asset["status"] == status for asset in self.assets)
 
     def summary(self) -> Record:
-        """The report in values that JSON can hold."""
+        """Report as values that JSON can hold."""
         counts = {status: self.count(status) for status in get_args(Status)}
         return {**counts, "seconds": self.seconds, "assets": list(self.assets)}
 
@@ -55,13 +55,13 @@ class BatchReport:
 
     @property
     def total(self) -> str:
-        """How many have which status, in one line."""
+        """Counts of each status, in one line."""
         counts = ", ".join(f"{self.count(status)} {status}" for status in get_args(Status))
         return f"{counts} in {self.seconds:.1f} s"
 
 
 def asset_line(asset: Record, width: int = 0) -> str:
-    """What became of one asset, its name `width` characters wide."""
+    """Status line of one asset, with its name `width` characters wide."""
     told = f"{Path(asset['model']).name:<{width}}  {asset['status']:<7}  {asset['seconds']:>7.1f} s"
     if asset["status"] == "failed":
         return f"{told}  {asset['error']}"
@@ -158,7 +158,7 @@ def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
 
 
 def failed_entry(job: Job, error: str) -> Record:
-    """The entry of a job that nobody could begin."""
+    """Entry of a job that could not be started."""
     return _entry(job, "failed", 0.0, error=error)
 
 
@@ -167,7 +167,7 @@ def _lost(job: Job) -> Record:
 
 
 def run_job(job: Job, version: str | None = None) -> Record:
-    """Do one job of a batch; what goes wrong is in the entry that it returns.
+    """Run one job of a batch; errors are in the entry that it returns.
 
     A `version` is that of who asks: on another machine there may be another one, whose maps are not the same.
     """
@@ -196,7 +196,7 @@ def _judged(job: Job, status: Status, seconds: float, doubts: list[str], **more:
 
 
 def _doubts(job: Job, record: Record) -> list[str]:
-    """Why the maps of a record are suspect."""
+    """Reasons why the maps of a record are suspect."""
     most, found = job.get("max_escaped", MAX_ESCAPED), []
     for part in parts_of(record):
         name = f"{part['mesh']['name']}: " if "maps" in record else ""
@@ -213,7 +213,7 @@ def _entry(job: Job, status: Status, seconds: float, error: str | None = None, *
 
 
 def told_of(record: Record, results: Any, folder: Path) -> Record:
-    """Files, range, unit, rays and warnings of a bake, of all its parts together."""
+    """Summary of a bake: files, range, unit, rays and warnings of all its parts together."""
     parts, files = parts_of(record), files_of(record)
     ranges = [part["range"] for part in parts if part["range"] is not None]
     warnings = [line for part in parts for line in (*part["report"]["warnings"], *part.get("warnings", []))]

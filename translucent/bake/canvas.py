@@ -1,4 +1,4 @@
-"""The map while it is made, and the file that keeps it if the bake is interrupted."""
+"""Canvas of a map in progress, and its checkpoint file in case the bake is interrupted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EVERY, REST = 5.0, 20.0
 
 @dataclass(eq=False)
 class Canvas:
-    """Strips put together.
+    """Canvas of a map: strips put together.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ class Canvas:
         self.done[number] = True
 
     def count(self, name: str) -> int:
-        """One of `COUNTS`."""
+        """Value of one of `COUNTS`."""
         return int(self.counts[COUNTS.index(name)])
 
 
 class Checkpoint:
-    """A file with the finished strips of a bake.
+    """Checkpoint file with the finished strips of a bake.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Checkpoint:
         self._next = time.monotonic() + EVERY
 
     def read(self, canvas: Canvas) -> None:
-        """Fill `canvas` with what the file holds, if there is one.
+        """Fill `canvas` from the file, if there is one.
 
         Raises
         ------
@@ -104,12 +104,12 @@ class Checkpoint:
             setattr(canvas, name, array)
 
     def keep(self, canvas: Canvas) -> None:
-        """Write `canvas` if the last time was long enough ago."""
+        """Write `canvas` if the last write was long enough ago."""
         if time.monotonic() >= self._next:
             self.write(canvas)
 
     def write(self, canvas: Canvas) -> None:
-        """Write `canvas`, wholly or not at all; raises `RenderError` if that fails."""
+        """Write `canvas` atomically; raises `RenderError` if that fails."""
         started = time.monotonic()
         arrays = {name: getattr(canvas, name) for name in self._ARRAYS}
 
@@ -127,7 +127,7 @@ class Checkpoint:
 
 
 def bake_key(settings: BakeSettings, *meshes: Mesh | None) -> str:
-    """A hash of all that decides the result of a bake."""
+    """Hash of everything that determines the result of a bake."""
     digest = hashlib.sha256(f"{VERSION} {sorted(settings.summary().items())}".encode())
     for mesh in meshes:
         for array in () if mesh is None else (mesh.vertices, mesh.faces, mesh.uv):

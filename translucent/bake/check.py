@@ -1,4 +1,4 @@
-"""What a thickness map loses: a body as a glTF viewer shades it with the map, beside the body with its true thickness.
+"""Check of a thickness map: a body shaded with the map, as in a glTF viewer, and with its true thickness.
 
 A rasterizing viewer looks the thickness up where the view ray meets the front of the surface, and takes it for the way
 of the light: t = map(uv of the first hit), whatever the direction of the view, and nothing for the bodies behind. The
@@ -31,17 +31,17 @@ from translucent.planning.plan import plan
 from translucent.scene.camera import Camera
 from translucent.scene.showcase import showcase
 
-#: What is this close, as a share of the diagonal, is one surface.
+#: Distance within which surfaces coincide, as a share of the diagonal.
 SAME_PLACE = 1e-4
 
 
 class NotSeenError(InputError):
-    """No pixel shows the surface that a map is for."""
+    """Error for a map whose surface no pixel shows."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapCheck:
-    """A body shaded with its map and with its true thickness, from one view.
+    """Check of a map: a body shaded with it and with the true thickness, from one view.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class MapCheck:
     empty: float = 0.0
 
     def summary(self) -> dict[str, Any]:
-        """The errors in values that JSON can hold."""
+        """Errors as values that JSON can hold."""
         return {
             "thickness": dataclasses.asdict(self.thickness),
             "transmittance": dataclasses.asdict(self.transmittance),
@@ -93,7 +93,7 @@ def check_map(
     camera: Camera | None = None,
     body: Mesh | None = None,
 ) -> MapCheck:
-    """Compare the look of a thickness map with the truth.
+    """Compare shading with a thickness map to the truth.
 
     Parameters
     ----------
@@ -204,6 +204,6 @@ def _barycentric(corners: Array, points: Array) -> Array:
 
 
 def _backdrop(size: tuple[int, int]) -> Array:
-    """(h, w, 2): where pixel centers are in the picture, in its heights."""
+    """(h, w, 2): positions of pixel centers in the picture, in units of its height."""
     across, down = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
     return np.stack([across, down], axis=-1) / size[1]

@@ -1,4 +1,4 @@
-"""The files of a bake, read back and checked against the truth."""
+"""Checks of a bake's files, read back and compared with the truth."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def check_output(job: Job, record: Record, results: Results) -> Checks:
-    """A check per map that a job has written, quantized as the file is.
+    """Check each map that a job has written, quantized as in the file.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def _check_glb(job: Job, record: Record, results: Results, medium: Medium | None
 
 
 def _check_maps(job: Job, record: Record, results: Results, medium: Medium | None) -> Checks:
-    """Checks of maps that are files of their own."""
+    """Checks of maps in files of their own."""
     output, metres = Path(job["output"]), metres_per_unit(job.get("unit", "m"))
     uv_file = output.with_name(record["uv_file"]["file"]) if "uv_file" in record else None
     path, found = uv_file or Path(job["model"]), Checks()
@@ -111,6 +111,6 @@ def _material_at(file: GltfFile, part: Record) -> GltfMaterial | None:
 
 
 def _medium(material: GltfMaterial | None, metres: float) -> Medium | None:
-    """What fills an object of this material, per metre of the world; None for clear ones, which would show nothing."""
+    """Medium of an object with this material, per metre of the world; None for clear ones, which would show nothing."""
     found = None if material is None else material.medium()
     return Medium(absorption=found.extinction / metres) if found is not None and found.extinction.any() else None

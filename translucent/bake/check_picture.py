@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from translucent.bake.check import MapCheck
 
 
-#: Colors of the error: the map is too thin, right, too thick (sRGB 0..255).
+#: Colors of the error: too thin, right, too thick (sRGB 0..255).
 THIN, RIGHT, THICK = (30, 90, 200), (245, 245, 245), (200, 50, 30)
 
-#: More rows make a picture that nobody looks at.
+#: Largest number of rows of a picture.
 MOST_ROWS = 12
 
-#: Pixels without the body.
+#: Color of pixels without the body.
 NO_BODY = (70, 70, 74)
 _CAPTION = 26  # pixels
 

@@ -1,4 +1,4 @@
-"""Whether a map belongs to the texture coordinates of the file that it is for, which is read again for that."""
+"""Check that a map matches the texture coordinates of the file that it is for, which is read again."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from translucent.gltf.accessors import Accessors
 from translucent.gltf.file import GltfFile
 from translucent.gltf.materials import GltfMaterial
 
-#: Positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
+#: Corners: positions (n, 3) in metres and texture coordinates (n, 2), v upwards, or none.
 Corners = tuple[Array, Array | None]
 
-#: Positions, as shares of the diagonal, and texture coordinates that differ by less than this are the same.
+#: Tolerances of positions, as shares of the diagonal, and of texture coordinates.
 SAME = 1e-4
-#: Share of the vertices that may have others: of seams that a repair has closed.
+#: Share of the vertices that may differ: those on seams that a repair has closed.
 MOST_OTHERS = 0.01
 
 
@@ -61,7 +61,7 @@ def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
 
 
 def own_corners(file: GltfFile, part: Record, metres: float, material: GltfMaterial | None = None) -> Corners:
-    """Those of a primitive in its own space; with a material, at which its thickness texture is read."""
+    """Corners of a primitive in its own space; with a material, at the coordinates of its thickness texture."""
     accessors = Accessors(file)
     mesh, primitive = part["place"]
     attributes = file.item("meshes", mesh)["primitives"][primitive]["attributes"]
@@ -76,14 +76,14 @@ def own_corners(file: GltfFile, part: Record, metres: float, material: GltfMater
 
 
 def placed_corners(file: GltfFile, part: Record, metres: float) -> Corners:
-    """Those of a primitive where the first node puts it."""
+    """Corners of a primitive as the first node places it."""
     matrix = _matrix(file, part)
     positions, uv = own_corners(file, part, metres)
     return positions @ matrix[:3, :3].T + metres * matrix[:3, 3], uv
 
 
 def placed_around(file: GltfFile, part: Record, metres: float) -> Mesh | None:
-    """The body that a primitive bounds with others, where the first node puts it."""
+    """Corners of the body that a primitive bounds with others, as the first node places it."""
     around = Bodies(file, metres).around((part["place"][0], part["place"][1]))
     return None if around is None else transformed(around, _matrix(file, part), metres)
 
@@ -95,7 +95,7 @@ def _matrix(file: GltfFile, part: Record) -> Array:
 
 
 def mesh_corners(path: Path, metres: float) -> Corners:
-    """Those of any other file, as they stand in it."""
+    """Corners of a mesh in any other file, as stored."""
     import trimesh
 
     with warnings.catch_warnings(), np.errstate(all="ignore"):

@@ -14,26 +14,27 @@ from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
 from translucent.geometry.normals import CREASE
 
-#: How many independently scrambled sets there are, and how many numbers all of them may hold.
+#: Number of independently scrambled sets, and largest number of values in all of them.
 SETS, TABLE = 256, 1 << 22
 
-#: Rays from one point at most, as a multiple of those asked for, where a tolerance wants more.
+#: Largest multiple of the requested rays from one point, where a tolerance needs more.
 MOST_MULTIPLE, MOST_ADDED = 64, 8192
 
-#: Binary digits of the points: what float32 holds.
+#: Binary digits of the points, as in float32.
 DIGITS = 24
 
 #: A sphere that touches the surface where a ray along w has its exit is seen from its center under pi - 2 theta: beyond
 #: this theta the exit belongs to the smooth surface around the point, see `inscribed`.
 SPHERE_CONE = 0.5 * (math.pi - CREASE)
 
-#: Points closer than this share of the radius have the same set: the same point of two charts, rounded twice.
+#: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
+#: twice.
 SAME_POINT = 2.0**-24
 
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Ray directions of a bake, the same for any order of points and any number of threads.
+    """Ray directions of a bake, independent of the order of points and the number of threads.
 
     Attributes
     ----------
@@ -62,7 +63,7 @@ class Directions:
 
     @property
     def most(self) -> int:
-        """How many rays a point may have."""
+        """Largest number of rays of a point."""
         return int(self.table.shape[2])
 
     def at(self, points: Points, begin: int, end: int) -> Floats:

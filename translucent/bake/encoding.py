@@ -1,4 +1,4 @@
-"""What a number in a file of thickness means: metres = offset + scale * stored.
+"""Encoding of thickness in files: metres = offset + scale * stored.
 
 =============  ===========  =======================  =====================================
 file           asked        stored                   metres = offset + scale * stored
@@ -29,7 +29,7 @@ from translucent.errors import InputError
 
 @dataclass(frozen=True)
 class Encoding:
-    """How values become what a file stores, and back.
+    """Encoding of values in a file, and its inverse.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Encoding:
     def of(
         cls, values: npt.ArrayLike, levels: int = 0, *, normalize: bool = False, invert: bool = False, unit: str = "m"
     ) -> Encoding:
-        """The encoding for these values; `invert` normalizes, too, since a thin part is to be 1 and the thickest 0.
+        """Encoding for these values; `invert` also normalizes, so that thin parts are 1 and the thickest 0.
 
         Raises
         ------
@@ -69,11 +69,11 @@ class Encoding:
 
     @property
     def quantum(self) -> float:
-        """Smallest step of the values that the file can tell; 0 for floats."""
+        """Quantization step of the values; 0 for floats."""
         return abs(self.scale) if self.levels else 0.0
 
     def encode(self, values: npt.ArrayLike) -> npt.NDArray[Any]:
-        """What is stored: float32, uint8 or uint16."""
+        """Encode values as float32, uint8 or uint16."""
         with np.errstate(under="ignore"):
             stored = (np.asarray(values, dtype=np.float64) - self.offset) / self.scale
             if not self.levels:
@@ -82,11 +82,11 @@ class Encoding:
         return whole.astype(np.uint8 if self.levels < 256 else np.uint16)
 
     def decode(self, stored: npt.ArrayLike) -> Array:
-        """The values, float64."""
+        """Decode values to float64."""
         return self.offset + self.scale * np.asarray(stored, dtype=np.float64)
 
     def summary(self) -> dict[str, Any]:
-        """The formula in values that JSON can hold."""
+        """Formula as values that JSON can hold."""
         return {
             "formula": "value = offset + scale * stored",
             "scale": self.scale,

@@ -1,4 +1,4 @@
-"""High to low: the points of a detailed mesh that the texels of a simple one show."""
+"""Projection from a low-poly to a high-poly mesh: points of the detailed mesh for the texels of the simple one."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from translucent.bake.unwrap import Unwrapped
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 
-#: How far on either side of the low mesh the high one is looked for where nothing says so, as a share of the diagonal.
+#: Default distance on either side of the low mesh within which the high one is searched, as a share of the diagonal.
 SEARCH = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Sends points of a low mesh to a high one, along its smooth normals or from a cage.
+    """Projection of points of a low-poly mesh to a high-poly one, along its smooth normals or from a cage.
 
     Attributes
     ----------

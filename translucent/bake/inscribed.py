@@ -22,19 +22,19 @@ from translucent.bake.surface import Points, Surface, blend
 from translucent.bake.texels import closest
 from translucent.geometry.normals import CREASE
 
-#: About how many points of the surface the search tree holds, beyond one for each face, and how many of them are tried
-#: around a center. The center of a round body is as far from all points, so that a search looks at every one.
+#: Approximate number of points of the surface in the search tree, beyond one for each face, and how many of them are
+#: tried around a center. The center of a round body is as far from all points, so that a search looks at every one.
 TREE_POINTS, TRIED = 20_000, 6
 
-#: Larger trees are searched to this relative error of the distance only, for the same reason.
+#: Relative error of the distance in searches of larger trees, for the same reason.
 LARGE_TREE, LARGE_TREE_ERROR = 50_000, 0.005
 
-#: Rounds of shrinking at most, and the share of the radius below which it has come to rest.
+#: Largest number of rounds of shrinking, and the relative change of the radius at convergence.
 ROUNDS, AT_REST = 32, 1e-7
 
 
 class InscribedSpheres:
-    """Finds inscribed spheres. Any number of threads may ask at once.
+    """Finder of inscribed spheres. Any number of threads may ask at once.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One bake as a plain dict in, and files out: what a process on another machine can do as well.
+"""Bake jobs: a plain dict in and files out, so that a process on another machine can run them.
 
 A job holds what JSON can hold, so it can be kept, sent and hashed:
 
@@ -63,26 +63,26 @@ from translucent.units import metres_per_unit
 from translucent.version import VERSION
 
 Job = dict[str, Any]
-#: Gets the share that is done, 0..1, and the rays traced so far.
+#: Callback with the share that is done, 0..1, and the rays traced so far.
 Progress = Callable[[float, int], None]
 
 KEYS = {
     "model", "output", "unit", "settings", "medium", "high", "cage", "vertices", "unwrap", "normalize", "invert",
     "resume", "threads", "max_escaped", "outside",
 }  # fmt: skip
-#: Which files a bake writes, of which objects; another number makes them anew.
+#: Version of the set of files that a bake writes; another number makes them anew.
 FILES = 2
-#: How far a part of a body may be from its surface, as a share of the diagonal: as far as rounding can lead.
+#: Largest distance of a part of a body from its surface, as a share of the diagonal: that of rounding.
 ON_SURFACE = 1e-4
-#: Keys that do not change what is written into the file.
+#: Keys that do not change the contents of the file.
 _HOW = {"output", "model", "high", "cage", "resume", "threads", "max_escaped", "outside"}
 _LENGTHS = ("max_distance", "tolerance", "high_distance")
-#: What has no meaning for vertices: a mistake, and what merely has a default.
+#: Keys without meaning for vertices: those that are a mistake, and those that merely have a default.
 _OF_MAPS, _TEXELS = ("tile", "high", "cage", "high_distance"), ("size", "supersample", "padding")
 
 
 def check_job(job: Job) -> None:
-    """Raise `InputError` or `RenderError` where a job cannot be done, as far as can be told without any work."""
+    """Raise `InputError` or `RenderError` if a job is found invalid before any work is done."""
     if unknown := sorted(set(job) - KEYS):
         raise InputError(f"bake job with {unknown[0]!r}", "not a known key", f"use {', '.join(sorted(KEYS))}")
     if missing := [key for key in ("model", "output") if not isinstance(job.get(key), str)]:
@@ -133,17 +133,17 @@ def _share(key: str, text: str) -> float:
 
 
 def has_parts(job: Job) -> bool:
-    """Whether the objects of the model are baked one by one; of other models, and of vertices, all are one mesh."""
+    """Whether the objects of the model are baked one by one, and not as one mesh."""
     return Path(job["model"]).suffix.lower() in SUFFIXES and (stays_gltf(job) or not job.get("vertices"))
 
 
 def stays_gltf(job: Job) -> bool:
-    """Whether the model stays a glTF file with all that it has."""
+    """Whether the output is a copy of the model's glTF file."""
     return Path(job["output"]).suffix.lower() == ".glb" and Path(job["model"]).suffix.lower() in SUFFIXES
 
 
 def content_hash(job: Job) -> str:
-    """SHA-256 of all that the result depends on: the bytes of the meshes, the settings, and the version.
+    """SHA-256 of everything that the result depends on: the bytes of the meshes, the settings, and the version.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def content_hash(job: Job) -> str:
 
 
 def _parts(path: Path, allow_outside: bool) -> list[bytes]:
-    """A file and, of a .gltf, what it links to."""
+    """Paths of a file and, for a .gltf, of its links."""
     data = [read_bytes(path, f"mesh {str(path)!r}")]
     if path.suffix.lower() in SUFFIXES:
         file = read_gltf(path, allow_outside)
@@ -171,7 +171,7 @@ def _parts(path: Path, allow_outside: bool) -> list[bytes]:
 
 
 def is_done(job: Job, content: str) -> bool:
-    """Whether the job's files are there, whole, and of this content."""
+    """Whether the job's files exist, complete and with this content."""
     output = Path(job["output"])
     record = read_record(output)
     return (

@@ -1,4 +1,4 @@
-"""Jobs in processes of this machine, of which none takes the others along when it dies."""
+"""Local process pool in which no worker process takes the others along when it dies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-#: Seconds that a process has for tidying up when the work is given up.
+#: Seconds that a worker process has for cleaning up when the work is canceled.
 PATIENCE = 5.0
 
 Item = TypeVar("Item")
@@ -73,7 +73,7 @@ def in_processes(
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end at once when the work is given up."""
+    """Worker processes that end at once when the work is canceled."""
 
     def __init__(self, workers: int) -> None:
         super().__init__(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
@@ -93,7 +93,9 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _do(task: Callable[[Item], Result], item: Item) -> Result:
-    """In each process: a task. Where it has tidied up since the process is to end, that ends; a pool would go on."""
+    """Run a task in a worker process. Where it has tidied up since the process is to end, that ends; a pool would go
+    on.
+    """
     try:
         return task(item)
     except SystemExit:
@@ -101,7 +103,7 @@ def _do(task: Callable[[Item], Result], item: Item) -> Result:
 
 
 def _begin() -> None:
-    """In each process: the parent answers Ctrl-C, and ends this process so that its temporary files go."""
+    """Set up a worker process: the parent handles Ctrl-C, and ends the worker so that its files are removed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_follow_parent, daemon=True).start()
@@ -109,7 +111,7 @@ def _begin() -> None:
 
 
 def _follow_parent() -> None:
-    """End this process when its parent is gone: it waits at a pipe whose other end it holds, too, and hears nothing."""
+    """End this worker process when its parent is gone, as reading its pipe would wait forever."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

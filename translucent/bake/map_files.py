@@ -1,4 +1,4 @@
-"""The maps of a glTF file as images of their own, one for each primitive that light enters, in its own UVs.
+"""Maps of a glTF file as separate images, one for each primitive that light enters, in its own UVs.
 
 Of one map ``thickness.exr`` is the file; of several it is ``thickness-NAME.exr`` for each, NAME being that of its
 material (and of its mesh where that is not enough), each with its record. ``thickness.exr.json`` is the record of all.
@@ -21,7 +21,7 @@ from translucent.bake.writing import save_map, write_uv_file
 from translucent.files.paths import remove_partial
 from translucent.gltf.file import GltfFile
 
-#: Most characters of the name of a map, and what beside letters and digits neither file systems nor shells mind.
+#: Largest length of the name of a map, and the characters besides letters and digits that are safe in file names.
 _LONGEST, _SAFE = 60, "._-"
 
 
@@ -75,7 +75,7 @@ def save_maps(
 
 
 def _paths(file: GltfFile, output: Path, places: list[Place]) -> dict[Place, Path]:
-    """A file for each of several maps; names are never the same but for case."""
+    """Path of each of several maps; names differ by more than case."""
     materials = {place: _material_name(file, place) for place in places}
     count = Counter(materials.values())
     taken: set[str] = set()
@@ -97,6 +97,6 @@ def _material_name(file: GltfFile, place: Place) -> str:
 
 
 def _safe(name: str) -> str:
-    """A name as a part of the name of a file."""
+    """Name made safe as part of a file name."""
     kept = "".join(character if character.isalnum() or character in _SAFE else " " for character in name)
     return "_".join(kept.split())[:_LONGEST].strip("._-") or "map"

@@ -1,4 +1,4 @@
-"""The thickness at points of a surface: rays from each, until the error is small enough, and their mean."""
+"""Measurement of thickness at points of a surface: the mean over rays, cast until the error is small enough."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from translucent.bake.rays import Rays
 from translucent.bake.settings import LOCAL_REACH, BakeSettings
 from translucent.bake.surface import Points, Surface
 
-#: Rays that are traced at a time: their arrays stay in the cache of a processor.
+#: Number of rays that are traced at a time: their arrays stay in the cache of a processor.
 CHUNK_RAYS = 1 << 14
 
 
 class StoppedError(Exception):
-    """The bake was given up while this was at work; nobody waits for it."""
+    """Signal that the bake was canceled during the work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,8 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """Measures thickness. Any number of threads may ask at once; what they get depends on the points alone.
+    """Measurement of thickness at points. Any number of threads may ask at once; what they get depends on the points
+    alone.
 
     Attributes
     ----------
@@ -90,7 +91,7 @@ class Measure:
 
     @property
     def unit(self) -> float:
-        """What a value of 1 in the unit ball is outside."""
+        """World value of 1 in the unit ball."""
         return 1.0 if self.settings.mode == "local" else self.surface.radius
 
     def at(self, points: Points) -> Measured:

@@ -1,4 +1,4 @@
-"""What a texel gets from the lengths d of its rays: a mean M = f^-1(E[f(d)]), each mode with an f of its own.
+"""Modes of averaging the lengths d of a texel's rays: a mean M = f^-1(E[f(d)]), each with an f of its own.
 
 Rays go along directions w around the inward normal -n, with the density p(w) of the weighting within the cone:
 
@@ -29,7 +29,7 @@ from translucent.arrays import Array, Integers
 from translucent.bake.settings import BakeSettings
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 
-#: Groups of rays whose means tell the standard error.
+#: Number of groups of rays whose means give the standard error.
 BLOCKS = 8
 
 #: Newton steps for the thickness of a transmittance: one for a gray medium, and each channel bends the curve once.
@@ -126,7 +126,7 @@ class RayMean:
 
 
 def block_edges(begin: int, end: int, blocks: int) -> Integers:
-    """(1, blocks): where the blocks of rays `begin` to `end` begin, as equal as can be."""
+    """(1, blocks): starts of the blocks of rays `begin` to `end`, as equal as can be."""
     return (begin + np.arange(blocks) * (end - begin) // blocks)[None]
 
 

@@ -1,11 +1,11 @@
-"""Padding: what bilinear filtering and mipmaps read beside the charts of a map."""
+"""Padding of a map's charts, for bilinear filtering and mipmaps."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-#: Rows whose distances are looked at at a time.
+#: Number of rows whose distances are computed at a time.
 ROWS = 256
 
 

@@ -1,4 +1,4 @@
-"""How far rays run inside a mesh: Embree finds the faces, float64 says where.
+"""Lengths of rays inside a mesh: Embree finds the faces, float64 the distances.
 
 Embree is asked for the first face only, from a start a little below the surface. A ray that so finds the face through
 which it leaves the body has its exit, at the crossing of its line with that face's plane, in float64. All others, few
@@ -24,16 +24,16 @@ OFFSET = 5e-7
 #: The face on which a ray starts, and those beside it, may be found up to here; also the step behind a face.
 NEAR = 2e-6
 
-#: A ray that meets a face at a smaller cosine runs along it, as far as float32 directions tell.
+#: Smallest cosine at which a ray meets a face and does not run along it, in float32 directions.
 GRAZING = 1e-6
 
-#: What lies less than this behind the start is at it: rounding of float64, for all but the flattest angles.
+#: Distance behind the start within which a face is at it: rounding of float64, for all but the flattest angles.
 BEHIND = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Follows rays into a surface. Any number of threads may ask at once.
+    """Rays into a surface, followed to their exits. Any number of threads may ask at once.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class Rays:
         return traced
 
     def _step(self, walk: _Walk, hits: dict[str, Any]) -> None:
-        """Move the live rays of a walk behind the face that each has found, or end them."""
+        """Advance the live rays of a walk behind the face that each has found, or end them."""
         missed = hits["primID"] < 0
         walk.end(missed, np.where(walk.depth[walk.live] > 0, np.inf, walk.length[walk.live]))
         live = walk.live
@@ -145,7 +145,7 @@ class Rays:
     def _cross_surface(
         self, walk: _Walk, distance: Array, leaves: npt.NDArray[np.bool_], enters: npt.NDArray[np.bool_]
     ) -> None:
-        """Count what the live rays cross, and end those that are through."""
+        """Count the crossings of the live rays, and end those that leave."""
         live = walk.live
         if self.gaps == "first-exit":
             walk.end(leaves | (enters & (not self.pass_entries)), distance)
@@ -160,7 +160,7 @@ class Rays:
 
 @dataclass(eq=False)
 class _Walk:
-    """Rays under way, one per row; `live` has the indices of those that are not at their end."""
+    """Walk of rays, one per row; `live` has the indices of those that are not at their end."""
 
     origin: Array
     direction: Array

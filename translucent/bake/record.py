@@ -1,4 +1,4 @@
-"""What is written about a bake beside it, as JSON: ``thickness.exr`` has ``thickness.exr.json``."""
+"""Record of a bake, written beside it as JSON: ``thickness.exr`` has ``thickness.exr.json``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from translucent.version import VERSION
 
 Record = dict[str, Any]
 
-#: What the values of each mode are; the equations are in ``docs/baking.md``.
+#: Definitions of the values of each mode; the equations are in ``docs/baking.md``.
 DEFINITIONS = {
     "normal": "distance from the surface to the exit along the inward normal",
     "cone": "mean distance from the surface to the exit over the directions of a cone around the inward normal",
@@ -30,17 +30,17 @@ DEFINITIONS = {
 
 
 def unit_of(mode: str) -> str:
-    """Unit of the values of a mode: ``"m"``, or ``"1"`` for the one that has none."""
+    """Unit of the values of a mode: ``"m"``, or ``"1"`` for the dimensionless one."""
     return "1" if mode == "local" else "m"
 
 
 def sidecar_of(path: Path) -> Path:
-    """Where the record of a file is."""
+    """Path of the record of a file."""
     return path.with_name(f"{path.name}.json")
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON can hold it: NumPy's numbers become Python's, infinity and NaN null."""
+    """Convert a value for JSON: NumPy's numbers become Python's, infinity and NaN null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -51,7 +51,7 @@ def plain(value: Any) -> Any:
 
 
 def describe(result: BakedMap | BakedVertices, encoding: Encoding) -> Record:
-    """What a bake is: definition, unit, range, encoding, settings, report and mesh."""
+    """Description of a bake: definition, unit, range, encoding, settings, report and mesh."""
     values, settings = np.asarray(result.values), result.settings
     coverage = getattr(result, "coverage", None)
     seen = values[coverage] if coverage is not None else values
@@ -75,7 +75,7 @@ def describe(result: BakedMap | BakedVertices, encoding: Encoding) -> Record:
 
 
 def shared(parts: list[Record]) -> Record:
-    """What all parts of one bake have in common, for the head of their record."""
+    """Common entries of all parts of one bake, for the head of their record."""
     return {key: parts[0][key] for key in ("kind", "mode", "definition", "unit", "settings")}
 
 
@@ -86,7 +86,7 @@ def _range(values: Any) -> Record | None:
 
 
 def provenance() -> dict[str, str]:
-    """Versions of all that the numbers depend on."""
+    """Versions of everything that the numbers depend on."""
     from translucent.cpu.embree import embree_versions
 
     return {
@@ -99,7 +99,7 @@ def provenance() -> dict[str, str]:
 
 
 def write_record(path: Path, record: Record) -> Record:
-    """Write the record of the file at `path` beside it, with the file's hash; what was written.
+    """Write the record of the file at `path` beside it, with the file's hash; returns the record.
 
     It is written after the file, so that a record whose hash is that of its file vouches for both.
     """
@@ -107,7 +107,7 @@ def write_record(path: Path, record: Record) -> Record:
 
 
 def write_common_record(path: Path, record: Record) -> Record:
-    """Write the record of several files where that of the file at `path` would be; what was written."""
+    """Write the record of several files where that of the file at `path` would be; returns the record."""
     full = {**record, "provenance": provenance()}
     text = json.dumps(full, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_text_atomically(sidecar_of(path), text)
@@ -120,13 +120,13 @@ def fingerprint(path: Path) -> Record:
 
 
 def parts_of(record: Record) -> list[Record]:
-    """The records of the maps, or of the primitives with thickness at their vertices, that a record tells of."""
+    """Records of the maps, or of the primitives with thickness at their vertices, within a record."""
     found: list[Record] = record.get("maps") or record.get("primitives") or [record]
     return found
 
 
 def files_of(record: Record) -> list[Record]:
-    """Names and hashes of the files that a record vouches for: maps, and meshes with new UVs."""
+    """Names and hashes of the files of a record: maps, and meshes with new UVs."""
     maps, uv_file = record.get("maps"), record.get("uv_file")
     parts = [record, *(maps if isinstance(maps, list) else []), uv_file]
     return [part for part in parts if isinstance(part, dict) and isinstance(part.get("file"), str)]
@@ -139,7 +139,7 @@ def file_hash(path: Path) -> str:
 
 
 def read_record(path: Path) -> Record | None:
-    """The record of a file, if there is one and it is whole."""
+    """Read the record of a file, if it exists and is valid."""
     try:
         found = json_value(read_text(sidecar_of(path), f"record of {str(path)!r}"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""What a bake is asked for, checked once."""
+"""Settings of a bake, checked once."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Mode = Literal["normal", "cone", "transmittance", "inscribed", "local"]
 Weighting = Literal["cosine", "uniform"]
 Gaps = Literal["first-exit", "total"]
 
-#: Largest map, in texels along a side.
+#: Largest size of a map, in texels along a side.
 MAX_SIZE = 16384
 
-#: Most rays from one point, before those that a tolerance adds.
+#: Largest number of rays from one point, before those that a tolerance adds.
 MAX_RAYS = 65536
 
-#: The reach of mode "local" where none is given, as a share of the diagonal; the customary one of baking tools.
+#: Default reach of mode "local", as a share of the diagonal; the customary one of baking tools.
 LOCAL_REACH = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class BakeSettings:
-    """How to bake.
+    """Settings of a bake.
 
     Rays go from points of the surface into the mesh, around the inward smooth normal; the mode makes one number of
     their lengths d. With n the outward normal, w the directions and p the density of the weighting:
@@ -134,7 +134,7 @@ class BakeSettings:
             )
 
     def summary(self) -> dict[str, object]:
-        """The settings in values that JSON can hold; the medium by its extinction in 1/m."""
+        """Settings as values that JSON can hold; the medium by its extinction in 1/m."""
         known = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "medium"}
         return {**known, "extinction": None if self.medium is None else self.medium.extinction.tolist()}
 
@@ -158,7 +158,7 @@ def _check_count(name: str, value: Any, low: int, high: int, do: str) -> None:
 
 
 def settings_from(settings: Any, short: str, given: Mapping[str, Any]) -> BakeSettings:
-    """Settings with some fields given instead.
+    """Copy of settings with some fields replaced.
 
     Parameters
     ----------

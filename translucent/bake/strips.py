@@ -1,4 +1,4 @@
-"""Strips of a map: which points their texels show, and their thickness. Strips are independent of one another."""
+"""Strips of a map: surface points of their texels, and their thickness. Strips are independent of one another."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from translucent.bake.texels import Atlas
 #: Texels (before supersampling) in a strip, about: one strip is what a thread takes at a time.
 STRIP_TEXELS = 1 << 14
 
-#: The numbers that a strip counts.
+#: Names of the counts of a strip.
 COUNTS = ("traced", "cast", "escaped", "above", "samples", "missed", "overlapping")
 
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """Some rows of a map.
+    """Strip: some rows of a map.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Strip:
 
 @dataclass(frozen=True, eq=False)
 class Strips:
-    """Bakes strips of a map. Any number of threads may ask at once.
+    """Baker of strips of a map. Any number of threads may ask at once.
 
     Attributes
     ----------

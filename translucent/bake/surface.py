@@ -1,4 +1,4 @@
-"""A mesh made ready for baking: Embree's scene, exact planes of the faces, and smooth normals."""
+"""Mesh prepared for baking: Embree's scene, exact planes of the faces, and smooth normals."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import smooth_normals
 
-#: Rays start this far from the edges of their triangle at least, as a share of its height: a ray that runs down an
+#: Smallest distance of a ray's start from the edges of its triangle, as a share of its height: a ray that runs down an
 #: adjacent wall would otherwise run in it.
 INSET = 1e-3
 
-#: Triangles with less than this share of the squared diagonal have no area that float64 could tell from rounding.
+#: Smallest area of a triangle, as a share of the squared diagonal, that float64 can tell from rounding.
 NO_AREA = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Where rays start: points of a surface, in the unit ball around it.
+    """Origins of rays: points of a surface, in the unit ball around it.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What rays and points need of a mesh. Lengths are in the unit ball around it.
+    """Mesh data that rays and points need. Lengths are in the unit ball around it.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class Surface:
 
 
 def blend(corners: Array, barycentric: Array) -> Array:
-    """(k, 3): what (k, 3, 3) is at barycentric weights (k, 3).
+    """(k, 3): interpolation of (k, 3, 3) with barycentric weights (k, 3).
 
     Written out: sums of products over arrays may round according to where an element stands.
     """

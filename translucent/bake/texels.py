@@ -1,4 +1,4 @@
-"""Which point of the surface each texel of a map shows."""
+"""Surface points of the texels of a map."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers, Mask
 
-#: A texel's center is inside a triangle, or on its edge, by more or less than this share of a texel.
+#: Distance, as a share of a texel, within which a texel's center is on a triangle's edge.
 ON_EDGE = 1e-7
 
 
@@ -39,7 +39,7 @@ class Texels:
 
 
 class Atlas:
-    """Triangles in a map, ready to tell which texels they touch.
+    """Atlas: triangles in a map, prepared for finding the texels that they touch.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Atlas:
         self._top, self._bottom = _cells(self.corners[..., 1].min(axis=1), self.corners[..., 1].max(axis=1))
 
     def strip(self, begin: int, end: int) -> Texels:
-        """The texels of rows `begin` to `end` that any face touches."""
+        """Texels of rows `begin` to `end` that any face touches."""
         face, row = self._face_rows(begin, end)
         left, right = self._spans(face, row)
         count = right - left
@@ -100,7 +100,7 @@ class Atlas:
         return left, np.where(met, right, left)
 
     def _nearest(self, face: Integers, row: Integers, column: Integers) -> Texels:
-        """Of all pairs of a face and a texel that it touches, the best for each texel."""
+        """Best face for each texel, of all pairs of a face and a texel that it touches."""
         center = np.stack([column, row], axis=1).astype(np.float64) + 0.5
         distance, barycentric = closest(self.corners[face], center)
         texel = (row % self.height) * self.width + column % self.width
@@ -124,7 +124,7 @@ class Atlas:
         return np.asarray(np.add.reduceat(within, first) > 1)
 
     def _depth(self, face: Integers, center: Array) -> Array:
-        """(n,): how far inside their faces the centers are, in texels; below 0 outside."""
+        """(n,): depth of the centers inside their faces, in texels; below 0 outside."""
         corners = self.corners[face]
         depth = np.full(len(face), np.inf)
         turn = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

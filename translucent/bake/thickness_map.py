@@ -1,4 +1,4 @@
-"""What a bake gives, with the way to its files: a map, or a value per vertex."""
+"""Results of a bake that can be saved: a map, or a value per vertex."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from translucent.bake.writing import save_map, save_vertices
 
 @dataclass(frozen=True, eq=False)
 class ThicknessMap(BakedMap):
-    """A baked map, from `translucent.bake_thickness`.
+    """Baked thickness map, from `translucent.bake_thickness`.
 
     Attributes
     ----------

@@ -15,13 +15,13 @@ from translucent.geometry.mesh import Mesh
 #: Texels between the charts that xatlas makes, and the share of a small map's side that this is at most.
 CHART_GAP, GAP_SHARE = 4, 1 / 128
 
-#: Texture coordinates this close to a whole number are that number: float32 near 1 rounds by half of it.
+#: Distance of texture coordinates to an integer within which they are equal to it: float32 near 1 rounds by half of it.
 WHOLE = 1e-7
 
-#: What to do about texture coordinates that no map can have.
+#: Advice about texture coordinates that no map can have.
 ANEW = "make new ones with --unwrap (in Python, leave out the uv), or unwrap it in a modelling tool"
 
-#: The most tiles that one triangle may cover; more repeat a texture, which no thickness does.
+#: Largest number of tiles that one triangle may cover; more repeat a texture, which no thickness does.
 MOST_TILES = 4.0
 
 
@@ -75,7 +75,7 @@ def unwrap(mesh: Mesh, size: int, tile: int | None) -> Unwrapped:
 
 
 def in_tile(uv: Array, tile: int) -> npt.NDArray[np.bool_]:
-    """(m,): which faces (m, 3, 2) lie in a UDIM tile."""
+    """(m,): mask of faces (m, 3, 2) in a UDIM tile."""
     return np.asarray(_tiles(uv)[0] == tile)
 
 
@@ -124,7 +124,7 @@ def _tiles(uv: Array) -> tuple[Integers, npt.NDArray[np.bool_]]:
 def _doubts(
     mesh: Mesh, uv: Array, tiles: tuple[int, ...], crossing: npt.NDArray[np.bool_], tile: int | None
 ) -> tuple[str, ...]:
-    """What to warn of; raises where a tile is asked for in which there is nothing."""
+    """Warnings about texture coordinates; raises if a requested tile is empty."""
     listed = ", ".join(map(str, tiles))
     if tile is not None:
         if tile not in tiles:

@@ -24,13 +24,13 @@ from translucent.geometry.grouping import position_ids
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_angles
 
-#: How far from its vertex the point is that stands for the corner of a face, as a share of the way to the other two.
+#: Distance from its vertex of the point that stands for a face's corner, as a share of the way to the other two.
 CORNER = 1e-3
 
-#: Settings that have no meaning for vertices.
+#: Settings without meaning for vertices.
 _OF_MAPS: dict[str, Any] = {"size": 1, "supersample": 1, "padding": 0, "tile": None, "high_distance": None}
 
-#: Corners that a thread takes at a time.
+#: Number of corners that a thread takes at a time.
 PART = 1 << 13
 
 
@@ -42,7 +42,7 @@ def bake_vertex_thickness(
     progress: Progress | None = None,
     **given: Any,
 ) -> VertexThickness:
-    """Bake how thick a mesh is under each vertex.
+    """Bake the thickness of a mesh under each vertex.
 
     A vertex has the mean over the corners of its faces, weighted by their angles; rays start in each of them, very near
     the vertex. So vertices on hard edges are defined, and vertices at the same position are equal.

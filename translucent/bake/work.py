@@ -1,4 +1,4 @@
-"""Work in threads, with progress, checkpoints and a way out at any time."""
+"""Threaded work with progress, checkpoints and cancellation at any time."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from translucent.bake.strips import Strips
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-#: Told how many texels or corners are done, of how many, and how many rays have been traced.
+#: Callback with the number of texels or corners done, their total, and the number of rays traced.
 Progress = Callable[[int, int, int], None]
 
-#: Pieces of work that wait for a thread, for each thread; their results wait for their turn.
+#: Number of queued pieces of work for each thread; their results wait for their turn.
 AHEAD = 4
 
 

@@ -45,12 +45,12 @@ from translucent.gltf.write_file import write_gltf
 MAP_SUFFIXES = (".exr", ".png", ".npy", ".npz", ".glb")
 VERTEX_SUFFIXES = (".ply", ".glb", ".npy")
 
-#: After the name of a map: the mesh with the UVs that were made for it.
+#: Suffix, after the name of a map, of the mesh with the UVs that were made for it.
 UV_SUFFIX = ".uv.glb"
 
 #: Largest level of a 16-bit PNG.
 PNG_LEVELS = 65535
-#: How its text chunks begin.
+#: Prefix of its text chunks.
 PNG_PREFIX = "translucent:"
 
 
@@ -109,7 +109,7 @@ def save_map(
 
 
 def write_uv_file(model: GltfFile, path: Path) -> Record:
-    """Write a model with new UVs beside the map at `path` that belongs to them; its name and hash."""
+    """Write a model with new UVs beside their map at `path`; returns its name and hash."""
     place = path.with_name(f"{path.name}{UV_SUFFIX}")
     remove_partial(place)
     write_gltf(model, place)
@@ -119,7 +119,7 @@ def write_uv_file(model: GltfFile, path: Path) -> Record:
 def check_map_output(
     path: Path, suffixes: tuple[str, ...] = MAP_SUFFIXES, *, normalize: bool = False, invert: bool = False
 ) -> str:
-    """The suffix in lower case; raises as `save_map` does, before any work is done."""
+    """Check the output path of a map before any work is done, as `save_map` does; returns the suffix in lower case."""
     asked, suffix = f"output {str(path)!r}", path.suffix.lower()
     if suffix not in suffixes:
         raise InputError(asked, f"suffix {path.suffix!r}", f"use {', '.join(suffixes[:-1])} or {suffixes[-1]}")
@@ -145,7 +145,7 @@ def _write_exr(task: _Task, path: Path) -> None:
 
 
 def _stated(task: _Task) -> dict[str, Any]:
-    """What a file says of itself."""
+    """Metadata of a file."""
     settings = task.result.settings
     return {
         "unit": task.encoding.unit,

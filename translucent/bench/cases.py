@@ -26,13 +26,13 @@ from translucent.scene.surface import Surface
 
 Size = tuple[int, int]
 
-#: How far away a far body is, in its own diameters.
+#: Distance of a far body, in its own diameters.
 FAR = 1e4
 
 #: Thickness of the thin slab as a share of its width.
 THIN = 1e-3
 
-#: What is behind scenes in which light is to be seen: nearly nothing.
+#: Nearly black background of scenes in which light is to be seen.
 DUSK = Environment.constant((0.02, 0.02, 0.025))
 
 

@@ -1,4 +1,4 @@
-"""What the project says of itself, checked on the numbers of a report."""
+"""Claims of the project about itself, checked on the numbers of a report."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from translucent.bench.frontier import NOISES, error_of
 from translucent.bench.record import CaseRecord, Claim, HardCase
 from translucent.bench.row import Row
 
-#: Times the floor, within which signed depth stays.
+#: Largest time of signed depth, as a multiple of the floor.
 MOST_OF_FLOOR = 1.25
 
 #: A time with a noise of `NOISES` standard errors beyond this share of it decides nothing about the frontier: next to
@@ -107,7 +107,7 @@ def _near_floor(case: CaseRecord) -> tuple[bool | None, str]:
 
 
 def _why_slow(case: CaseRecord) -> str:
-    """What signed depth does there that the floor does not."""
+    """Reason why signed depth is slower than the floor there."""
     if case.bodies > 1:
         return " (several media: three optical depths and the path are added up, 20 bytes per pixel and not 8)"
     if case.layers > MANY_LAYERS:
@@ -129,7 +129,7 @@ def _off(case: CaseRecord, shortcut: str) -> tuple[bool | None, str]:
 
 
 def _error_factor(case: CaseRecord, shortcut: str) -> float | None:
-    """How many times larger the error of the shortcut is than that of signed depth."""
+    """Ratio of the shortcut's error to that of signed depth."""
     ours, theirs = _row(case, "SignedDepth"), _row(case, shortcut)
     if ours is None or theirs is None:
         return None

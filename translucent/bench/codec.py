@@ -19,7 +19,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.files.reading import json_value
 
-#: Of an array, in bytes once unpacked: a damaged file must not fill the memory.
+#: Largest size of an unpacked array in bytes: a damaged file must not fill the memory.
 _LARGEST = 1 << 28
 
 T = TypeVar("T")
@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Packed:
-    """A small array in text.
+    """Small array packed as text.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ def encode(value: Any) -> str:
 
 
 def decode(kind: type[T], text: str, name: str, file_format: str, version: int) -> T:
-    """The dataclass of a JSON text; `name` is what errors call it.
+    """Decode a dataclass from a JSON text; errors name it `name`.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def decode(kind: type[T], text: str, name: str, file_format: str, version: int) 
 
 
 class _WrongFieldError(ValueError):
-    """A field is not what it should be."""
+    """Error for a field of the wrong type or value."""
 
 
 @cache
@@ -125,7 +125,7 @@ def _fields(kind: type) -> dict[str, Any]:
 
 
 def _read(kind: Any, value: Any, where: str) -> Any:
-    """`value` of JSON as the annotated type `kind`."""
+    """Read a JSON `value` as the annotated type `kind`."""
     origin, arguments = get_origin(kind), get_args(kind)
     if dataclasses.is_dataclass(kind):
         return _read_dataclass(kind, value, where)

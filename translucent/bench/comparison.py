@@ -1,4 +1,4 @@
-"""What got slower or less accurate between two reports of one machine, beyond their noise."""
+"""Comparison of two reports of one machine: changes in time or accuracy beyond their noise."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from translucent.bench.frontier import ERROR_FLOOR, ERROR_MARGIN
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
 
-#: Runs on one machine differ by this share of a ratio to the floor though nothing has changed.
+#: Relative noise of a ratio to the floor between runs on one machine.
 TIME_SHARE = 0.15
 
-#: Standard errors of the difference of two medians, beyond which it is no accident.
+#: Number of standard errors beyond which the difference of two medians is significant.
 NOISES = 4.0
 
-#: Shares of pixels that rasterizers may decide otherwise.
+#: Shares of pixels on which rasterizers may differ.
 PIXEL_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that is not as it was.
+    """Change between two reports.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Change:
 
     @property
     def worse(self) -> bool:
-        """Whether that is bad news."""
+        """Whether the change is for the worse."""
         return self.kind not in ("faster", "more accurate")
 
     def __str__(self) -> str:
@@ -48,13 +48,13 @@ class Change:
 
 
 def compare_reports(old: Report, new: Report) -> tuple[Change, ...]:
-    """All changes, bad news first. What only the new report has is no change."""
+    """Changes between two reports, those for the worse first. What only the new report has is no change."""
     changes = list(_changes(old, new))
     return tuple(sorted(changes, key=lambda change: not change.worse))
 
 
 def machines_differ(old: Report, new: Report) -> str | None:
-    """Why times of the two cannot be compared, if so."""
+    """Reason why the times of two reports cannot be compared, if there is one."""
     pairs = {
         "device": (old.provenance.renderer, new.provenance.renderer),
         "processor": (old.provenance.processor, new.provenance.processor),

@@ -1,4 +1,4 @@
-"""What is compared, as data: the methods with their parameters, and the shortcuts that others take."""
+"""Contenders, as data: the methods with their parameters, and the shortcuts of other renderers."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from translucent.planning.methods.ray_marched import Quadrature
 from translucent.planning.render_plan import Interfaces
 from translucent.scene.scene import Scene
 
-#: How a contender is drawn: by the plan for its method, by a shortcut of the bench, or without OpenGL.
+#: Kinds of contenders: by the plan for its method, by a shortcut of the bench, or without OpenGL.
 Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march"]
 
-#: What a scene has that makes some contenders worth a row, or no contest at all.
+#: Effects of a scene, which decide on the contenders that are measured.
 Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces"]
 
 #: Refraction index of the thin layers that bend rays.
@@ -38,13 +38,13 @@ _ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect
 _STEPS = (8, 16, 32, 64, 128, 256, 512)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 
-#: With light scattered into every step, more take seconds for a frame, and nobody would.
+#: Largest number of steps with light scattered into each: more take seconds for a frame.
 _MOST_LIT_STEPS = 128
 
 
 @dataclass(frozen=True)
 class Contender:
-    """One row of every case that it fits.
+    """Contender: one row of every case that it fits.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Contender:
         return self.technique in ("constant", "ball") or self.method.makes_sheets
 
     def refusal(self, scene: Scene) -> str | None:
-        """Why it is not measured on a scene though the planner would run it."""
+        """Reason why it is not measured on a scene, though the planner would run it."""
         if self.technique in ("constant", "ball", "unmarked", "half") and scene.opaque:
             return "the shortcuts are drawn without opaque objects"
         if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
@@ -148,7 +148,7 @@ def _marched() -> Iterable[Contender]:
 
 
 def _as_they_are() -> Iterable[Contender]:
-    """The methods without parameters that would be worth rows of their own: none is left out."""
+    """Contenders of methods without parameters worth rows of their own: none is left out."""
     for method in METHODS.values():
         if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched):
             yield Contender(method.__name__, method.__name__, method())
@@ -206,7 +206,7 @@ CONTENDERS: tuple[Contender, ...] = (
 
 
 def contenders(effect: Effect, *, quick: bool, only: Iterable[str] = ()) -> tuple[Contender, ...]:
-    """What is measured on a case of this effect; `only` names contenders or families, as `check_names` accepts them."""
+    """Contenders on a case of this effect; `only` names contenders or families, as `check_names` accepts them."""
     wanted = {_slug(name) for name in only}
     return tuple(
         one
@@ -218,7 +218,7 @@ def contenders(effect: Effect, *, quick: bool, only: Iterable[str] = ()) -> tupl
 
 
 def check_names(names: Iterable[str]) -> None:
-    """Raise `InputError` where a name is that of no contender and of no family: ``depth-peeling``, ``ThinLayer``."""
+    """Raise `InputError` if a name is that of no contender and of no family: ``depth-peeling``, ``ThinLayer``."""
     known = {_slug(text) for one in CONTENDERS for text in (one.name, one.family)}
     families = sorted({_slug(one.family) for one in CONTENDERS})
     for name in names:
@@ -229,7 +229,9 @@ def check_names(names: Iterable[str]) -> None:
 
 
 def _slug(name: str) -> str:
-    """Lower case, words joined by dashes: ``DepthPeeling, 8 layers`` is ``depth-peeling-8-layers``."""
+    """Slug of a name, in lower case with words joined by dashes: ``DepthPeeling, 8 layers`` is
+    ``depth-peeling-8-layers``.
+    """
     spaced = "".join(f" {letter}" if letter.isupper() and i else letter for i, letter in enumerate(name))
     words = "".join(letter if letter.isalnum() else " " for letter in spaced.lower()).split()
     return "-".join(words).replace("c-p-u", "cpu")

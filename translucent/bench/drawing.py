@@ -1,4 +1,4 @@
-"""What is timed: frames that are prepared once, drawn again and again, and read at the end."""
+"""Drawings that are timed: frames prepared once, drawn again and again, and read at the end."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ Size = tuple[int, int]
 
 
 class Drawing(Protocol):
-    """A frame that can be drawn again and again."""
+    """Drawing: a frame that can be drawn again and again."""
 
     def draw(self) -> Sample:
-        """Draw it, and tell what that took."""
+        """Draw the frame, and return its times."""
 
     def read(self) -> Frame:
-        """What the last drawing left."""
+        """Read the frame of the last drawing."""
 
     @property
     def bytes_per_pixel(self) -> int | None:
-        """Of all targets and buffers."""
+        """Bytes per pixel of all targets and buffers."""
 
     def release(self) -> None:
-        """Free what it needed."""
+        """Free its resources."""
 
 
 class Studio:
-    """What the drawings of one renderer share: compiled passes, uploaded meshes, timers.
+    """Studio: resources that the drawings of one renderer share, such as compiled passes, uploaded meshes and timers.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Studio:
         self._passes: dict[type[Pass], Pass] = {}
 
     def step(self, name: PassName) -> Pass:
-        """The pass of this name in plans."""
+        """Pass with this name in plans."""
         kind = PASSES[name]
         if kind not in self._passes:
             self._passes[kind] = kind(self.gl)
@@ -81,25 +81,25 @@ class Studio:
         return Sample(wall, frame, sum(self.timer.seconds().values()), part, whole)
 
     def release(self) -> None:
-        """Free everything."""
+        """Free all resources."""
         self.resources.release()
         self._passes.clear()
 
 
 class _OnGpu:
-    """A frame of OpenGL, into targets that others draw into, too."""
+    """Drawing with OpenGL, into shared targets."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
         self._studio = studio
         self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
 
     def read(self) -> Frame:
-        """What the last drawing left."""
+        """Read the frame of the last drawing."""
         return self._studio.renderer.gpu.read(self._job)
 
     @property
     def bytes_per_pixel(self) -> int | None:
-        """Of all targets and buffers that have been made in this size."""
+        """Bytes per pixel of all targets and buffers of this size."""
         width, height = self._job.targets.size
         lights = self._job.resources.light_lists.size // (width * height) if self._job.features.scatters else 0
         return self._job.targets.bytes_per_pixel() + lights
@@ -110,7 +110,7 @@ class _OnGpu:
 
 
 class Floor:
-    """What light enters into a depth buffer, and nothing else: what any rasterized method costs at least.
+    """Floor: translucent objects drawn into a depth buffer alone, the least cost of any rasterized method.
 
     Opaque objects are staging, which every method draws before and which is in all costs: it is in the floor, too.
     """
@@ -124,7 +124,7 @@ class Floor:
         self._pass = DepthOnlyPass(studio.gl)
 
     def draw(self) -> Sample:
-        """Draw it."""
+        """Draw the floor."""
 
         def geometry() -> None:
             for spec in self._staging:
@@ -144,7 +144,7 @@ class Floor:
 
 
 class Planned(_OnGpu):
-    """A plan of the public API, pass by pass as the renderer runs it."""
+    """Planned drawing: a plan of the public API, pass by pass as the renderer runs it."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
         super().__init__(studio, scene, targets, plan)
@@ -152,7 +152,7 @@ class Planned(_OnGpu):
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
 
     def draw(self) -> Sample:
-        """Draw it."""
+        """Draw the plan."""
 
         def geometry() -> None:
             self._job.place((0.0, 0.0))
@@ -171,7 +171,7 @@ class Planned(_OnGpu):
 
 
 class Short(_OnGpu):
-    """A shortcut in place of the passes over geometry, and the shading of signed depth."""
+    """Drawing of a shortcut: it replaces the passes over geometry, with the shading of signed depth."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan, shortcut: Shortcut) -> None:
         shading = tuple(spec for spec in plan.passes if spec.name is PassName.TRANSMITTANCE)
@@ -179,7 +179,7 @@ class Short(_OnGpu):
         self._shortcut = shortcut
 
     def draw(self) -> Sample:
-        """Draw it."""
+        """Draw the shortcut."""
         job = self._job
 
         def geometry() -> None:
@@ -197,7 +197,7 @@ class Short(_OnGpu):
 
 
 class OnProcessor:
-    """Frames without OpenGL: of the backend ``cpu``, or where it is given a way to march, of the reference's march."""
+    """Drawing without OpenGL: of the backend ``cpu``, or where it is given a way to march, of the reference's march."""
 
     bytes_per_pixel = None
 
@@ -212,7 +212,7 @@ class OnProcessor:
         self._frame: Frame | None = None
 
     def draw(self) -> Sample:
-        """Draw it; thickness and shading are one."""
+        """Draw the frame, with thickness and shading in one time."""
         began, work = time.perf_counter(), self._clock()
         if self._march is None:
             self._frame = self._renderer.render(self._scene, self._size)
@@ -222,7 +222,7 @@ class OnProcessor:
         return Sample(seconds, seconds, None, spent, spent)
 
     def read(self) -> Frame:
-        """What the last drawing left."""
+        """Read the frame of the last drawing."""
         if self._frame is None:
             self.draw()
         assert self._frame is not None
@@ -233,7 +233,7 @@ class OnProcessor:
 
 
 def is_software(renderer: Renderer) -> bool:
-    """Whether the CPU draws what OpenGL is asked to."""
+    """Whether OpenGL runs on a software rasterizer."""
     return "software" in renderer.provenance["renderer"]
 
 

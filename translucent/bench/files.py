@@ -13,7 +13,7 @@ from translucent.bench.row import Row
 from translucent.files.paths import write_text_atomically
 from translucent.files.reading import read_text
 
-#: Bytes of a report: it holds pictures.
+#: Largest size of a report in bytes: it holds pictures.
 _LARGEST = 1 << 28
 
 #: Fields of a row that are dataclasses, one column for each of their fields.
@@ -26,7 +26,7 @@ def write_report(report: Report, path: Path) -> None:
 
 
 def read_report(path: Path) -> Report:
-    """The report of a file.
+    """Read the report of a file.
 
     Raises
     ------

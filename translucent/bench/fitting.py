@@ -1,4 +1,4 @@
-"""The best thickness that a shortcut could be told: of least squared error, for want of one that is right."""
+"""Fit of the thickness that a shortcut assumes, by least squared error."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.scene.scene import Scene
 
 
 def fitted(studio: Studio, contender: Contender, scene: Scene, truth: Frame, size: Size) -> tuple[Contender, float]:
-    """The contender with the thickness of least squared error, and that in metres.
+    """Contender with the thickness of least squared error, and that thickness in metres.
 
     Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t> over
     all pixels that truth or picture cover.

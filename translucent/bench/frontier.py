@@ -1,4 +1,4 @@
-"""Which methods of a case no other beats: neither slower nor less accurate than any (Pareto)."""
+"""Pareto frontier of a case: the methods that no other beats in both time and accuracy."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from translucent.bench.row import Quantity, Row
 
-#: Times closer than this are equal, as are those within `NOISES` standard errors: two runs differ by as much. A report
-#: compares some hundred pairs of rows of about the same time, of which chance takes five for different at two standard
-#: errors, and none at three.
+#: Factor within which times are equal, as are those within `NOISES` standard errors: two runs differ by as
+#: much. A report compares some hundred pairs of rows of about the same time, of which chance takes five for different
+#: at two standard errors, and none at three.
 TIME_MARGIN = 1.05
 NOISES = 3.0
 
-#: Errors closer than this are equal, as are all below `ERROR_FLOOR`: float32 of a path has no more to say.
+#: Factor within which errors are equal, as are all below `ERROR_FLOOR`: float32 of a path has no more to say.
 ERROR_MARGIN = 1.5
 ERROR_FLOOR = 1e-6
 
@@ -26,13 +26,13 @@ ROUNDING = 100 * float(np.finfo(np.float32).eps) / 2
 
 
 def error_of(row: Row, quantity: Quantity) -> float | None:
-    """By which methods are ranked: the root mean square error. None where there is none to trust."""
+    """Root mean square error, by which methods are ranked. None where there is none to trust."""
     errors = row.errors(quantity)
     return None if errors is None else errors.rms
 
 
 def mark_frontier(rows: Sequence[Row], quantity: Quantity) -> tuple[Row, ...]:
-    """The rows, each with `Row.pareto` set."""
+    """Mark the rows on the frontier by `Row.pareto`."""
     placed = [row for row in rows if _place(row, quantity) is not None]
     return tuple(
         dataclasses.replace(

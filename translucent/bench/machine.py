@@ -1,4 +1,4 @@
-"""Where numbers come from: machine, driver, versions, commit."""
+"""Provenance of numbers: machine, driver, versions, commit."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from translucent.bench.drawing import is_software
 from translucent.bench.record import Provenance
 from translucent.renderer import Renderer
 
-#: What results and times depend on.
+#: Packages on which results and times depend.
 PACKAGES = ("numpy", "moderngl", "scipy", "trimesh", "embreex")
 
-#: Of all random numbers: those of ray marching, which every frame starts anew.
+#: Seed of all random numbers: those of ray marching, which every frame starts anew.
 SEED = 0
 
 
 def provenance(renderer: Renderer, command: str, *, quick: bool) -> Provenance:
-    """Of a report that is begun now."""
+    """Provenance of a report that is begun now."""
     found = renderer.provenance
     commit, dirty = _commit(Path(__file__).parents[2])
     return Provenance(
@@ -53,7 +53,7 @@ def _versions() -> dict[str, str]:
 
 
 def _processor() -> str:
-    """The name of the CPU, as Linux tells it, or the best that others do."""
+    """Name of the CPU, from Linux, or as well as other systems tell it."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -1,4 +1,4 @@
-"""From a case to its record: every contender drawn, timed and held against the reference."""
+"""Measurement of a case: every contender drawn, timed and compared with the reference."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
-#: By which quantity the methods of a case are ranked.
+#: Quantity by which the methods of a case are ranked.
 QUANTITY: dict[str, Quantity] = {
     "absorption": "thickness",
     "sheet": "thickness",
@@ -39,7 +39,7 @@ QUANTITY: dict[str, Quantity] = {
 
 @dataclass
 class _Entry:
-    """A contender under way."""
+    """Contender under measurement."""
 
     contender: Contender
     row: Row
@@ -51,7 +51,7 @@ class _Entry:
 
 @dataclass
 class CaseRun:
-    """One case being measured.
+    """Measurement of one case.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class CaseRun:
     _entries: list[_Entry] = field(default_factory=list)
 
     def measure(self, contenders: Sequence[Contender]) -> CaseRecord:
-        """All rows and pictures of the case. What fails is a row with its reason; the rest goes on."""
+        """Measure all rows and pictures of the case. What fails is a row with its reason; the rest goes on."""
         case = self.case
         self.size = self.size[0] // case.shrink or 1, self.size[1] // case.shrink or 1
         blank = CaseRecord(case.name, case.title, case.why, QUANTITY[case.effect], size=self.size)
@@ -100,7 +100,7 @@ class CaseRun:
         return dataclasses.replace(blank, rows=rows, pictures=tuple(pictures))
 
     def _compared(self, contender: Contender, scene: Scene, truth: Truth, size: Size, case: CaseRecord) -> _Entry:
-        """Draw the contender once, small, and hold it against the reference."""
+        """Draw the contender once, small, and compare it with the reference."""
         seen = seen_by(contender, scene)
         row = Row(contender.name, contender.family, _parameters(contender), contender.kind, "", False)
         entry = _Entry(contender, row, seen)
@@ -170,13 +170,13 @@ class CaseRun:
 
 
 def scaled(size: Size, longest: int) -> Size:
-    """A size of the same shape, with no side longer than this."""
+    """Scale a size so that no side is longer than this."""
     share = min(1.0, longest / max(size))
     return max(1, round(size[0] * share)), max(1, round(size[1] * share))
 
 
 def one_line(error: Exception) -> str:
-    """An error as rows tell it."""
+    """One line of text for an error, as in rows."""
     text = str(error) if isinstance(error, TranslucentError) else f"{type(error).__name__}: {error}"
     return " ".join(text.split())
 
@@ -202,7 +202,7 @@ def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> Ca
 
 
 def _untrusted(scene: Scene) -> str:
-    """Why there is nothing to compare."""
+    """Reason why there is nothing to compare."""
     problems = [f"{body.mesh.name!r}: {'; '.join(body.mesh.diagnosis.problems)}" for body in scene.bodies]
     return (
         f"no pixel of the reference can be trusted; {', '.join(problems)}; close the mesh, or declare it a sheet"

@@ -1,4 +1,4 @@
-"""Models of the user as cases."""
+"""Cases from models of the user."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOOK: Size = (64, 64)
 
 
 def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
-    """A case for the scene of each model, by the name that the user gave.
+    """Cases for the scenes of models, by the names that the user gave.
 
     What is judged is what methods do differently: interfaces, which cost the same on top of each and have scenes of
     their own, are left out, and so is light that is scattered many times, which no method and no reference follows
@@ -45,7 +45,7 @@ def model_cases(scenes: Mapping[str, Scene]) -> list[Case]:
 
 
 def without_interfaces(scene: Scene) -> Scene:
-    """The scene with media that neither bend light nor have a surface; itself, if it has no others."""
+    """Scene without interfaces; itself, if it has none."""
     if not any(_has_interface(item) for item in scene.bodies):
         return scene
 
@@ -62,7 +62,7 @@ def _has_interface(item: Object) -> bool:
 
 
 def effect_of(scene: Scene) -> Effect:
-    """What the media of a scene do, which decides what is worth measuring."""
+    """Effect of the media of a scene, which decides what is worth measuring."""
     media = [body.medium for body in scene.bodies if body.medium is not None]
     if any(body.density is not None for body in scene.bodies):
         return "density"

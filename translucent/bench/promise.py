@@ -1,4 +1,4 @@
-"""What a contender promises on a scene: the planner's own words, or what the shortcut leaves out."""
+"""Promise of a contender on a scene: the planner's notes, or what the shortcut leaves out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from translucent.scene.scene import Object, Scene
 #: Light that a sum of one event each does not have; rows say so by their effect.
 _LIT = (NoteKind.SCATTERED_AGAIN,)
 
-#: What changes pictures, and leaves the thickness along straight rays as it is.
+#: Effects that change pictures, but not the thickness along straight rays.
 _BESIDE_THICKNESS = (
     *_LIT,
     NoteKind.LIGHTS_LEFT_OUT,
@@ -23,7 +23,7 @@ _BESIDE_THICKNESS = (
 
 
 def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
-    """What the row promises in that quantity, in words, and whether that is to be exact."""
+    """Promise of a row in a quantity, in words, and whether it is exact."""
     if contender.technique in ("constant", "ball"):
         return "none: the nearest face alone, with the best thickness that there is", False
     if contender.technique == "unmarked":
@@ -46,6 +46,6 @@ def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Q
 
 
 def _shines(body: Object) -> bool:
-    """Whether steps through the body add something up."""
+    """Whether steps through the body add up any light."""
     medium = body.medium
     return medium is not None and (medium.emits or medium.scatters or body.density is not None)

@@ -1,4 +1,4 @@
-"""What a report knows: frozen values, written to and read from ``report.json``. Pages are made from these alone."""
+"""Record of a report: immutable values, written to and read from ``report.json``. Pages are made from these alone."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Literal
 from translucent.bench.codec import Packed, decode, encode
 from translucent.bench.row import Quantity, Ratio, Row, Timing
 
-#: What a file of ours says that it is, and the version of the fields below. A change of meaning raises the version.
+#: Format name of a report's file, and the version of the fields below. A change of meaning raises the version.
 FORMAT, VERSION = "translucent report", 1
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where the numbers come from.
+    """Provenance of the numbers.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Picture:
-    """What one method shows, and how wrong that is; (h, w), row 0 at the top.
+    """Picture of one method with its errors; (h, w), row 0 at the top.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class CaseRecord:
-    """One scene with all methods.
+    """Record of a case: one scene with all methods.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class CaseRecord:
 
 @dataclass(frozen=True)
 class ScalePoint:
-    """One measurement of a series.
+    """Point of a series: one measurement.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class ScalePoint:
 
 @dataclass(frozen=True)
 class Series:
-    """How the cost of one method grows.
+    """Series of the cost of one method along an axis.
 
     Attributes
     ----------
@@ -183,7 +183,7 @@ class Series:
 
 @dataclass(frozen=True)
 class HardCase:
-    """One of H01 to H26.
+    """Record of one of the hard cases H01 to H26.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class HardCase:
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that the project says of itself, checked on these numbers.
+    """Claim of the project about itself, checked on these numbers.
 
     Attributes
     ----------
@@ -229,13 +229,13 @@ class Claim:
 
     @property
     def undecided(self) -> bool:
-        """Whether there are numbers, and noise leaves open what they say."""
+        """Whether there are numbers whose noise leaves the claim open."""
         return self.held is None and self.measured.startswith("undecided")
 
 
 @dataclass(frozen=True)
 class Report:
-    """All of a report.
+    """Complete report.
 
     Attributes
     ----------
@@ -258,7 +258,7 @@ class Report:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What could not be measured, a line each: ``case / method: why``. Refusals are answers, and not among them."""
+        """Failed measurements, a line each: ``case / method: why``. Refusals are answers, and not among them."""
         cases = [f"{case.name}: {case.failure}" for case in self.cases if case.failure]
         rows = [f"{case.name} / {row.method}: {row.failure}" for case in self.cases for row in case.rows if row.failure]
         points = [

@@ -1,4 +1,4 @@
-"""What a report knows of one method on one case.
+"""Row of a report: one method on one case.
 
 Times are milliseconds. Errors are result minus reference, on pixels whose 3 x 3 neighborhood crosses equally many
 surfaces and that the method calls valid: in thickness as shares of the diagonal of the scene's bounds, in transmittance
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-#: The quantity by which the methods of a case are ranked, and which its Pareto plot shows.
+#: Quantity by which the methods of a case are ranked, and which its Pareto plot shows.
 Quantity = Literal["thickness", "transmittance", "radiance"]
 
 #: A method of the public API, or a shortcut that others take, which the report draws for comparison only.
@@ -29,7 +29,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Ratio:
-    """Time as a multiple of the depth-only floor's.
+    """Ratio of a time to that of the depth-only floor.
 
     Each round measures the method between two floors, and their quotient is one sample: what disturbs the machine for
     longer than that cancels. With a software rasterizer, times in it are the processor's, of all threads.
@@ -49,7 +49,9 @@ class Ratio:
 
 @dataclass(frozen=True)
 class Errors:
-    """Of the absolute error: root mean square, median, percentiles, maximum. ``bias`` is the mean signed error."""
+    """Statistics of the absolute error: root mean square, median, percentiles, maximum. ``bias`` is the mean signed
+    error.
+    """
 
     rms: float
     median: float
@@ -61,7 +63,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class ColorDifference:
-    """By how much colors are off, in CIELAB 1976: median, 99.9th percentile and maximum.
+    """Statistics of the color difference in CIELAB 1976: median, 99.9th percentile and maximum.
 
     Of white light that has passed, where thickness ranks the methods; else of the radiance, as a screen shows it.
     """
@@ -73,7 +75,7 @@ class ColorDifference:
 
 @dataclass(frozen=True)
 class Row:
-    """One method on one case.
+    """Row: one method on one case.
 
     Attributes
     ----------
@@ -146,5 +148,5 @@ class Row:
     failure: str | None = None
 
     def errors(self, quantity: Quantity) -> Errors | None:
-        """The errors in one quantity."""
+        """Errors in one quantity."""
         return {"thickness": self.thickness, "transmittance": self.transmittance, "radiance": self.radiance}[quantity]

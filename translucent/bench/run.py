@@ -27,7 +27,7 @@ QUICK_SIZE: Size = (256, 256)
 
 @dataclasses.dataclass(frozen=True)
 class Effort:
-    """How long to measure.
+    """Effort of a measurement.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Effort:
 FULL = Effort(12.0, 2.5, 1.0)
 QUICK = Effort(1.2, 0.25, 0.6)
 
-#: Told what is being measured, and how many steps of how many are done.
+#: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]
 
 
@@ -159,7 +159,7 @@ def _measured(
 
 
 def _cpu_renderer(stack: ExitStack) -> Renderer | None:
-    """A renderer without OpenGL, where Embree can be loaded."""
+    """Renderer without OpenGL, if Embree can be loaded."""
     try:
         return stack.enter_context(Renderer("cpu"))
     except RenderError:

@@ -1,4 +1,4 @@
-"""How cost grows with triangles, pixels, layers and media."""
+"""Scaling of cost with triangles, pixels, layers and media."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from translucent.scene.showcase import framing, showcase
 
 Axis = Literal["triangles", "pixels", "layers", "media"]
 
-#: What is measured along all axes, by family.
+#: Contenders along all axes, by family.
 METHODS: dict[str, Method] = {
     "SignedDepth": SignedDepth(),
     "FragmentLists": FragmentLists(),
@@ -43,7 +43,7 @@ SCREENS: tuple[Size, ...] = ((1920, 1080), (3840, 2160))
 
 @dataclass(frozen=True)
 class Ladder:
-    """One axis: what is drawn at each x.
+    """Ladder: the scenes along one axis.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Ladder:
 
 @dataclass
 class ScalingRun:
-    """All ladders, a step at a time.
+    """Measurement of all ladders, a step at a time.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class ScalingRun:
     _points: dict[tuple[Axis, str], list[ScalePoint]] = field(default_factory=dict)
 
     def ladders(self) -> list[Ladder]:
-        """What is to be measured on this machine."""
+        """Ladders to be measured on this machine."""
         ladders = _ladders(is_software(self.studio.renderer))
         return [_thinned(ladder) for ladder in ladders] if self.quick else ladders
 
@@ -143,7 +143,7 @@ class ScalingRun:
 
 
 def _label(method: Method) -> str:
-    """As the row of the method is called."""
+    """Label of the method, as in its row."""
     return next((row.name for row in CONTENDERS if row.method == method), type(method).__name__)
 
 
@@ -189,7 +189,7 @@ def _plates(layers: int) -> Callable[[], tuple[Scene, Size]]:
 
 
 def _media(count: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
-    """16 balls, and as many media as asked for."""
+    """Scene of 16 balls with as many media as asked for."""
 
     def make() -> tuple[Scene, Size]:
         ball = Sphere(radius=0.6).tessellate(80)

@@ -1,4 +1,4 @@
-"""Whether anybody would see that a method is wrong: differences of color in CIELAB, and what they mean in words."""
+"""Visibility of errors: color differences in CIELAB, and their meaning in words."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def lab(linear: npt.ArrayLike) -> Array:
 
 @np.errstate(under="ignore")
 def color_difference(shown: npt.ArrayLike, right: npt.ArrayLike) -> ColorDifference:
-    """Of linear colors (n, 3), one or more: Euclidean distances in CIELAB, as the CIE had them in 1976."""
+    """Color difference of linear colors (n, 3), one or more: Euclidean distances in CIELAB 1976."""
     distance = np.linalg.norm(lab(shown) - lab(right), axis=-1)
     median, p999 = np.quantile(distance, (0.5, 0.999))
     return ColorDifference(float(median), float(p999), float(distance.max()))
 
 
 def seen_words(row: Row) -> str:
-    """Whether the difference from the truth would be seen; nothing where that was not measured."""
+    """Words on whether the difference from the truth is visible; empty where it was not measured."""
     found = row.color_difference
     if found is None:
         return ""

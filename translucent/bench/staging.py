@@ -1,4 +1,4 @@
-"""What is drawn of a contender: the scene as it sees it, its plan, and its frame, ready to be drawn."""
+"""Staging of a contender: its variant of the scene, its plan, and its frame, ready to be drawn."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from translucent.scene.scene import Object, Scene
 
 
 def seen_by(contender: Contender, scene: Scene) -> Scene:
-    """The scene with the index of refraction that the contender wants."""
+    """Scene with the contender's index of refraction."""
     if contender.ior is None:
         return scene
 
@@ -41,7 +41,7 @@ def drawing(
     size: float,
     cpu: Renderer | None,
 ) -> Drawing:
-    """The contender's frame, ready to be drawn; `size` is the thickness that a shortcut assumes, in metres."""
+    """Drawing of a contender, ready to be drawn; `size` is the thickness that a shortcut assumes, in metres."""
     if contender.technique in ("cpu", "march"):
         assert cpu is not None, "there is a plan for it"
         # What the reference marches by is `RayMarched`, as it checks.
@@ -60,7 +60,7 @@ def drawing(
 
 
 def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | None = None) -> RenderPlan:
-    """What runs, or what lends a shortcut its shading; raises `InputError` where the planner refuses."""
+    """Plan of a contender, or the one that shades a shortcut; raises `InputError` if the planner refuses."""
     if contender.technique in ("cpu", "march"):
         if cpu is None:
             raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")

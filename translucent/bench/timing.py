@@ -1,4 +1,4 @@
-"""Interleaved timing on a machine that others use, too.
+"""Interleaved timing on a shared machine.
 
 All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
 a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
@@ -29,7 +29,7 @@ FLOOR_SHARE, MOST_FLOORS = 0.3, 10
 
 
 class Sample(NamedTuple):
-    """Seconds of one drawing.
+    """Sample: seconds of one drawing.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Sample(NamedTuple):
 
 @dataclass
 class Samples:
-    """What the rounds of one drawing have given, in seconds.
+    """Samples of one drawing over the rounds, in seconds.
 
     Attributes
     ----------
@@ -70,11 +70,11 @@ class Samples:
 
     @property
     def spent(self) -> float:
-        """Seconds so far."""
+        """Total time in seconds so far."""
         return sum(self.frame) + sum(self.floor_wall)
 
     def add(self, sample: Sample, floor: float, floor_wall: float) -> None:
-        """Keep one more."""
+        """Add a sample."""
         for values, value in zip(
             (self.wall, self.frame, self.part, self.whole, self.floor, self.floor_wall),
             (sample.wall, sample.frame, sample.part, sample.whole, floor, floor_wall),
@@ -91,7 +91,7 @@ def interleaved(
     seconds: float,
     failed: Callable[[str, Exception], None],
 ) -> dict[str, Samples]:
-    """Measure all, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
+    """Measure all drawings, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
 
     What raises is left out of the other rounds, and `failed` hears of it.
     """
@@ -118,7 +118,7 @@ def interleaved(
 
 
 def _warm_up(name: str, draw: Callable[[], Sample], seconds: float, failed: Callable[[str, Exception], None]) -> bool:
-    """Draw for so long, at least once: shaders compile, buffers grow, caches fill."""
+    """Warm up for some seconds, with at least one draw: shaders compile, buffers grow, caches fill."""
     begin = time.perf_counter()
     try:
         draw()
@@ -145,7 +145,7 @@ def _enough(samples: Samples, share: float) -> bool:
 
 
 def timing(seconds: list[float]) -> Timing | None:
-    """Statistics in milliseconds; None of nothing."""
+    """Statistics in milliseconds; None without samples."""
     if not seconds:
         return None
     low, median, high, p95 = np.quantile(np.array(seconds) * 1e3, (0.25, 0.5, 0.75, 0.95))
@@ -153,7 +153,7 @@ def timing(seconds: list[float]) -> Timing | None:
 
 
 def ratio(seconds: list[float], floor: list[float]) -> Ratio | None:
-    """Statistics of the quotients of rounds."""
+    """Statistics of the ratios of rounds."""
     if not seconds:
         return None
     quotients: npt.NDArray[np.float64] = np.array(seconds) / np.array(floor)

@@ -1,4 +1,4 @@
-"""What all contenders of a case are held against, and how far a frame is from it."""
+"""Ground truth of a case, and errors of frames against it."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
 from translucent.scene.scene import Scene
 
-#: Reflections that the reference follows where interfaces bend rays; what it leaves then is below the errors shown.
+#: Number of reflections that the reference follows at interfaces; what it leaves then is below the errors shown.
 BOUNCES = 12
 
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
 
 
-#: Radiance below which a picture is black, and errors are no shares of it.
+#: Radiance below which a picture is black, and relative errors are meaningless.
 DARK = 1e-6
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What all are held against.
+    """Ground truth of a case.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Truth:
 
     @classmethod
     def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
-        """Trace the scene."""
+        """Trace the ground truth of a scene."""
         begin = time.perf_counter()
         frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES)
         seconds = time.perf_counter() - begin
@@ -78,7 +78,7 @@ class Truth:
         return self.inside & self.frame.coverage & self.frame.valid
 
     def scale(self, quantity: Quantity) -> float:
-        """What errors in that quantity are shares of."""
+        """Scale of errors in a quantity, of which they are shares."""
         if quantity == "radiance":
             with np.errstate(under="ignore"):
                 rms = float(np.sqrt(np.mean(self.frame.radiance[self.compared] ** 2)))
@@ -96,7 +96,7 @@ class Truth:
         return Errors(**values), found.invalid, found.coverage_mismatch
 
     def color_difference(self, frame: Frame, quantity: Quantity) -> ColorDifference | None:
-        """What anybody could see of the errors of a frame; None where there is no pixel to compare."""
+        """Visible color difference of a frame; None if there is no pixel to compare."""
         used = self.compared & frame.coverage & frame.valid
         if not used.any():
             return None
@@ -104,7 +104,7 @@ class Truth:
         return color_difference(getattr(frame, shown)[used], getattr(self.frame, shown)[used])
 
     def picture(self, method: str, frame: Frame, quantity: Quantity) -> Picture:
-        """The picture of a frame with its errors; the reference has none."""
+        """Picture of a frame with its errors; the reference has none."""
         stream = io.BytesIO()
         Image.fromarray(frame.to_srgb8()).save(stream, format="PNG", optimize=True)
         png = base64.b64encode(stream.getvalue()).decode("ascii")

@@ -117,7 +117,7 @@ def _progress(label: str) -> Iterator[Progress | None]:
 
 
 def _lines(record: Record, told: Record) -> Iterator[str]:
-    """What a bake was, for people."""
+    """Lines of text about a bake."""
     from translucent.bake.record import parts_of
 
     parts = parts_of(record)
@@ -196,7 +196,7 @@ def _bake_many(
 
 
 def _wanted(files: list[tuple[str, Path]], given: dict[str, Any]) -> tuple[list[Job], list[Record]]:
-    """The jobs of the models, and the entries of those whose name is that of nothing."""
+    """Jobs of the models, and entries of those that do not exist."""
     from translucent.bake.batch import failed_entry
 
     wanted, nothing = [], []
@@ -211,7 +211,9 @@ def _wanted(files: list[tuple[str, Path]], given: dict[str, Any]) -> tuple[list[
 
 
 def _teller(assets: list[Record], as_json: bool) -> Callable[[Record], None]:
-    """Prints a line for each asset when it is done, with the time left; not between the lines of a JSON result."""
+    """Callback that prints a line for each asset when it is done, with the time left; not between the lines of a JSON
+    result.
+    """
     from translucent.bake.batch import asset_line
 
     width = max(len(Path(asset["model"]).name) for asset in assets)

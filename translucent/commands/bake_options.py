@@ -86,7 +86,7 @@ def bake_options(command: F) -> F:
 
 
 def read_job(model: str, output: Path, given: dict[str, Any]) -> Job:
-    """The job of a model: what the options ask for.
+    """Job of a model, from the options.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _read_share(name: str, text: str) -> float:
 
 
 def _read_length(name: str, text: str, unit: str) -> float | str:
-    """Metres, or a share as it was given, which depends on the mesh."""
+    """Length in metres, or a share as given, which depends on the mesh."""
     from translucent.units import parse_length
 
     if text.strip().endswith("%"):

@@ -1,4 +1,4 @@
-"""What the verbs share: options, and reading what they were given."""
+"""Shared options of the verbs, and readers of their values."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from translucent.planning.methods import Method
     from translucent.scene.environment import Environment
 
-#: Of tone curves, as in `translucent.formulas.tone.TONES`, which only rendering imports.
+#: Names of tone curves, as in `translucent.formulas.tone.TONES`, which only rendering imports.
 TONE_NAMES = ("none", "neutral", "agx")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: Under which a verb finds whether it may replace what it reads.
+#: Key under which a verb finds whether it may replace a file that it reads.
 _OVERWRITE = "translucent.overwrite"
 
 
@@ -79,7 +79,7 @@ def overwrite_option(command: F) -> F:
 
 
 def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
-    """Raise where a verb would replace a file that it reads, under whatever name, unless it is told to.
+    """Raise if a verb would replace a file that it reads, under whatever name, unless overwriting is allowed.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def interfaces_option(command: F) -> F:
 def read_medium(
     color: str | None, distance: str | None, preset_name: str | None, clamp: bool | None = None
 ) -> Medium | None:
-    """The medium that the options choose, if they do."""
+    """Medium that the options choose, if any."""
     from translucent.media.medium import Medium
     from translucent.media.presets import preset
     from translucent.units import parse_length
@@ -168,7 +168,7 @@ def read_medium(
 
 
 def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
-    """The color without channels that are too dark, and a line for the user where there were any."""
+    """Clamp channels of a color that are too dark, with a warning if there were any."""
     from translucent.media.colors import parse_color
     from translucent.media.conversion import CLAMP, clamp_colors
 
@@ -199,7 +199,7 @@ def method_option(command: F) -> F:
 
 
 def read_method(name: str | None, thickness: str | None) -> Method | None:
-    """The thickness method of this name, if there is one."""
+    """Thickness method of this name, if one is given."""
     from translucent.planning.methods import METHODS, method_from_name
     from translucent.units import parse_length
 
@@ -242,7 +242,7 @@ def look_options(command: F) -> F:
 
 
 def read_environment(name: str | None, background: str | None) -> Environment | None:
-    """What the options name; None if they name nothing."""
+    """Environment that the options name; None if they name none."""
     from translucent.scene.showcase import LIGHT_TABLE
 
     if background is None:
@@ -265,7 +265,7 @@ def _environment(text: str) -> Environment:
 
 
 def read_size(text: str) -> tuple[int, int]:
-    """Width and height of an option."""
+    """Width and height from an option's value."""
     from translucent.scene.camera import check_size
 
     try:

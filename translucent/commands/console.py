@@ -1,4 +1,4 @@
-"""The one way out to the terminal: no name in a file commands it, and no line but the toolkit's own has colors."""
+"""Output to the terminal: control characters from files are escaped, and only the toolkit's own lines have colors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import click
 
 from translucent.errors import printable
 
-#: Ends of lines, tabs, and swatches such as those of `translucent.media.swatches`.
+#: Printable sequences: ends of lines, tabs, and swatches such as those of `translucent.media.swatches`.
 _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 

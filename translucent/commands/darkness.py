@@ -1,4 +1,4 @@
-"""Why a picture is black, in words: a file whose unit is not what it was taken for, or a medium too dense for it."""
+"""Explanations of black pictures: a wrong unit of a file, or a medium too dense for it."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 #: Below these shares of light, passed straight or scattered back, a picture shows little but black.
 NEARLY_BLACK, HARDLY_LIT = 0.02, 0.05
 
-#: Of light that passes, what makes a picture that shows its medium.
+#: Range of the share of light that passes in a picture that shows its medium.
 SHOWS_MEDIUM = (0.05, 0.97)
 
 #: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.
 LARGE, USUAL = 0.5, (0.01, 1.0)
 
-#: Units that files are in, and what they are called.
+#: Units of files, and their names.
 _FILE_UNITS = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}
 
 
 def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> None:
-    """Say so where hardly any light passes, or is scattered back, and what may be the reason.
+    """Warn if hardly any light passes or is scattered back, with the likely reason.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def warn_if_black(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -
 
 
 def _other_unit(size: np.ndarray, depth: np.ndarray, unit: str, own: bool) -> str:
-    """The unit in which the model would be of a usual size, and the medium would show; nothing if there is none."""
+    """Unit in which the model would have a usual size, and the medium would show; empty if there is none."""
     if own or size.max() < LARGE:
         return ""
     for name, words in _FILE_UNITS.items():
@@ -79,13 +79,13 @@ def _other_unit(size: np.ndarray, depth: np.ndarray, unit: str, own: bool) -> st
 
 
 def _clearer(depth: float) -> str:
-    """By how much the medium would have to be clearer, where its clearest channel is so deep."""
+    """Factor by which the medium would have to be clearer, for the optical depth of its clearest channel."""
     times = float(f"{depth / math.log(5.0):.2g}")
     return f"in a medium {times:.3g} times as clear (a color at a --distance so much longer), a fifth would pass"
 
 
 def _media(scene: Scene) -> list[Medium]:
-    """Those that give back what they scatter many times."""
+    """Media in which multiple scattering matters."""
     return [
         body.medium
         for body in scene.bodies
@@ -94,7 +94,7 @@ def _media(scene: Scene) -> list[Medium]:
 
 
 def _given_back(scene: Scene, medium: Medium) -> float:
-    """Luminance of what a body as large as the scene gives back of white light."""
+    """Luminance of white light scattered back by a body as large as the scene."""
     from translucent.formulas.color import luminance
     from translucent.formulas.two_stream import two_stream_absorption, two_stream_reflectance, two_stream_scattering
 
@@ -114,7 +114,7 @@ def _length(metres: float) -> str:
 
 
 def _unit(metres: float) -> tuple[str, float]:
-    """In which a length is read best."""
+    """Unit in which a length is read best."""
     return next(
         ((name, METRES_PER_UNIT[name]) for name in ("m", "cm", "mm") if metres >= METRES_PER_UNIT[name]), ("um", 1e-6)
     )

@@ -136,7 +136,7 @@ def _convert(
     unit_out: str,
     clamp: bool,
 ) -> tuple[dict[str, Any], Medium]:
-    """What there is to say of a medium: a given one, one for a color at a distance, or one for a color on a model."""
+    """Facts about a medium: a given one, one for a color at a distance, or one for a color on a model."""
     import numpy as np
 
     from translucent.frames.appearance import medium_for_average_color, thickness_samples

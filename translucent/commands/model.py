@@ -1,4 +1,4 @@
-"""From MODEL and the options of a verb to a scene."""
+"""Scenes from MODEL and the options of a verb."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from translucent.scene.environment import Environment
     from translucent.scene.scene import Object, Scene
 
-#: Of a camera that options place, and that no option says otherwise of.
+#: Default field of view in degrees, and up vector, of a camera that options place.
 DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
 
 
@@ -122,7 +122,7 @@ def mesh_file(model: str, unit: str) -> str:
 
 
 def _placed_camera(scene: Scene, view: View, size: tuple[int, int]) -> Camera:
-    """The camera that the options place, or that frames all objects as they say."""
+    """Camera that the options place, or that frames all objects as they say."""
     from translucent.scene.camera import Camera
     from translucent.scene.showcase import framing
 
@@ -136,7 +136,7 @@ def _placed_camera(scene: Scene, view: View, size: tuple[int, int]) -> Camera:
 
 
 def read_vector(option: str, text: str) -> list[float]:
-    """Three numbers of an option."""
+    """Vector from an option's three numbers."""
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
@@ -147,7 +147,7 @@ def read_vector(option: str, text: str) -> list[float]:
 
 
 def medium_lines(scene: Scene) -> list[str]:
-    """What the translucent objects of a scene are filled with, and how light fares in it; a line per medium.
+    """Lines about the media of a scene's translucent objects, one per medium.
 
     Layers, which nothing fills, are not among them.
     """

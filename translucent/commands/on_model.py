@@ -29,14 +29,14 @@ def thickness_on(model: str, unit: str, eye: str | None, allow_outside: bool = F
 
 
 def told_on(model: str, frame: Frame, medium: Medium) -> dict[str, Any]:
-    """How a medium looks on a model, as JSON can hold it."""
+    """Appearance of a medium on a model as values that JSON can hold."""
     from translucent.frames.appearance import appearance_of
 
     return {"model": model, **appearance_of(frame, medium).summary()}
 
 
 def doubts_on(told: dict[str, Any]) -> list[str]:
-    """What an artist should know about an average color: channels that next to nothing of the model shows."""
+    """Warnings about an average color: channels that next to nothing of the model shows."""
     return [
         f"the average {name} is made by the edges: {share:.0%} of it comes from the thinnest 5 % of the pixels"
         for name, share in zip(("red", "green", "blue"), told["thin_share"], strict=True)

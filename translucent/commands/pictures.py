@@ -1,4 +1,4 @@
-"""Where the frames of ``translucent render`` go: one file, pictures of the quantities, or a turntable."""
+"""Output of ``translucent render``: one file, pictures of the quantities, or a turntable."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Pictures(NamedTuple):
     aov: Path | None
 
     def check(self) -> None:
-        """Raise before any work is done where they could not be written."""
+        """Raise before any work is done if they could not be written."""
         from translucent.files.paths import require_folder
         from translucent.frames.animation import check_animation
         from translucent.frames.frame import check_exposure
@@ -47,7 +47,7 @@ class Pictures(NamedTuple):
             raise InputError(f"--turntable {self.turntable}", "--aov is given, too", "render one picture for it")
 
     def write(self, scene: Scene, draw: Callable[[Scene], Frame]) -> Frame:
-        """Draw and write all of them; the first frame."""
+        """Draw and write all of them; returns the first frame."""
         if self.turntable is not None:
             return self._write_turntable(scene, draw, self.turntable)
         frame = draw(scene)

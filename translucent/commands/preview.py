@@ -77,7 +77,7 @@ def preview(
 
 
 def _script_error(failure: Exception) -> TranslucentError:
-    """What a script fails by: what its first action that failed says, or that it is a defect."""
+    """Error of a script: that of its first failed action, or a defect."""
     from translucent.preview.tasks import problem
 
     return failure if isinstance(failure, TranslucentError) else RenderError(problem(failure))

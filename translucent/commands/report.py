@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from translucent.bench.record import CaseRecord, Report
     from translucent.media.medium import Medium
 
-#: How the names of the cases begin that users bring.
+#: Prefix of the names of cases from users' models.
 MODEL_CASE = "model "
 
 PATH = click.Path(path_type=Path)
@@ -163,7 +163,7 @@ def _measured(
 
 
 def _command(given: dict[str, Any]) -> str:
-    """What the user wrote, as far as it says what was measured."""
+    """Command line of the user, as far as it tells what was measured."""
     words = ["translucent", "report", *given["models"]]
     options = {"-o": "output", "--size": "size", "--methods": "methods", "--backend": "backend"}
     options |= {"--color": "color", "--distance": "distance", "--preset": "preset_name"}
@@ -175,7 +175,7 @@ def _command(given: dict[str, Any]) -> str:
 
 
 def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
-    """What happened, in numbers that JSON can hold; ``report.json`` has all of it."""
+    """Summary of a report as values that JSON can hold; ``report.json`` has all of it."""
     return {
         "files": [str(path) for path in files],
         "complete": made.complete,
@@ -211,7 +211,7 @@ def _answer(case: CaseRecord) -> dict[str, Any]:
 
 
 def _tell_seen(answer: dict[str, Any]) -> None:
-    """What an artist's eye would make of the difference, in the model's own medium."""
+    """Print whether the difference is visible, in the model's own medium."""
     if answer["seen"]:
         echo(f"  with it, {answer['seen']}")
     if answer["cheaper_seen"]:

@@ -50,7 +50,7 @@ def _list(as_json: bool) -> None:
 
 
 def _define(text: str) -> tuple[str, int]:
-    """A switch and its value; one that is only named is on."""
+    """Parse a switch and its value; one without a value is on."""
     key, equals, value = text.partition("=")
     if not (key.isidentifier() and (value.isdecimal() if equals else True)):
         raise InputError(f"--define {text!r}", "not a name with a whole number", "write for example --define OPAQUE=0")

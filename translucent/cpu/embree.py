@@ -1,4 +1,4 @@
-"""Faces that rays probably meet, from Embree, in float32."""
+"""Candidate faces of rays from Embree, in float32."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from embreex.rtcore_scene import EmbreeScene
 
 
-#: How far behind a face the search for the next one begins, in radii of the mesh: nearer, float32 finds it again.
+#: Step behind a face at which the search for the next one begins, in radii of the mesh: nearer, float32 finds it again.
 STEP = 2e-6
 
-#: A search begins this far before the middle of the mesh, in radii.
+#: Distance before the middle of the mesh at which a search begins, in radii.
 BEFORE = 1.01
 
 
 class EmbreeMesh:
-    """A mesh in an Embree scene of its own, moved and scaled into the unit ball.
+    """Mesh in an Embree scene of its own, moved and scaled into the unit ball.
 
     Parameters
     ----------

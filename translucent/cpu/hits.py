@@ -1,4 +1,4 @@
-"""All surfaces of a mesh on the pixel rays: found by Embree, decided in float64, and proved to be all.
+"""Complete intersections of pixel rays with a mesh: found by Embree, decided in float64, and proved complete.
 
 The result is that of `translucent.reference.line_hits`, to the last bit.
 """
@@ -25,7 +25,7 @@ from translucent.scene.scene import Object
 
 @dataclass(frozen=True, eq=False)
 class TracedMesh:
-    """What rays need of a mesh, whoever looks at it."""
+    """Mesh prepared for ray tracing, independent of the camera."""
 
     embree: EmbreeMesh
     edges: Edges
@@ -37,7 +37,7 @@ class TracedMesh:
 
 
 class Tracer:
-    """Finds all surfaces of one object in one picture. Any number of threads may ask at once.
+    """Tracer of all surfaces of one object in one picture. Any number of threads may ask at once.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Tracer:
         return both.where(np.argsort(both.pixel, kind="stable"))
 
     def search(self, band: Band) -> tuple[Hits, Mask]:
-        """What Embree finds, decided in float64, and (pixels,): rays on which that is not proved to be all."""
+        """Hits that Embree finds, decided in float64, and (pixels,): rays whose hits are not proved complete."""
         expected, incomplete = self._outline.counts(band)
         pixel = np.flatnonzero((expected > 0) & ~incomplete)
         passing = self._view.passing

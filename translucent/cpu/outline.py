@@ -1,4 +1,4 @@
-"""How many surfaces each pixel sees, from the outline of a mesh alone.
+"""Number of surfaces on each pixel's ray, from the outline of a mesh alone.
 
 In the picture every face is a triangle, and the number of faces over a pixel is the sum of their winding numbers around
 it, those of faces that appear counter-clockwise counted negatively. Along an edge between two faces that both appear
@@ -18,7 +18,7 @@ from translucent.cpu.picture import Band
 from translucent.cpu.view import View, expand, slices
 from translucent.geometry.mesh import Mesh
 
-#: Positions in the picture round by less than this share of their size, by far: doubt costs time, and errors surfaces.
+#: Generous bound of the relative rounding of positions in the picture: doubt costs time, and errors lose surfaces.
 ROUNDING = 1e-11
 
 #: Pairs of an edge and a row that are handled at a time: the working arrays stay below 10 MB.
@@ -27,7 +27,7 @@ CROSSINGS = 1 << 16
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges of a mesh, each once.
+    """Unique edges of a mesh.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Edges:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Edges across which the number of faces changes.
+    """Outline of a mesh: edges across which the number of faces changes.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Outline:
 
     @classmethod
     def of(cls, view: View, edges: Edges) -> Outline:
-        """The outline of what `view` shows, without the faces that pass the eye."""
+        """Outline of the object in `view`, without the faces that pass the eye."""
         a, b, c = view.projected[view.body.mesh.faces].transpose(1, 2, 0)
         with np.errstate(under="ignore"):
             clockwise = np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).astype(np.int8)
@@ -86,7 +86,9 @@ class Outline:
         return cls(start, end, np.where(upwards, net[chosen], -net[chosen]))
 
     def counts(self, band: Band) -> tuple[Integers, Mask]:
-        """(pixels,), (pixels,): how many faces are over each pixel, and where that is in doubt, next to the outline."""
+        """(pixels,), (pixels,): number of faces over each pixel, and mask of pixels next to the outline, where it is in
+        doubt.
+        """
         tolerance = ROUNDING * (band.width + np.abs(self.start).max(axis=1) + np.abs(self.end).max(axis=1))
         past = band.first_row + band.rows
         first = np.ceil(np.clip(self.start[:, 1] - tolerance, band.first_row, past)).astype(np.int64)

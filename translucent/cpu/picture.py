@@ -12,7 +12,7 @@ from translucent.reference.hits import PictureGrid
 from translucent.reference.rays import Rays
 from translucent.scene.camera import Camera, check_size
 
-#: Pixels of a band: so many that Python's own time does not count, so few that the working arrays stay below 50 MB.
+#: Pixels of a band: enough to hide Python's own time, few enough that the working arrays stay below 50 MB.
 BAND = 1 << 15
 
 #: Rows of a band: of a narrow picture, too, an edge must not cross too many at a time.
@@ -34,13 +34,13 @@ class Band:
 
     @property
     def pixels(self) -> int:
-        """How many there are."""
+        """Number of pixels."""
         return self.rows * self.width
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Where the rays of a camera pass.
+    """Picture plane: positions of the rays of a camera.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Picture:
 
     @classmethod
     def of(cls, camera: Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> Picture:
-        """The picture that a camera takes; raises `InputError` where the size is not one."""
+        """Picture of a camera; raises `InputError` if the size is invalid."""
         centered = PictureGrid.of(camera, check_size(size))
         return cls(camera, size, offset, PictureGrid(centered.center - offset, centered.scale))
 
@@ -70,14 +70,14 @@ class Picture:
         return self.camera.fov_y is not None
 
     def bands(self) -> Iterator[Band]:
-        """The picture from top to bottom."""
+        """Bands of the picture from top to bottom."""
         width, height = self.size
         rows = min(max(BAND // width, 1), BAND_ROWS)
         for first in range(0, height, rows):
             yield Band(first, min(rows, height - first), width)
 
     def points(self, band: Band, pixel: Integers) -> Array:
-        """(k, 2): where the rays of pixels (k,) pass the picture's plane, right and up."""
+        """(k, 2): positions of the rays of pixels (k,) in the picture's plane, right and up."""
         row, column = np.divmod(pixel, band.width)
         return self.grid.points(row + band.first_row, column)
 

@@ -33,7 +33,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 class CpuRenderer:
-    """Renders scenes on the processors: the shading of the reference, on its exact hits, which Embree finds quickly.
+    """Renderer on the processors: the shading of the reference, on its exact hits, which Embree finds quickly.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class CpuRenderer:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the planner may count on."""
+        """Capabilities of this renderer for the planner."""
         return Capabilities(shader_storage=False, opengl=False, scattering=False)
 
     def render(self, scene: Scene, size: tuple[int, int], plan: RenderPlan, samples: int) -> Frame:
@@ -104,12 +104,12 @@ class CpuRenderer:
         return Frame(**arrays, plan=plan, seconds=seconds, provenance=self.provenance)
 
     def close(self) -> None:
-        """Free what is kept of the meshes. Closing twice is fine."""
+        """Free the cached meshes. Closing twice is fine."""
         self._closed = True
         self._meshes.clear()
 
     def _draw(self, shader: Shader, picture: Picture, keep: Callable[[Band, Arrays], None]) -> Seconds:
-        """Shade a picture, and let `keep` have each band of it; what that takes."""
+        """Shade a picture, and pass each band of it to `keep`; returns the seconds of each part."""
         started = time.perf_counter()
         objects = shader.scene.objects
         for body in objects:
@@ -130,7 +130,7 @@ class CpuRenderer:
 
 
 def _empty(size: tuple[int, int]) -> Arrays:
-    """The arrays of a frame, not filled yet."""
+    """Uninitialized arrays of a frame."""
     shape = size[::-1]
     arrays: Arrays = {name: np.empty((*shape, 3), dtype=np.float32) for name in _COLORS}
     arrays["thickness"] = np.empty(shape, dtype=np.float32)
@@ -139,7 +139,7 @@ def _empty(size: tuple[int, int]) -> Arrays:
 
 
 def _store(arrays: Arrays, band: Band, shaded: Arrays) -> None:
-    """Put a band where it belongs."""
+    """Store a band in the arrays of a frame."""
     for name, array in arrays.items():
         part = _part(array, band)
         values = shaded[name].reshape(part.shape)
@@ -148,7 +148,7 @@ def _store(arrays: Arrays, band: Band, shaded: Arrays) -> None:
 
 
 def _average(arrays: Arrays, number: int, band: Band, shaded: Arrays) -> None:
-    """Let the sample of this number, from 1, count in the means of those that are averaged."""
+    """Add the sample of this number, from 1, to the means of the averaged arrays."""
     for name in ("radiance", "transmittance"):
         mean = _part(arrays[name], band)
         # The first one takes the place of the pixel center.

@@ -1,4 +1,4 @@
-"""What a band of a picture shows: the shading of the reference, in pieces that fit into memory."""
+"""Shading of a band of a picture: that of the reference, in pieces that fit into memory."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Sheets = tuple[float | None, ...]
 #: Surfaces, times objects, that are shaded at a time: the working arrays stay below 100 MB.
 SURFACES = 1 << 21
 
-#: What the fallback tells of a pixel that is not valid; that it is not, and what covers it, is known already.
+#: Arrays that an invalid pixel takes from the fallback; its validity and coverage are known already.
 SHOWN = ("radiance", "transmittance", "optical_depth", "thickness")
 
 
 @dataclass(frozen=True, eq=False)
 class Shader:
-    """Turns hits into the arrays of a frame.
+    """Shader of hits, which gives the arrays of a frame.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Shader:
 
     @classmethod
     def of(cls, scene: Scene, plan: RenderPlan) -> Shader:
-        """As a plan of the scene wants it."""
+        """Shader for a plan of the scene."""
         sheets = sheet_thicknesses(scene, plan.method)
         drawn = {i for step in plan.passes if step.name is PassName.THIN_LAYER_FALLBACK for i in step.objects}
         diagonals = [float(np.linalg.norm(body.bounds[1] - body.bounds[0])) for body in scene.objects]
@@ -57,7 +57,7 @@ class Shader:
         return cls(scene, sheets, fallback if drawn else None)
 
     def shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
-        """The arrays of a frame for some rays, (n,) or (n, 3), float64 and bool.
+        """Shade some rays into the arrays of a frame, (n,) or (n, 3), float64 and bool.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class Shader:
 
 
 def _on_rays(hits: Hits, chosen: Integers, rays: int) -> Hits:
-    """The hits on `chosen` of so many rays, these numbered anew."""
+    """Hits on the `chosen` rays, with the rays renumbered."""
     number = np.full(rays, -1)
     number[chosen] = np.arange(len(chosen))
     kept = hits.where(number[hits.pixel] >= 0)

@@ -1,4 +1,4 @@
-"""Work on all processors: NumPy and Embree let other threads run while they count."""
+"""Thread pool on all processors: NumPy and Embree release the interpreter lock while they compute."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Result = TypeVar("Result")
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

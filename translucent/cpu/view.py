@@ -1,4 +1,4 @@
-"""A mesh as the pixels of a picture see it, in the float64 geometry of the reference."""
+"""Projection of a mesh into a picture, in the float64 geometry of the reference."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from translucent.scene.scene import Object
 
 _Pairs = tuple[Integers, Integers]
 
-#: A vertex farther to the side of the eye than this many times its depth is too near to the eye's plane to project.
+#: Largest ratio of sideways distance to depth of a vertex that is projected; beyond, it is too near the eye's plane.
 STEEPEST = 1e6
 
 #: Pairs of a pixel and a face that are decided at a time: the working arrays stay in the processor's cache.
@@ -24,14 +24,14 @@ PAIRS = 1 << 13
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One object in one picture."""
+    """Projection of one object into one picture."""
 
     body: Object
     picture: Picture
 
     @cached_property
     def vertices(self) -> Array:
-        """(n, 3): right of, above and in front of the eye, in metres."""
+        """(n, 3): vertices right of, above and in front of the eye, in metres."""
         return camera_vertices(self.body.mesh, self.body.matrix, self.picture.camera)
 
     @cached_property
@@ -41,7 +41,7 @@ class View:
 
     @cached_property
     def weight(self) -> Array:
-        """(m, 3): what divides the corners' positions in the picture."""
+        """(m, 3): perspective divisors of the corners."""
         return self.corners[..., 2] if self.picture.perspective else np.ones(self.corners.shape[:2])
 
     @cached_property
@@ -59,18 +59,18 @@ class View:
 
     @cached_property
     def any_passing(self) -> bool:
-        """Whether there are such faces."""
+        """Whether any faces are `passing`."""
         return bool(self.passing.any())
 
     @cached_property
     def projected(self) -> Array:
-        """(n, 2): column and row of the vertices; of those `beside` the eye they mean nothing."""
+        """(n, 2): column and row of the vertices; meaningless for those `beside` the eye."""
         depth = self.vertices[:, 2] if self.picture.perspective else np.ones(len(self.vertices))
         weight = np.where(self.beside, 1.0, depth)
         return np.asarray(self.picture.grid.pixels(self.vertices[:, :2], weight) / weight[:, None])
 
     def meet(self, band: Band, pairs: Iterator[_Pairs]) -> Hits:
-        """Of pairs of a pixel and a face, those where the ray meets the face: each once, sorted as by `line_hits`."""
+        """Pairs of a pixel and a face in which the ray meets the face, each once, sorted as by `line_hits`."""
         parts = []
         for pixel, face in pairs:
             points = self.picture.points(band, pixel)
@@ -79,7 +79,9 @@ class View:
         return sorted_hits(parts, -1 if self.body.faces_inwards else 1)
 
     def boxed_pairs(self, band: Band, wanted: Mask, chosen: Mask | None = None) -> Iterator[_Pairs]:
-        """All pairs of a `wanted` pixel (pixels,) and a face, or a `chosen` one (m,), that may meet."""
+        """Candidate pairs of a `wanted` pixel (pixels,) and a face, or a `chosen` one (m,), by the faces' bounding
+        boxes.
+        """
         face, top, rows, left, columns = self._boxes
         pixels = np.flatnonzero(wanted)
         before = np.concatenate([[0], np.cumsum(wanted)])
@@ -119,7 +121,7 @@ def expand(first: Integers, count: Integers) -> tuple[Integers, Integers]:
 
 
 def slices(count: Integers, most: int) -> Iterator[slice]:
-    """Runs of items with a sum of `count` (n,) up to `most`, or of one item."""
+    """Slices of items with a sum of `count` (n,) up to `most`, or of one item."""
     ends = np.cumsum(count)
     begin = 0
     while begin < len(ends):

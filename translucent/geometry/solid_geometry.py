@@ -75,7 +75,7 @@ def nearest_to_zero(point: Array, direction: Array) -> tuple[Array, Array]:
 
 
 def between(position: Array, velocity: Array, half: Array) -> tuple[Array, Array]:
-    """First and last t with `position + t velocity` within [-half, half], elementwise; none where start > end."""
+    """Range of t with `position + t velocity` within [-half, half]: first and last t; empty if start > end."""
     moving = velocity != 0
     safe = np.where(moving, velocity, 1.0)
     always = np.where(np.abs(position) <= half, np.inf, -np.inf)

@@ -1,1 +1,1 @@
-"""Working together with other renderers, each in a module of its own that is imported when it is asked for."""
+"""Interoperation with other renderers, one module each, imported on demand."""

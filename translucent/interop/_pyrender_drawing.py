@@ -1,4 +1,6 @@
-"""pyrender draws what is opaque: in the context of a renderer, or in one of its own. Import it by the shim only."""
+"""Drawing of opaque objects by pyrender: in the context of a renderer, or in one of its own. Import it by the shim
+only.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,7 @@ PICTURE_FLAGS = _SHAPE_FLAGS | Flags.SHADOWS_DIRECTIONAL | Flags.SHADOWS_SPOT
 
 
 class OpaqueRenderer(pyrender.Renderer):  # type: ignore[misc]
-    """pyrender's renderer, but for the depth, which is that at the pixel centers.
+    """Renderer of pyrender, with depth at the pixel centers.
 
     Colors are the mean of four samples, as ever. Of these, pyrender's own depth map has the depth of the first, which
     lies up to half a pixel off the ray that media are shaded along.
@@ -88,7 +90,7 @@ class OpaqueRenderer(pyrender.Renderer):  # type: ignore[misc]
 
 
 def why_not_in(context: GpuContext) -> str | None:
-    """Why pyrender cannot draw in this OpenGL context; None if it can."""
+    """Reason why pyrender cannot draw in this OpenGL context; None if it can."""
     with context.current() as gl:
         _forget_errors(gl)
         # PyOpenGL sees only contexts of the window system that it is bound to.
@@ -187,7 +189,7 @@ def _as_render_error() -> Iterator[None]:
 
 @contextmanager
 def _current_kept() -> Iterator[None]:
-    """Make the EGL context current again that is so now: pyrender leaves its own, or none."""
+    """Context manager that restores the current EGL context: pyrender leaves its own, or none."""
     if os.environ.get("PYOPENGL_PLATFORM") != "egl":
         yield  # pyrender leaves windows as it should
         return

@@ -1,4 +1,4 @@
-"""What pyrender has drawn, in the toolkit's numbers. Import it by the shim only."""
+"""Conversion of pyrender's pictures to the toolkit's quantities. Import it by the shim only."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GAMMA = 2.2
 
 @dataclass(frozen=True)
 class Clipping:
-    """How a camera of pyrender writes depth: from `near` to `far` metres along its forward axis."""
+    """Depth range of a pyrender camera: from `near` to `far` metres along its forward axis."""
 
     near: float
     far: float
@@ -28,7 +28,7 @@ class Clipping:
 
     @classmethod
     def of(cls, scene: Any) -> Clipping:
-        """Of the scene's camera."""
+        """Depth range of the scene's camera."""
         camera = scene.main_camera_node.camera
         far = math.inf if camera.zfar is None else camera.zfar
         return cls(camera.znear, far, isinstance(camera, pyrender.OrthographicCamera))
@@ -50,7 +50,7 @@ class Clipping:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What pyrender has drawn, row 0 at the top: `colors` (h, w, 4) uint8, encoded, and `depth` (h, w) in metres."""
+    """Picture drawn by pyrender, row 0 at the top: `colors` (h, w, 4) uint8, encoded, and `depth` (h, w) in metres."""
 
     colors: npt.NDArray[np.uint8]
     depth: npt.NDArray[np.float64]

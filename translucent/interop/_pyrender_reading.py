@@ -1,4 +1,4 @@
-"""Scenes of pyrender as scenes of the toolkit. Import it by the shim only."""
+"""Conversion of pyrender's scenes to scenes of the toolkit. Import it by the shim only."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from translucent.errors import RenderError
 
-#: What is used of pyrender's private members, by class; another pyrender may lack them.
+#: Private members of pyrender that are used, by class; another pyrender may lack them.
 _PRIVATE = {
     "Renderer": ("_configure_forward_pass_viewport", "_read_main_framebuffer", "_configure_main_framebuffer"),
     "Primitive": ("_add_to_context", "_remove_from_context"),

@@ -1,4 +1,4 @@
-"""What is opaque in a scene of the toolkit as a scene of pyrender. Import it by the shim only."""
+"""Conversion of a scene's opaque objects to a pyrender scene. Import it by the shim only."""
 
 from __future__ import annotations
 

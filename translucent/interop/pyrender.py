@@ -1,4 +1,4 @@
-"""pyrender draws what is opaque, and translucent objects are shaded over it.
+"""Use with pyrender, which draws opaque objects, with translucent ones shaded over them.
 
 Without a window, set ``PYOPENGL_PLATFORM=egl`` in the environment before anything imports pyrender: PyOpenGL, which
 pyrender draws with, binds itself to one window system when it is first imported, and that has to be the one of the
@@ -264,7 +264,7 @@ def _require_opaque(scene: Scene) -> None:
 
 
 def _opaque_part(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int) -> Any:
-    """What pyrender is to draw, checked."""
+    """Check the scene that pyrender is to draw."""
     from translucent.interop._pyrender_drawing import PICTURE_FLAGS
     from translucent.interop._pyrender_reading import camera_of, translucent_nodes
     from translucent.interop._pyrender_twins import opaque_part

@@ -1,4 +1,5 @@
-"""Media in the terms of other systems: one file per target, each with its formula, its source and what it loses.
+"""Conversion of media to and from other systems: one file per target, each with its formula, its source and what it
+loses.
 
 `TARGETS` names the systems that `text_block` writes for; `load_medium` reads files of those that have files. Numbers of
 the others: `translucent.materials.blender`, `unity` and `unreal`. Reading and writing whole glTF files:
@@ -28,7 +29,7 @@ from translucent.media.medium import Medium
 
 __all__ = ["TARGETS", "load_medium", "text_block"]
 
-#: Largest difference between the color that is given and that of the medium: a channel that was raised from black.
+#: Largest difference between a given color and that of the medium, from a channel that was raised from black.
 _SAME_COLOR = 1e-3
 
 
@@ -56,7 +57,7 @@ TARGETS: tuple[str, ...] = tuple(_WRITERS)
 
 
 def text_block(target: str, medium: Medium, color: npt.ArrayLike, distance: float) -> str:
-    """A copy-ready block of text that holds the medium in the terms of another system.
+    """Copy-ready block of text that describes the medium for another system.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ _READERS: dict[str, Callable[[str, str], Medium]] = {
 
 
 def load_medium(path: str | Path, unit: str = "m") -> Medium:
-    """The medium of a material file of another system.
+    """Load the medium of a material file of another system.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""CSS: the color at the distance and what becomes of it, as custom properties and a gradient. Written only.
+"""CSS: the color of a medium at a distance as custom properties, and a gradient. Written only.
 
 Formula: the gradient runs from no thickness to twice the distance, T(x) = exp(-sigma_t x) at each stop. Colors are
 ``color(srgb-linear ...)`` (CSS Color 4), with the nearest hex color for older browsers.

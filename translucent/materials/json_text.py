@@ -1,4 +1,4 @@
-"""A medium as JSON, all of it: what no other format holds. Written and read without loss.
+"""Complete media as JSON, including what no other format holds. Written and read without loss.
 
 Fields are those of `Medium`, in 1/m and linear Rec.709. Source: the toolkit's own vocabulary.
 """
@@ -24,7 +24,7 @@ def write_json(medium: Medium) -> str:
 
 
 def read_json(text: str) -> Medium:
-    """The medium of such an object; absent fields have their defaults.
+    """Read the medium of such an object; absent fields have their defaults.
 
     Raises
     ------

@@ -42,7 +42,7 @@ _SRGB = "srgb_texture"
 
 @dataclass(frozen=True)
 class Shader:
-    """Name of a surface shader, of its inputs for transmission, and the last version where they mean what they do here.
+    """Surface shader: its name, its inputs for transmission, and the last supported version.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Shader:
     last_version: tuple[int, int] | None = None
 
     def defaults(self) -> dict[str, float | Array]:
-        """What inputs have that are not stated; the kinds of the values are those of the inputs."""
+        """Default values of inputs, which also give the types of the inputs."""
         return {
             self.weight: 0.0,
             self.color: np.ones(3),
@@ -106,7 +106,7 @@ def transmission_inputs(
 
 
 def write_shader(shader: Shader, medium: Medium, distance: float | None, name: str, unit: str) -> str:
-    """A MaterialX 1.39 document with one material."""
+    """Write a MaterialX 1.39 document with one material."""
     root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
     surface = ElementTree.SubElement(root, shader.node, name=f"{name}_surface", type="surfaceshader")
     for key, value in transmission_inputs(shader, medium, distance, unit).items():
@@ -120,7 +120,7 @@ def write_shader(shader: Shader, medium: Medium, distance: float | None, name: s
 
 
 def read_shader(shader: Shader, text: str, unit: str) -> Medium:
-    """The medium of the first such shader in a MaterialX document."""
+    """Read the medium of the first such shader in a MaterialX document."""
     what = f"{shader.title} document"
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(what, "it declares entities, which may unpack into anything", "export it without a DOCTYPE")
@@ -168,7 +168,7 @@ def medium_of(shader: Shader, stated: Mapping[str, float | Array], metres: float
 
 
 def _value(what: str, key: str, element: ElementTree.Element, default: float | Array, space: str) -> float | Array:
-    """The constant value of an input, of the kind of its default; colors become linear."""
+    """Constant value of an input, of the type of its default; colors become linear."""
     text = element.get("value")
     if text is None:
         raise InputError(what, f"{key} comes from a node", "give it a constant value")

@@ -16,7 +16,7 @@ SHADER = Shader(
 
 
 def write_openpbr(medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m") -> str:
-    """A MaterialX document with an OpenPBR surface around this medium.
+    """Write a MaterialX document with an OpenPBR surface around this medium.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def write_openpbr(medium: Medium, distance: float | None = None, name: str = "tr
 
 
 def read_openpbr(text: str, unit: str = "m") -> Medium:
-    """The medium of the first OpenPBR surface in a MaterialX document, whose lengths are in `unit`.
+    """Read the medium of the first OpenPBR surface in a MaterialX document, whose lengths are in `unit`.
 
     Raises
     ------

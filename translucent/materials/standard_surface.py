@@ -16,10 +16,10 @@ SHADER = Shader("standard_surface", weight="transmission", ior="specular_IOR", t
 def write_standard_surface(
     medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m"
 ) -> str:
-    """A MaterialX document with a Standard Surface around this medium; parameters as in `write_openpbr`."""
+    """Write a MaterialX document with a Standard Surface around this medium; parameters as in `write_openpbr`."""
     return write_shader(SHADER, medium, distance, name, unit)
 
 
 def read_standard_surface(text: str, unit: str = "m") -> Medium:
-    """The medium of the first Standard Surface in a MaterialX document; errors as in `read_openpbr`."""
+    """Read the medium of the first Standard Surface in a MaterialX document; errors as in `read_openpbr`."""
     return read_shader(SHADER, text, unit)

@@ -36,12 +36,12 @@ _TOKENS = re.compile(
     r"""|\#[^\n]*|<[^>]*+(?:>|\Z)|@[^@]*+(?:@|\Z)|([(){}\[\]=,;]|[^\s(){}\[\]=,;"'\#<@]+)""",
     re.DOTALL,
 )
-#: Braces within each other.
+#: Largest depth of nested braces.
 _MAX_DEPTH = 100
 
 
 def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent") -> str:
-    """A .usda layer with one material; the color is stated at `distance` in metres, see `color_at`."""
+    """Write a .usda layer with one material; the color is stated at `distance` in metres, see `color_at`."""
     lines = []
     for key, value in transmission_inputs(SHADER, medium, distance).items():
         if isinstance(value, float):
@@ -73,17 +73,17 @@ def Material "{name}"
 
 @dataclass
 class _Block:
-    """What the reader keeps of the text between two braces."""
+    """Block of text between two braces, as the reader keeps it."""
 
     identifier: str = ""
     #: Texts of the parts of a value, and its color space.
     inputs: dict[str, tuple[list[str], str]] = field(default_factory=dict)
-    #: Inputs that are no constants.
+    #: Inputs that are not constants.
     varying: set[str] = field(default_factory=set)
 
 
 def read_usda(text: str) -> Medium:
-    """The medium of the first OpenPBR or Standard Surface shader in a .usda layer.
+    """Read the medium of the first OpenPBR or Standard Surface shader in a .usda layer.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _blocks(tokens: list[str]) -> Iterator[_Block]:
 
 
 def _list(tokens: list[str], index: int) -> tuple[list[str], int]:
-    """The tokens of a value from here on, without parentheses and commas, and where they end."""
+    """Tokens of a value from a position on, without parentheses and commas, and the position of their end."""
     if tokens[index : index + 1] != ["("]:
         return tokens[index : index + 1], index + 1
     try:

@@ -9,7 +9,7 @@ from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 
-#: Where rays bend that cross a body: where they enter and where they leave it, or only where they enter.
+#: Interfaces at which rays refract: where they enter and where they leave a body, or only where they enter.
 Interfaces: TypeAlias = Literal["both", "front"]
 
 
@@ -85,7 +85,7 @@ class RenderPlan:
 
     @property
     def geometry_passes(self) -> int:
-        """How often geometry is drawn in all."""
+        """Total number of draws of the geometry."""
         return sum(step.geometry_passes for step in self.passes)
 
     @property

@@ -1,4 +1,4 @@
-"""What a user can do to a document: small values, and the pure function that does them."""
+"""Actions of a user on a document: small values, and the pure function that applies them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from translucent.preview.document import Document, Material, Model, Orbit, check
 
 @dataclass(frozen=True)
 class Change:
-    """Give a field, such as ``material.roughness``, a value. Changes of one `drag` are one step of undo."""
+    """Action: give a field, such as ``material.roughness``, a value. Changes of one `drag` are one step of undo."""
 
     field: str
     value: Any
@@ -58,7 +58,7 @@ class Replace:
 
 @dataclass(frozen=True)
 class View:
-    """Put the camera there."""
+    """Place the camera."""
 
     orbit: Orbit | None
 
@@ -90,17 +90,17 @@ class Zoom:
 
 Action = Change | Open | ChoosePreset | Adopt | Replace | View | Turn | Pan | Zoom
 
-#: What moves the camera is no step of undo, and undo leaves the camera where it is.
+#: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
 CAMERA_ACTIONS = (View, Turn, Pan, Zoom)
 
-#: Fields that make the medium one of a color at a distance, or one of coefficients.
+#: Fields that define the medium by a color at a distance, or by coefficients.
 _BY_COLOR = ("color", "distance")
 _BY_COEFFICIENTS = ("absorption",)
 _OF_PRESET = ("scattering", "anisotropy", "emission")
 
 
 def apply(document: Document, action: Action) -> Document:
-    """The document after an action.
+    """Apply an action to a document.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _changed(document: Document, action: Change) -> Document:
 
 
 def _resourced(material: Material, edited: str) -> Material:
-    """The material with the source that an edited field makes it have."""
+    """Material with its source updated for an edited field."""
     if edited in _BY_COLOR:
         absorption = absorption_of_color(material)
         return dataclasses.replace(material, source="color", preset="", absorption=absorption)
@@ -200,7 +200,7 @@ def _of_preset(material: Material, name: str) -> Material:
 
 
 def _stated(material: Material) -> Material:
-    """The material with the color at a distance that its coefficients make, as ``translucent extinction`` states it."""
+    """Material with the color at a distance of its coefficients, as ``translucent extinction`` states it."""
     medium = Medium(material.absorption, material.scattering)
     color, distance = color_at(medium, None if medium.extinction.any() else 1.0)
     red, green, blue = np.asarray(color).tolist()

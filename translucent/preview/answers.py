@@ -1,4 +1,4 @@
-"""What is done with the files that dialogs and scripts name."""
+"""Handling of the files that dialogs and scripts name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.preview.scenes import medium_of, method_of
 
 
 def take_answers(desk: Desk) -> None:
-    """Do what the user has asked for in dialogs that have been answered."""
+    """Handle dialogs that have been answered."""
     for entry in list(desk.dialogs):
         path = answer(entry[1])
         if path is None:
@@ -27,7 +27,7 @@ def take_answers(desk: Desk) -> None:
 
 
 def use_file(desk: Desk, kind: str, path: str) -> None:
-    """Read or write a file, by what it was asked for."""
+    """Read or write a file, according to its dialog."""
     work = desk.work
     match kind:
         case "open":
@@ -63,7 +63,7 @@ def _export(desk: Desk, kind: str, path: str) -> None:
 
 
 def _save_medium(desk: Desk, path: str) -> None:
-    """The model's file, with the medium in its materials; of another kind of file there is nothing to keep."""
+    """Write the model's file with the medium in its materials; other kinds of files have none to keep."""
     source, material = desk.get("model.path"), desk.work.document.material
     if Path(source).suffix.lower() not in SUFFIXES:
         do = "copy the medium as glTF, or export the model as .glb first"

@@ -1,4 +1,4 @@
-"""The window: docked panels around a viewport, menus, and what a frame does."""
+"""The window: docked panels around a viewport, menus, and the work of a frame."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from translucent.preview.document import Document
 from translucent.preview.script import Script
 from translucent.preview.workspace import Workspace
 
-#: What the window is called in the system.
+#: Name of the window in the system.
 TITLE = "translucent"
 
-#: sRGB of what is behind panels.
+#: sRGB color behind panels.
 BACKGROUND = (0.135, 0.14, 0.15, 1.0)
 
 #: Parts of the width of a window of this many pixels that panels take on its right and left. In wider ones they keep
@@ -33,7 +33,7 @@ IDLE_FPS = 9.0
 
 
 def require_display() -> None:
-    """Raise where there is nowhere to open a window, or no package that could.
+    """Raise if there is no display for a window, or no package that could open one.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def run(
     screenshot: str | None = None,
     allow_outside: bool = False,
 ) -> Workspace:
-    """Open the window, and come back when it is closed.
+    """Open the window, and return when it is closed.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def leave(work: Workspace, code: int = 0) -> None:
 
 @contextmanager
 def _told_as_messages(work: Workspace) -> Iterator[None]:
-    """Warnings go to the window, not to a terminal that nobody sees."""
+    """Context manager that shows warnings in the window instead of a terminal."""
     before = warnings.showwarning
     warnings.showwarning = lambda message, *_, **__: work.tell("warning", str(message))
     try:
@@ -135,7 +135,7 @@ class _Window:
         self._drops: object = None
 
     def params(self, size: tuple[int, int], scale: float) -> Any:
-        """What the window is made of."""
+        """Parameters of the window."""
         from imgui_bundle import hello_imgui, imgui
 
         params = hello_imgui.RunnerParams()
@@ -173,7 +173,7 @@ class _Window:
         return params
 
     def _guarded(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """An exception in a callback would end the process; it closes the window instead, and is raised then."""
+        """Guard a callback: an exception closes the window, and is raised afterwards, instead of ending the process."""
 
         def call() -> None:
             try:
@@ -190,7 +190,7 @@ class _Window:
         hello_imgui.get_runner_params().app_shall_exit = True
 
     def _docking(self, share: float) -> Any:
-        """Panels on both sides, with this share of the part of the width that they have in a narrow window."""
+        """Docking layout: panels on both sides, with a share of the width that they have in a narrow window."""
         from imgui_bundle import hello_imgui, imgui
 
         from translucent.preview.panels.look import files_panel, look_panel
@@ -237,7 +237,7 @@ class _Window:
         panel(self.desk)
 
     def _style(self) -> None:
-        """Backgrounds are what the window is cleared to: on a software rasterizer they took most of a frame's time."""
+        """Style of the window, without panel backgrounds: on a software rasterizer they took most of a frame's time."""
         from imgui_bundle import imgui
 
         style = imgui.get_style()

@@ -27,7 +27,7 @@ from translucent.scene.texture import Texture
 
 @dataclass(eq=False)
 class Bake:
-    """A baked map, and the scene in which the model is painted with it.
+    """Baked map, and the scene with the model painted with it.
 
     Attributes
     ----------
@@ -48,13 +48,13 @@ class Bake:
         return float(np.mean(self.map.coverage))
 
     def thickest_text(self, unit: str) -> str:
-        """The largest value."""
+        """Text of the largest value."""
         values = self.map.values[self.map.coverage]
         most = float(values.max(initial=0.0))
         return f"{most:.3g}" if self.mode == "local" else length_text(most, unit)
 
     def seen_from(self, orbit: Orbit) -> Scene:
-        """The painted model; the same object while the camera stays."""
+        """Scene of the painted model; the same object while the camera stays."""
         if self._seen is None or self._seen[0] != orbit:
             self._seen = orbit, dataclasses.replace(self.scene, camera=camera_of(orbit))
         return self._seen[1]
@@ -82,7 +82,7 @@ def _bake(report: Report, mesh: Mesh, options: dict[str, Any]) -> ThicknessMap:
 
 
 def painted(body: Object, baked: ThicknessMap) -> Scene:
-    """The body in the false colors of a map, unshaded but for a white surrounding."""
+    """Scene with the body in the false colors of a map, unshaded, in white surroundings."""
     values = np.where(baked.coverage, baked.values, 0.0)
     most = float(values.max(initial=0.0)) or 1.0
     colors = false_colors()[np.rint(np.clip(values / most, 0.0, 1.0) * 255).astype(np.intp)]

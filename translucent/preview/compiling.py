@@ -1,4 +1,4 @@
-"""What a new kind of picture needs, made in another process: compiled shaders, and the normals of large meshes.
+"""Preparation of new kinds of pictures in a worker process: compiled shaders, and the normals of large meshes.
 
 A driver takes up to a second to compile what a new kind of scene needs, and meanwhile the window would stand still. But
 drivers keep what they have compiled on disk, for all processes (Mesa and NVIDIA do): another process that draws a frame
@@ -44,16 +44,16 @@ FRAME = (72, 40)
 #: Sides of small pictures in place of large ones, by whether those are powers of two.
 SIDES = {True: 64, False: 60}
 
-#: Triangles of which normals take so little time that no process need be asked.
+#: Largest number of triangles whose normals are made without the worker process.
 SMOOTHED_AT_ONCE = 50_000
 
-#: How many boxes, one within the other, stand in for a mesh: rays then cross as many layers as methods can tell apart.
+#: Number of nested boxes that stand in for a mesh: rays then cross as many layers as methods can tell apart.
 BOXES = 4
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """What has come of a request.
+    """Result of a request.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Compiled:
 
 
 class Compiler:
-    """Has another process compile what frames need, and smooth their meshes.
+    """Compiler of shaders and smoother of meshes in a worker process.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Compiler:
         self.device = ""
 
     def begin(self, scene: Scene, plans: Sequence[RenderPlan], then: Callable[[Compiled], None]) -> None:
-        """Start the process, with a frame like the one that is on show; from now on, the context waits for it."""
+        """Start the worker process, with a frame like the one on show; from now on, the context waits for it."""
         self.ledger.postpones = True
         self.ledger.elsewhere |= self.ledger.needed
 
@@ -108,7 +108,7 @@ class Compiler:
         plans: Sequence[RenderPlan],
         then: Callable[[Compiled], None],
     ) -> Task:
-        """Make what plans of a scene need."""
+        """Request the programs and normals for plans of a scene."""
         return self.lane.start(name, _guarded(lambda task: self._make(task, scene, plans)), then)
 
     def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan]) -> Compiled:
@@ -118,7 +118,7 @@ class Compiler:
         return self._companion.call(task, compile_frames, stand_in(scene), tuple(plans), self.device)
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
-        """Let the context build what there is, and what was `missing`: if it is not there, the window tells why."""
+        """Let the context build what is ready, and what was `missing`: if it is not ready, the window tells why."""
         if found.programs is None:
             self.ledger.postpones = False
         else:
@@ -127,12 +127,12 @@ class Compiler:
             self.ledger.elsewhere.add(missing)
 
     def close(self, patience: float) -> None:
-        """End the process."""
+        """End the worker process."""
         self._companion.close(patience)
 
 
 def _guarded(work: Callable[[Task], Compiled]) -> Callable[[Task], Compiled]:
-    """Work that always has a result: if it fails, one that says why."""
+    """Guard work so that it always has a result: if it fails, one that says why."""
 
     def call(task: Task) -> Compiled:
         try:
@@ -146,7 +146,7 @@ def _guarded(work: Callable[[Task], Compiled]) -> Callable[[Task], Compiled]:
 
 
 def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
-    """Large meshes that plans draw with normals which nobody has made yet."""
+    """Large meshes that plans draw with normals not made yet."""
     drawn = {
         i
         for plan in plans
@@ -166,7 +166,7 @@ def smoothed(
 
 
 def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], device: str) -> Compiled:
-    """Draw a scene by plans, and tell which programs that took."""
+    """Draw a scene by plans, and return the programs that this needed."""
     engine, ledger = _engine(newest_shader(), device)
     trouble = ""
     with engine.context.current() as gl:
@@ -199,7 +199,7 @@ def show_frames(report: Report, scene: Scene, plan: RenderPlan, device: str) -> 
 
 @lru_cache(maxsize=1)
 def _engine(written: float, device: str) -> tuple[GpuRenderer, Ledger]:
-    """Of the process, for shaders of a time.
+    """Renderer of the worker process, for one version of the shaders.
 
     Raises
     ------
@@ -214,7 +214,9 @@ def _engine(written: float, device: str) -> tuple[GpuRenderer, Ledger]:
 
 
 def stand_in(scene: Scene) -> Scene:
-    """A scene that is drawn with the same programs, and quickly sent and drawn: boxes for meshes, and no pictures."""
+    """Stand-in for a scene that needs the same programs, and is quick to send and draw: boxes for meshes, and no
+    pictures.
+    """
     return dataclasses.replace(
         scene,
         objects=[_object_like(item) for item in scene.objects],

@@ -1,4 +1,6 @@
-"""What panels share: the workspace, the stage, and what only the window needs to remember. And the ways of a row."""
+"""Window state that panels share: the workspace, the stage, and what is not part of a document. And the ways of a
+row.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +21,16 @@ from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Scene
 
-#: Seconds after which a view counts as still.
+#: Seconds without movement after which a view counts as still.
 STILL = 0.25
 
-#: sRGB of lines that warn, that tell of errors, and that matter less.
+#: sRGB colors of warnings, errors and secondary lines.
 WARNING, ERROR, FAINT = (1.0, 0.75, 0.35, 1.0), (1.0, 0.45, 0.35, 1.0), (0.62, 0.64, 0.68, 1.0)
 
 
 @dataclass
 class Probed:
-    """A pixel that the user wants to know about, and what the reference says of it."""
+    """Probed pixel, with the reference's values for it."""
 
     pixel: tuple[int, int]
     scene: object
@@ -38,7 +40,7 @@ class Probed:
 
 @dataclass
 class Desk:
-    """The window's own state; none of it is part of the document."""
+    """Window state, none of which is part of the document."""
 
     work: Workspace
     stage: Stage
@@ -61,16 +63,16 @@ class Desk:
     _still_since: float = 0.0
 
     def change(self, name: str, value: Any, *, step: bool = False) -> None:
-        """Give a field of the document a value; while the mouse is down, all of it is one step of undo."""
+        """Give a field of the document a value; all changes while the mouse is down are one undo step."""
         self.work.do(Change(name, value, None if step else self.drag))
 
     def get(self, name: str) -> Any:
-        """A field of the document."""
+        """Value of a field of the document."""
         section, _, key = name.partition(".")
         return getattr(getattr(self.work.document, section), key)
 
     def draw(self, pixels: tuple[int, int]) -> bool:
-        """Let the stage draw a step, and the background measure what has come to rest; whether more is to come."""
+        """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
         self.work.size = pixels
         self.work.update()
         more = self.stage.draw(self.work, pixels)
@@ -100,11 +102,11 @@ class Desk:
         self.work.measured = measured
 
     def frame(self) -> None:
-        """See the whole model, or the object that was clicked."""
+        """Frame the whole model, or the object that was clicked."""
         self.work.frame(self.selected)
 
     def turn_light(self, right: float, up: float) -> None:
-        """Move the light around and upwards, by degrees; it goes on if it was off."""
+        """Turn the light around and upwards, by degrees; it is switched on if it was off."""
         if not self.get("look.light"):
             self.change("look.light", True)
         self.change("look.light_yaw", math.remainder(self.get("look.light_yaw") + right, 360.0))
@@ -119,7 +121,7 @@ class Desk:
             self.work.tell("error", "no file dialog here: drop files on the window, or name them when starting")
 
     def inset_texture(self, pixels: Any) -> Any:
-        """The reference's small picture as a texture."""
+        """Texture of the reference's small picture."""
         if self._inset is None or self._inset[0] is not pixels:
             if self._inset is not None:
                 self._inset[1].release()
@@ -130,12 +132,12 @@ class Desk:
 
 
 def em(count: float) -> float:
-    """Pixels of so many letters' heights, whatever the display's scale."""
+    """Length of so many ems in pixels, whatever the display's scale."""
     return float(hello_imgui.em_size(count))
 
 
 def begin_rows(name: str) -> bool:
-    """A table of labels and fields."""
+    """Begin a table of labels and fields."""
     if not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_stretch_prop):
         return False
     imgui.table_setup_column("label", imgui.TableColumnFlags_.width_fixed, em(9.2))
@@ -144,7 +146,7 @@ def begin_rows(name: str) -> bool:
 
 
 def row(label: str, tip: str = "") -> None:
-    """The label of the next field."""
+    """Draw the label of the next field."""
     imgui.table_next_row()
     imgui.table_next_column()
     imgui.align_text_to_frame_padding()
@@ -158,7 +160,7 @@ def row(label: str, tip: str = "") -> None:
 def slider(
     desk: Desk, label: str, name: str, low: float, high: float, form: str = "%.3f", *, log: bool = False, tip: str = ""
 ) -> None:
-    """A number of the document."""
+    """Slider for a number of the document."""
     row(label, tip)
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
     changed, value = imgui.slider_float(f"##{name}", float(desk.get(name)), low, high, form, flags)
@@ -169,7 +171,7 @@ def slider(
 
 
 def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
-    """Three numbers of the document, at least 0, on a line of their own; not in a table."""
+    """Fields for three numbers of the document, at least 0, on a line of their own; not in a table."""
     wide_row(label, tip)
     value = list(desk.get(name))
     changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
@@ -180,7 +182,7 @@ def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", 
 
 
 def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
-    """One of some words."""
+    """Choice of one of some words."""
     row(label, tip)
     now = desk.get(name)
     if imgui.begin_combo(f"##{name}", str(now)):
@@ -191,7 +193,7 @@ def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: st
 
 
 def wide_row(label: str, tip: str = "") -> None:
-    """The label of a field that takes the whole line below it, in a table that has just ended or not begun."""
+    """Label of a field on the whole line below it, outside a table."""
     imgui.text(label)
     if tip and imgui.is_item_hovered():
         imgui.set_tooltip(tip)
@@ -199,7 +201,7 @@ def wide_row(label: str, tip: str = "") -> None:
 
 
 def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:
-    """Yes or no."""
+    """Checkbox."""
     row(label, tip)
     changed, value = imgui.checkbox(f"##{name}", bool(desk.get(name)))
     if changed:
@@ -207,7 +209,7 @@ def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:
 
 
 def fact(label: str, text: str, color: tuple[float, float, float, float] | None = None) -> None:
-    """A label and what there is to tell, over as many lines as it takes."""
+    """Label and text, wrapped over as many lines as it takes."""
     imgui.table_next_row()
     imgui.table_next_column()
     imgui.text_colored(FAINT, label)
@@ -221,7 +223,7 @@ def fact(label: str, text: str, color: tuple[float, float, float, float] | None 
 
 
 def wrapped(text: str, color: tuple[float, float, float, float]) -> None:
-    """A line that may take several."""
+    """Draw wrapped text."""
     imgui.push_text_wrap_pos(0.0)
     imgui.text_colored(color, text)
     imgui.pop_text_wrap_pos()

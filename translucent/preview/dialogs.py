@@ -16,7 +16,7 @@ MODELS = ["Models", "*.glb *.gltf *.obj *.stl *.ply *.off", "All files", "*"]
 SESSIONS = ["Sessions", "*.toml", "All files", "*"]
 PANORAMAS = ["Pictures of all directions", "*.hdr *.exr *.png *.jpg", "All files", "*"]
 
-#: What is asked for: the title, the file that is proposed where one is written, and the kinds.
+#: Kinds of dialogs: the title, the file that is proposed where one is written, and the kinds.
 QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
     "open": ("Open a model", None, MODELS),
     "open session": ("Open a session", None, SESSIONS),
@@ -32,7 +32,7 @@ QUESTIONS: dict[str, tuple[str, str | None, list[str]]] = {
 
 
 def open_dialog(kind: str) -> Any | None:
-    """A dialog that is now open, or None where the system has none."""
+    """Open a dialog; None if the system has none."""
     if sys.platform.startswith("linux") and not any(map(shutil.which, ("zenity", "kdialog", "matedialog", "qarma"))):
         return None
     title, proposed, kinds = QUESTIONS[kind]
@@ -42,7 +42,7 @@ def open_dialog(kind: str) -> Any | None:
 
 
 def answer(dialog: Any) -> str | None:
-    """The file that the user has chosen; empty if none, None while the dialog is open."""
+    """Path of the file that the user has chosen; empty if none, None while the dialog is open."""
     if not dialog.ready(0):
         return None
     result = dialog.result()
@@ -53,7 +53,9 @@ _Callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER
 
 
 def accept_drops(take: Callable[[str], None]) -> object:
-    """Call `take` for each file that is dropped on the window; what is returned has to be kept. None: not possible."""
+    """Call `take` for each file that is dropped on the window; the returned object has to be kept alive. None: not
+    possible.
+    """
     folder = Path(imgui_bundle.__file__).parent
     # The very file that the window uses: another copy of the library would know no windows.
     names = ("libglfw.so.3", "libglfw.3.dylib", "glfw3.dll")

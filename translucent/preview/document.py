@@ -1,4 +1,6 @@
-"""What the previewer shows, as one frozen value: it can be compared, undone, written to a file, and needs no window."""
+"""Document of the previewer, one immutable value: it can be compared, undone and written to a file, without a
+window.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +24,19 @@ Source = Literal["file", "color", "preset", "coefficients"]
 Mode = Literal["picture", "thickness", "transmittance", "validity"]
 Compare = Literal["off", "method", "reference", "error"]
 
-#: The planner picks.
+#: Name of the method that leaves the choice to the planner.
 AUTO = "auto"
 
-#: Of lengths, the ones that panels offer.
+#: Units of length that panels offer.
 SHOWN_UNITS = ("mm", "cm", "m", "in")
 
-#: Nothing on a display is closer to the poles than this: "up" would lose its meaning.
+#: Largest elevation of a camera: closer to the poles, "up" would lose its meaning.
 MAX_PITCH = 89.9
 
 
 @dataclass(frozen=True)
 class Model:
-    """A file, or one of the toolkit's own meshes by name, and the unit of its coordinates."""
+    """Model: a file, or one of the toolkit's own meshes by name, with the unit of its coordinates."""
 
     path: str = "goblet"
     unit: str = "m"
@@ -42,7 +44,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Material:
-    """What fills the bodies, and what their surface does. Names of glTF where it has one.
+    """Material: the medium in the bodies, and their interface. Names of glTF where it has one.
 
     Attributes
     ----------
@@ -84,7 +86,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Look:
-    """What lights the model, what is behind it, and how the picture is developed.
+    """Look: lights, background, exposure and tone curve.
 
     Attributes
     ----------
@@ -112,7 +114,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Display:
-    """What the viewport shows of the model, and how it is found.
+    """Display: the quantity that the viewport shows, and the method that finds it.
 
     Attributes
     ----------
@@ -143,7 +145,7 @@ class Display:
 
 @dataclass(frozen=True)
 class Orbit:
-    """A camera that goes around a target.
+    """Orbit: a camera around a target.
 
     Attributes
     ----------
@@ -169,7 +171,7 @@ class Orbit:
 
 @dataclass(frozen=True)
 class Document:
-    """Everything that a session holds. No orbit: the model is to be framed."""
+    """Document: everything that a session holds. No orbit: the model is to be framed."""
 
     model: Model = field(default_factory=Model)
     material: Material = field(default_factory=Material)
@@ -180,7 +182,7 @@ class Document:
 
 @dataclass(frozen=True)
 class _Range:
-    """What a field may hold: numbers in a range, or one of some words."""
+    """Range of a field: numbers between bounds, or one of some words."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -191,7 +193,7 @@ class _Range:
 _METHODS = (AUTO, *METHODS)
 _POSITIVE = _Range(0.0, 1e12, above=True)
 
-#: Fields that do not hold just anything of their type, by section and name.
+#: Ranges of fields that cannot hold every value of their type, by section and name.
 RANGES: dict[str, _Range] = {
     "model.unit": _Range(words=tuple(METRES_PER_UNIT)),
     "material.source": _Range(words=get_args(Source)),
@@ -227,7 +229,7 @@ RANGES: dict[str, _Range] = {
 
 
 def checked(name: str, value: Any, like: Any) -> Any:
-    """The value, in the type of `like`, if the field `name` (``material.roughness``) may hold it.
+    """Check a value, converted to the type of `like`, if the field `name` (``material.roughness``) may hold it.
 
     Raises
     ------

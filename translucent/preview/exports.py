@@ -1,4 +1,4 @@
-"""Files that the previewer has drawn by another process: pictures, with transparency or quantities, and turntables."""
+"""Export of files from a worker process: pictures, with transparency or quantities, and turntables."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Size: TypeAlias = tuple[int, int]
 #: Exposure in stops, and the name of the tone curve.
 Look: TypeAlias = tuple[float, str]
 
-#: Of files with a moving picture.
+#: Suffixes of files with a moving picture.
 MOVING = (".gif", ".webp", ".mp4")
 
 FPS = 24.0
 
 
 def check_export(path: str) -> None:
-    """Raise before any work is done where a picture or turntable could not be written."""
+    """Raise before any work is done if a picture or turntable could not be written."""
     suffix = Path(path).suffix.lower()
     if suffix in MOVING:
         return check_animation(Path(path), FPS)

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from translucent.preview.actions import CAMERA_ACTIONS, Action, Adopt, Change, apply
 from translucent.preview.document import Document
 
-#: Steps that can be undone.
+#: Largest number of steps that can be undone.
 MAX_STEPS = 200
 
 
 @dataclass(frozen=True)
 class History:
-    """A document, what it was, and what it will be again.
+    """History of a document: its past and undone states.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class History:
     drag: tuple[str, int] | None = None
 
     def done(self, action: Action) -> History:
-        """After an action; one that changes nothing leaves no step, and a drag leaves one."""
+        """History after an action; one that changes nothing leaves no step, and a drag leaves one."""
         after = apply(self.present, action)
         if isinstance(action, (*CAMERA_ACTIONS, Adopt)):
             return dataclasses.replace(self, present=after)
@@ -43,14 +43,14 @@ class History:
         return History(after, (*self.past, self.present)[-MAX_STEPS:], (), drag)
 
     def undone(self) -> History:
-        """A step back; the camera stays, unless the model is another."""
+        """History one step back; the camera stays, unless the model is another."""
         if not self.past:
             return self
         before = _seen_as(self.present, self.past[-1])
         return History(before, self.past[:-1], (*self.future, self.present))
 
     def redone(self) -> History:
-        """A step forward again."""
+        """History one step forward."""
         if not self.future:
             return self
         after = _seen_as(self.present, self.future[-1])

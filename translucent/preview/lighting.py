@@ -1,4 +1,4 @@
-"""Environments of files, which take a second to read: in the background, with the one before on show meanwhile."""
+"""Environments read from files in the background, with the last one on show meanwhile."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from translucent.preview.tasks import Lane, Task
 from translucent.scene.environment_files import READERS
 from translucent.scene.environment_filter import filtered
 
-#: What lights, and what is behind.
+#: Environments: the one that lights, and the one in the background.
 Names = tuple[str, str]
 
 
 @dataclass
 class Lighting:
-    """Reads what documents ask for.
+    """Reader of the environments of documents.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Lighting:
     _asked: Names | None = None
 
     def lit(self, document: Document) -> Document:
-        """The document, with the environments before if its own have not been read."""
+        """Document with the last environments in place of its own, if these have not been read."""
         look = document.look
         wanted = look.environment, look.background
         if not any(map(_is_file, wanted)):
@@ -54,7 +54,7 @@ class Lighting:
 
 
 def prepare(_: Task) -> None:
-    """What frames with surfaces, and smooth edges, need first, made before somebody waits for it."""
+    """Prepare the data of frames with surfaces or smooth edges, before it is waited for."""
     sample_shifts(1)  # these two import large parts of SciPy
     corner_normals(Box().tessellate())
     brdf_table()

@@ -1,4 +1,4 @@
-"""What another process finds out: errors against the reference, histograms, what is on one ray."""
+"""Measurements in a worker process: errors against the reference, histograms, crossings of one ray."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ BENT_LEVELS = (16, 8)
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A small picture of what the viewport shows, beside the truth.
+    """Comparison of a small picture of the viewport with the truth.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Compared:
 
 @dataclass(frozen=True, eq=False)
 class Measured(Compared):
-    """What was compared, too: a scene and a method."""
+    """Comparison together with its scene and method."""
 
     scene: Scene
     method: Method | None
@@ -72,7 +72,7 @@ class Measured(Compared):
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The reference of a whole picture, at a share of its size; of straight rays, or of those that interfaces bend."""
+    """Reference of a whole picture, at a share of its size; of straight rays, or with refraction."""
 
     scene: Scene
     method: Method | None
@@ -83,7 +83,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Crossing:
-    """What the float64 reference finds on one ray.
+    """Crossing of one ray in the float64 reference.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Crossing:
 
 @lru_cache(maxsize=1)
 def _renderer(written: float) -> Renderer:
-    """Of the process that measures, for shaders of a time."""
+    """Renderer of the worker process, for one version of the shaders."""
     return Renderer()
 
 
@@ -139,7 +139,7 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
 
 
 def straight(scene: Scene) -> Scene:
-    """The scene without what interfaces do to light, so that every method and the reference see the same rays."""
+    """Scene without the optical effects of interfaces, so that every method and the reference see the same rays."""
     return dataclasses.replace(scene, objects=[_index_matched(item) for item in scene.objects])
 
 
@@ -153,7 +153,8 @@ def _index_matched(item: Object) -> Object:
 
 
 def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Scene, tuple[int, ...]]:
-    """What the reference of a whole picture shows, and the shares of its size at which it is drawn, coarse first.
+    """Plan of the reference of a whole picture: its scene, and the shares of its size at which it is drawn, coarse
+    first.
 
     With `levels` given it is that of straight rays, for differences of thickness.
     """
@@ -168,12 +169,12 @@ def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Sce
 
 
 def truth_frame(report: Report, scene: Scene, method: Method | None, size: Size) -> Frame:
-    """The reference of a picture."""
+    """Render the reference of a picture."""
     return reference.render(scene, size, method)
 
 
 def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
-    """What the reference finds on the ray through a pixel's center."""
+    """Trace the ray through a pixel's center in the reference."""
     camera = pixel_camera(scene.camera, size, pixel)
     one = dataclasses.replace(straight(scene), camera=camera)
     frame = reference.render(one, (1, 1))
@@ -194,7 +195,7 @@ def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
 
 
 def pixel_camera(camera: Camera, size: Size, pixel: Size) -> Camera:
-    """A camera with one pixel, whose ray is that of a pixel of another camera."""
+    """Camera with one pixel, whose ray is that of a pixel of another camera."""
     half_width, half_height = camera.half_extent(size)
     x = ((pixel[0] + 0.5) / size[0] * 2 - 1) * half_width
     y = (1 - (pixel[1] + 0.5) / size[1] * 2) * half_height

@@ -76,7 +76,7 @@ def _file(desk: Desk) -> None:
 
 
 def status(desk: Desk) -> None:
-    """The model, how it is drawn, and what is under way."""
+    """Status line: the model, how it is drawn, and work under way."""
     loaded, stage = desk.work.loaded, desk.stage
     if loaded is not None:
         name = Path(loaded.model.path).name

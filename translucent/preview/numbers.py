@@ -1,4 +1,4 @@
-"""The numbers that panels show, in the words and to the digits of ``translucent extinction`` and ``render``."""
+"""Text of the numbers in panels, in the words and to the digits of ``translucent extinction`` and ``render``."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from translucent.preview.document import Material, Triple
 from translucent.preview.scenes import medium_of
 from translucent.units import metres_per_unit
 
-#: The darkest linear channel that the color field gives: 0 has no extinction. See `translucent.media.conversion.CLAMP`.
+#: Darkest linear channel of the color field: 0 has no finite extinction. See `translucent.media.conversion.CLAMP`.
 DARKEST = 1e-4
 
 
 def triple_text(values: npt.ArrayLike) -> str:
-    """Three numbers to the digits that ``translucent extinction`` prints."""
+    """Text of three numbers, to the digits that ``translucent extinction`` prints."""
     return " ".join(f"{value:.5g}" for value in np.asarray(values, dtype=np.float64).tolist())
 
 
 def length_text(metres: float, unit: str) -> str:
-    """A length in the user's unit, to five digits."""
+    """Text of a length in the user's unit, to five digits."""
     return f"{metres / metres_per_unit(unit):.5g} {unit}"
 
 
 def told(material: Material) -> dict[str, Any]:
-    """What ``translucent extinction`` tells of this medium, ready for text."""
+    """Facts that ``translucent extinction`` prints of this medium."""
     medium = medium_of(material)
     color, distance = np.asarray(material.color), material.distance
     if material.source != "color" or medium.scatters:
@@ -59,13 +59,13 @@ def extinction_lines(material: Material) -> list[tuple[str, str]]:
 
 
 def to_display(color: Triple) -> Triple:
-    """sRGB-encoded, as a color field shows it."""
+    """Encode a linear color in sRGB, as a color field shows it."""
     red, green, blue = np.clip(linear_to_srgb(color), 0.0, 1.0).tolist()
     return red, green, blue
 
 
 def from_display(encoded: npt.ArrayLike) -> Triple:
-    """Linear, of what a color field holds to 8 bits; black is raised to what a medium can make."""
+    """Decode a color field's 8-bit value to linear; black is raised to the darkest color of a medium."""
     levels = np.rint(np.clip(np.asarray(encoded, dtype=np.float64), 0.0, 1.0) * 255.0) / 255.0
     red, green, blue = np.maximum(srgb_to_linear(levels), DARKEST).tolist()
     return red, green, blue
@@ -79,7 +79,7 @@ def swatches(material: Material) -> list[tuple[float, str]]:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """How thick a model is in its picture.
+    """Thickness of a model in its picture.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Seen:
 
     @classmethod
     def of(cls, thickness: Array, pixels: int, invalid: int) -> Seen:
-        """With a histogram of 48 bins."""
+        """Thickness statistics of a frame, with a histogram of 48 bins."""
         most = float(thickness.max(initial=0.0)) or 1.0
         counts, edges = np.histogram(thickness, bins=48, range=(0.0, most))
         return cls(thickness, counts / max(int(counts.max()), 1), edges, pixels, invalid)

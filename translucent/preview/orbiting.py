@@ -1,4 +1,4 @@
-"""How an orbiting camera moves: around its target, across the picture, and towards what the cursor is on."""
+"""Movement of an orbiting camera: around its target, across the picture, and towards the cursor."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from translucent.scene.camera import MAX_COORDINATE, Camera
 from translucent.scene.scene import Object
 from translucent.scene.showcase import framing
 
-#: An orthographic camera stands this many distances back, so that a model around the target is before it.
+#: Factor by which an orthographic camera stands farther back, so that a model around the target is before it.
 _STEP_BACK = 4.0
 
-#: Nearest and farthest that zooming gets, in metres.
+#: Smallest and largest distance of zooming, in metres.
 _NEAREST, _FARTHEST = 1e-9, 1e12
 
 
@@ -29,7 +29,7 @@ def towards_camera(orbit: Orbit) -> Array:
 
 
 def camera_of(orbit: Orbit) -> Camera:
-    """The camera itself."""
+    """Camera of an orbit."""
     target = np.asarray(orbit.target)
     if orbit.orthographic:
         eye = target + _STEP_BACK * orbit.distance * towards_camera(orbit)
@@ -38,18 +38,18 @@ def camera_of(orbit: Orbit) -> Camera:
 
 
 def height_at_target(orbit: Orbit) -> float:
-    """Metres that the picture is high where the target is."""
+    """Height of the picture at the target in metres."""
     return 2.0 * orbit.distance * math.tan(math.radians(orbit.fov_y) / 2)
 
 
 def turned(orbit: Orbit, right: float, up: float) -> Orbit:
-    """The camera goes to the right and upwards around the target, by degrees."""
+    """Turn the camera to the right and upwards around the target, by degrees."""
     pitch = min(max(orbit.pitch + up, -MAX_PITCH), MAX_PITCH)
     return dataclasses.replace(orbit, yaw=math.remainder(orbit.yaw + right, 360.0), pitch=pitch)
 
 
 def panned(orbit: Orbit, right: float, down: float) -> Orbit:
-    """The picture moves to the right and down, by shares of its height."""
+    """Pan the picture to the right and down, by shares of its height."""
     camera = camera_of(orbit)
     step = height_at_target(orbit) * (down * camera.up - right * camera.right)
     target = np.clip(np.asarray(orbit.target) + step, -MAX_COORDINATE, MAX_COORDINATE)
@@ -57,7 +57,7 @@ def panned(orbit: Orbit, right: float, down: float) -> Orbit:
 
 
 def zoomed(orbit: Orbit, factor: float, at: tuple[float, float] = (0.0, 0.0)) -> Orbit:
-    """Closer by a factor; what is in the target's plane at `at` (heights right and down of the center) stays there."""
+    """Zoom by a factor; what is in the target's plane at `at` (heights right and down of the center) stays there."""
     distance = min(max(orbit.distance / factor, _NEAREST), _FARTHEST)
     camera = camera_of(orbit)
     shift = height_at_target(orbit) * (1.0 - distance / orbit.distance)
@@ -67,7 +67,7 @@ def zoomed(orbit: Orbit, factor: float, at: tuple[float, float] = (0.0, 0.0)) ->
 
 
 def framed(orbit: Orbit | None, objects: Sequence[Object], size: tuple[int, int]) -> Orbit:
-    """The orbit from which all of the objects are seen, from the same side as before."""
+    """Orbit that frames all of the objects, from the same side as before."""
     side = orbit or Orbit(yaw=math.degrees(math.atan2(0.45, 1.0)), pitch=math.degrees(math.atan2(0.35, 1.097)))
     corners = np.concatenate([_corners(item) for item in objects]) if orbit else None
     if corners is None:
@@ -79,7 +79,7 @@ def framed(orbit: Orbit | None, objects: Sequence[Object], size: tuple[int, int]
 
 
 def orbit_of(camera: Camera, center: npt.ArrayLike) -> Orbit:
-    """The orbit that shows what a camera shows, but for its roll, around the point of its axis nearest to `center`."""
+    """Orbit with the view of a camera, without its roll, around the point of its axis nearest to `center`."""
     axis = -camera.forward
     offset = np.asarray(center, dtype=np.float64) - camera.eye
     distance = max(float(offset @ camera.forward), 1e-3 * float(np.linalg.norm(offset)), _NEAREST)

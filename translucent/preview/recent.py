@@ -1,4 +1,4 @@
-"""Files that were opened lately, kept from one window to the next."""
+"""Recently opened files, kept from one window to the next."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _file() -> Path:
 
 
 def read_recent() -> list[str]:
-    """Paths, the latest first; those that are gone are left out. None where there is no such list."""
+    """Read recent paths, the latest first; those that are gone are left out. None where there is no such list."""
     try:
         lines = _file().read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
@@ -27,7 +27,7 @@ def read_recent() -> list[str]:
 
 
 def write_recent(paths: list[str]) -> None:
-    """Keep the list, where that is possible."""
+    """Write the list, if possible."""
     try:
         _file().parent.mkdir(parents=True, exist_ok=True)
         _file().write_text("\n".join(paths), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""From a document and a loaded model to the scene that is rendered, and from a model to the material that it has."""
+"""Scenes from documents and loaded models, and materials from models."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from translucent.scene.surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A model that has been read: its scene, and the material that its bodies came with."""
+    """Loaded model: its scene, and the material that its bodies came with."""
 
     model: Model
     scene: Scene
@@ -34,12 +34,12 @@ class Loaded:
 
     @property
     def triangles(self) -> int:
-        """How many are drawn."""
+        """Number of triangles that are drawn."""
         return sum(len(item.mesh.faces) for item in self.scene.objects)
 
 
 def load(model: Model, allow_outside: bool = False) -> Loaded:
-    """Read a model, and work out all that would hold up its first picture.
+    """Load a model, and compute everything that would delay its first picture.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
 
 
 def material_of(scene: Scene) -> Material:
-    """The material of the first body; of an opaque model, what it would be filled with."""
+    """Material of the first body; for an opaque model, the one that it would be filled with."""
     diagonal = scene.diagonal or 1.0
     body = fillable(scene)[0]
     if body.medium is None or body.covers:
@@ -94,7 +94,7 @@ def material_of(scene: Scene) -> Material:
 
 
 def medium_of(material: Material) -> Medium:
-    """What fills the bodies: for a color at a distance, exactly what ``translucent extinction`` makes of it."""
+    """Medium of the bodies: for a color at a distance, exactly that of ``translucent extinction``."""
     absorption: object = material.absorption
     if material.source == "color":
         absorption = Medium.from_color(material.color, material.distance).absorption
@@ -102,7 +102,7 @@ def medium_of(material: Material) -> Medium:
 
 
 def scene_of(document: Document, loaded: Loaded) -> Scene:
-    """The scene of a document with an orbit; a model without bodies is filled altogether.
+    """Scene of a document with an orbit; all objects of a model without bodies are filled.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
 
 @lru_cache(maxsize=2)
 def _objects(material: Material, scene: Scene) -> tuple[Object, ...]:
-    """The scene's objects with the material in its bodies; kept, so that turning the camera makes none anew."""
+    """Objects of the scene with the material in its bodies; cached, so that turning the camera makes none anew."""
     if material.source == "file" and scene.bodies:
         return tuple(scene.objects)
     medium, chosen = medium_of(material), set(map(id, fillable(scene)))
@@ -155,7 +155,7 @@ def _light(look: Look) -> DirectionalLight:
 
 @lru_cache(maxsize=2)
 def _environment(name: str, background: str, rotation: float, scene: Scene) -> Environment:
-    """What lights the scene; kept, since what is made of it for rough surfaces is kept with it."""
+    """Environment of the scene; cached, since its filtered maps are cached with it."""
     lit = environment_of(name) if name else scene.environment
     if lit.kind == "image" and rotation:
         lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
@@ -163,7 +163,7 @@ def _environment(name: str, background: str, rotation: float, scene: Scene) -> E
 
 
 def environment_of(name: str) -> Environment:
-    """The environment of a name, or of a file as it is now; the last ones are kept."""
+    """Environment of a name, or of a file as it is now; the last ones are cached."""
     path = Path(name)
     return _environment_of(name, path.stat().st_mtime_ns if path.is_file() else 0)
 
@@ -175,7 +175,7 @@ def _environment_of(name: str, written: int) -> Environment:
 
 @lru_cache(maxsize=4)
 def method_of(name: str, material: Material) -> Method | None:
-    """The method of a name; a thin layer is as thick as the material says."""
+    """Method of a name; a thin layer has the thickness of the material."""
     if name == AUTO:
         return None
     return method_from_name(name).with_thickness(material.thickness)

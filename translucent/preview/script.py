@@ -1,4 +1,4 @@
-"""Scripts: what a user would do, as a list of actions in TOML; for tests, pictures of the window and demonstrations.
+"""Scripts: user actions as a list in TOML; for tests, pictures of the window and demonstrations.
 
 Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
 (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
@@ -25,10 +25,10 @@ from translucent.preview.session import read_toml
 if TYPE_CHECKING:
     from translucent.preview.desk import Desk
 
-#: Seconds after which a script goes on, whatever is under way.
+#: Seconds after which a script continues, whatever work is under way.
 PATIENCE = 120.0
 
-#: Frames between two actions: what an action changes is seen before the next one.
+#: Frames between two actions, so that changes are drawn before the next one.
 FRAMES = 2
 
 _WORDS: dict[str, dict[str, Any]] = {
@@ -65,7 +65,7 @@ class Step:
 
 @dataclass
 class Script:
-    """A script under way.
+    """Running script.
 
     Attributes
     ----------
@@ -81,12 +81,12 @@ class Script:
 
     @classmethod
     def of(cls, steps: list[Step]) -> Script:
-        """Waits for the model first, and for all that is under way at the end."""
+        """Script that waits for the model first, and for all work at the end."""
         settle = Step("wait", {"seconds": -1.0})
         return cls([settle, *steps, settle][::-1])
 
     def step(self, desk: Desk) -> bool:
-        """Do the next action, if it is time; whether all are done."""
+        """Do the next action, if it is time; returns whether all are done."""
         hold_pointer(desk)
         if self._waiting is not None:
             if not self._rested(desk):
@@ -116,7 +116,7 @@ class Script:
 
 
 def read_script(path: str | Path) -> Script:
-    """A script from a file.
+    """Read a script from a file.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def read_script(path: str | Path) -> Script:
 
 
 def read_step(table: Any, where: str) -> Step:
-    """One action, checked."""
+    """Check one action."""
     verb = table.get("do") if isinstance(table, dict) else None
     if verb not in _WORDS:
         close = get_close_matches(str(verb), _WORDS, n=1)
@@ -189,7 +189,7 @@ def _use_file(desk: Desk, kind: str, path: str) -> None:
 
 
 def hold_pointer(desk: Desk) -> None:
-    """Keep the mouse where the script has put it, whatever the system says."""
+    """Keep the mouse where the script has put it, whatever the system reports."""
     if desk.pointer is not None:
         size = _io().display_size
         _io().add_mouse_pos_event(desk.pointer[0] * size.x, desk.pointer[1] * size.y)

@@ -12,14 +12,14 @@ from translucent.files.paths import write_atomically
 from translucent.files.reading import read_text, toml_value
 from translucent.preview.document import Document, Orbit, checked
 
-#: Of the format; a later one that this cannot read would raise it.
+#: Version of the format, raised by changes that older readers cannot read.
 VERSION = 1
 
 _SECTIONS = ("model", "material", "look", "display", "orbit")
 
 
 def to_table(document: Document) -> dict[str, Any]:
-    """The document in what TOML can hold."""
+    """Document as values that TOML can hold."""
     table: dict[str, Any] = {"version": VERSION}
     for section in _SECTIONS:
         value = getattr(document, section)
@@ -30,7 +30,7 @@ def to_table(document: Document) -> dict[str, Any]:
 
 
 def from_table(table: dict[str, Any], where: str) -> Document:
-    """The document that a table holds; what it does not mention is as at the start.
+    """Document of a table; absent fields have their defaults.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def _fields(section: str, default: Any, fields: dict[str, Any], where: str) -> d
 
 
 def save_session(path: str | Path, document: Document) -> None:
-    """Write a document; the file is complete or not there.
+    """Write a document atomically.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def load_session(path: str | Path) -> Document:
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
-    """The table in a file; `what` is what errors call it."""
+    """Read the table in a file; errors name it `what`."""
     text = read_text(path, what)
     try:
         return toml_value(text)

@@ -1,4 +1,4 @@
-"""What draws the viewport: a renderer in the window's context, steps that never take long, shaders that may change."""
+"""Stage that draws the viewport: a renderer in the window's context, short steps, and shaders that may change."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
-#: Seconds that a step should take at most, and samples of a pixel when steps are quick or slow.
+#: Largest time of a step in seconds, and samples of a pixel when steps are quick or slow.
 BUDGET = 0.045
 SAMPLES, SLOW_SAMPLES = 16, 4
 
-#: By which a picture is coarser while it moves.
+#: Factors by which a picture is coarser while it moves.
 FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
-#: Seconds between looks at the shader files.
+#: Seconds between checks of the shader files.
 WATCH = 0.5
 
 
@@ -41,7 +41,7 @@ Factor = TypeVar("Factor", int, float)
 
 @dataclass
 class Timing:
-    """What the last step of a side took: seconds, by the clock and per pass on the GPU; and its share of the pixels."""
+    """Timing of the last step of a side: seconds, by the clock and per pass on the GPU; and its share of the pixels."""
 
     wall: float = 0.0
     passes: dict[str, float] | None = None
@@ -54,7 +54,7 @@ class Timing:
 
 
 class Stage:
-    """Draws a workspace's scene into a texture.
+    """Stage: draws a workspace's scene into a texture.
 
     Parameters
     ----------
@@ -104,11 +104,11 @@ class Stage:
         self._newest = newest_shader()
 
     def current(self) -> AbstractContextManager[Any]:
-        """The context is current within: a window's always is, and our own is made so."""
+        """Context manager that makes the context current: a window's always is."""
         return nullcontext(self._gl) if self._own is None else self._own.current()
 
     def draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
-        """Draw a step, if there is one left; whether more are.
+        """Draw a step, if there is one left; returns whether more are.
 
         What goes wrong is told in `problem`, and the last picture stays.
         """
@@ -172,7 +172,7 @@ class Stage:
         return drawn
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
-        """While things move: the picture itself and nothing beside it."""
+        """Draw the picture alone, while things move."""
         look, begun = workspace.document.look, time.perf_counter()
         factor = self._factor(self.plans[0], FACTORS)
         try:
@@ -207,7 +207,7 @@ class Stage:
         self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def _factor(self, plan: RenderPlan | None, factors: tuple[Factor, ...]) -> Factor:
-        """The least of the factors with which a picture is drawn quickly, as far as one can tell."""
+        """Smallest factor of reduction at which a picture is expected to be drawn quickly."""
         known = None if plan is None else self._costs.get(_kind(plan))
         if known is None:
             return factors[0] if plan is None else factors[-2:][0]
@@ -247,20 +247,20 @@ class Stage:
         return self._truth is not None
 
     def thickest(self, workspace: Workspace) -> float:
-        """Metres of the last false color: the thickest that was measured, or a guess."""
+        """Length in metres of the last false color: the thickest that was measured, or a guess."""
         measured = workspace.measured
         if measured is not None and measured.seen.thickness.size:
             return float(measured.seen.thickness.max()) or 1.0
         return workspace.loaded.scene.diagonal or 1.0 if workspace.loaded else 1.0
 
     def worst(self, workspace: Workspace) -> float:
-        """Metres of the largest error that has a color of its own."""
+        """Largest error in metres that has a color of its own."""
         measured = workspace.measured
         least = 1e-7 * self.thickest(workspace)
         return max(measured.errors[0].p99, least) if measured is not None and measured.errors else 10 * least
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
-        """What a pixel of a side holds, once it has been drawn for good."""
+        """Values of a pixel of a side, once it is final."""
         done = self._strides[side] ** 2 if side == 0 or self.plans[1] is not None else 1
         if self.viewport.steps(side) < done:
             return None
@@ -268,7 +268,7 @@ class Stage:
             return self.viewport.probe(x, y, side)
 
     def watch(self, workspace: Workspace) -> None:
-        """Take over shaders that have changed on disk, unless they do not compile."""
+        """Reload shaders that have changed on disk, unless they do not compile."""
         if time.monotonic() - self._watched < WATCH:
             return
         self._watched = time.monotonic()
@@ -277,7 +277,7 @@ class Stage:
             self.reload(workspace)
 
     def _begin(self, workspace: Workspace, scene: Scene) -> None:
-        """There is a first picture: from now on, it stays on show while later ones are prepared."""
+        """Mark the first picture as drawn: from now on, it stays on show while later ones are prepared."""
         if self._begun:
             return
         self._begun = True
@@ -290,7 +290,7 @@ class Stage:
         return [plan for plan in self.plans if plan is not None]
 
     def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
-        """Ask for what is missing; until it is there, the same picture is not tried again."""
+        """Request missing programs; until they are there, the same picture is not tried again."""
         compiler, scene = self._compiler, workspace.scene()
         assert compiler is not None
         assert scene is not None
@@ -313,7 +313,7 @@ class Stage:
             workspace.tell("warning", text)
 
     def reload(self, workspace: Workspace) -> None:
-        """Compile the shaders anew; if that fails, go on with those there are, and tell why."""
+        """Compile the shaders anew; if that fails, keep the present ones, and tell why."""
         compiler, scene = self._compiler, workspace.scene()
         if compiler is None or not compiler.ledger.postpones or scene is None:
             return self._rebuild(workspace)
@@ -362,7 +362,7 @@ class Stage:
         self._shown = self._presented = ()
 
     def close(self) -> None:
-        """Free everything."""
+        """Free all resources."""
         with self.current():
             self.viewport.release()
             self.renderer.close()
@@ -371,5 +371,5 @@ class Stage:
 
 
 def _kind(plan: RenderPlan) -> tuple[str, ...]:
-    """Plans that take about the same time."""
+    """Key of plans that take about the same time."""
     return (str(plan.method), *(step.name for step in plan.passes))

@@ -1,4 +1,4 @@
-"""Long work in threads of its own: with progress, and cancelled where nobody waits for it any more."""
+"""Long tasks in threads, with progress and cancellation."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import Any, TypeAlias
 
 from translucent.errors import TranslucentError
 
-#: Tells how far work is, 0 to 1 if that is known, and what it is at.
+#: Callback for progress, 0 to 1 if that is known, and a description of the step.
 Report: TypeAlias = Callable[[float | None, str], None]
 
 
 class CancelledError(Exception):
-    """Raised within a task that nobody waits for."""
+    """Signal within a task that it is canceled."""
 
 
 @dataclass(eq=False)
 class Task:
-    """Work under way.
+    """Task under way.
 
     Attributes
     ----------
@@ -50,27 +50,27 @@ class Task:
 
     @property
     def cancelled(self) -> bool:
-        """Whether nobody waits for it."""
+        """Whether the task is canceled."""
         return self._cancelled.is_set()
 
     @property
     def finished(self) -> bool:
-        """Whether it has ended, in whichever way."""
+        """Whether the task has ended, in whichever way."""
         return self._finished.is_set()
 
     @property
     def seconds(self) -> float:
-        """Since it was asked for."""
+        """Seconds since the task was requested."""
         return time.monotonic() - self.started
 
     def cancel(self) -> None:
-        """Nobody waits any more; the work ends at its next report, and does not begin if it has not."""
+        """Cancel the task: the work ends at its next report, or does not start."""
         self._cancelled.set()
         # A task may wait long behind another one, and what it would have drawn is large.
         self.work = self.then = _nothing
 
     def report(self, share: float | None, detail: str = "") -> None:
-        """Tell how far the work is; raises `CancelledError` if nobody waits for it."""
+        """Report the progress of the work; raises `CancelledError` if it is canceled."""
         if self.cancelled:
             raise CancelledError
         self.share, self.detail = share, detail
@@ -89,11 +89,11 @@ class Task:
 
 
 def _nothing(_: Any) -> None:
-    """What is left of a task that nobody waits for."""
+    """Replacement for the work of a canceled task."""
 
 
 class Lane:
-    """A thread that does one task after the other; what is asked for takes the place of what was.
+    """Thread that runs one task after the other; a new request replaces the last one.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Lane:
         self._thread.start()
 
     def start(self, name: str, work: Callable[[Task], Any], then: Callable[[Any], None]) -> Task:
-        """Ask for work; what is under way is cancelled."""
+        """Start work; work under way is canceled."""
         if self.task is not None:
             self.task.cancel()
         self.task = Task(name, work, then)
@@ -116,7 +116,7 @@ class Lane:
         return self.task
 
     def poll(self, refuse: Callable[[Exception], None]) -> None:
-        """Hand over a result that is there, or what went wrong."""
+        """Deliver a result that is ready, or its error."""
         task = self.task
         if task is None or not task.finished:
             return
@@ -129,7 +129,7 @@ class Lane:
             refuse(task.error)
 
     def close(self, patience: float = 0.5) -> None:
-        """Cancel what is under way, and end the thread, unless that takes longer than `patience` seconds."""
+        """Cancel work under way, and end the thread, unless that takes longer than `patience` seconds."""
         if self.task is not None:
             self.task.cancel()
         self._waiting.put(None)
@@ -137,7 +137,7 @@ class Lane:
 
     @property
     def ended(self) -> bool:
-        """Whether the thread is no more."""
+        """Whether the thread has ended."""
         return not self._thread.is_alive()
 
     def _run(self) -> None:
@@ -147,7 +147,7 @@ class Lane:
 
 
 def problem(error: Exception) -> str:
-    """An error in words: those of the toolkit as they are, and a defect by its kind."""
+    """Message of an error: those of the toolkit as they are, and a defect by its type."""
     if isinstance(error, TranslucentError):
         return str(error)
     if isinstance(error, MemoryError):

@@ -1,4 +1,4 @@
-"""Work in a worker process: libraries that hold the interpreter's lock for seconds would stop the window."""
+"""Work in worker processes, as libraries that hold the interpreter lock for seconds would freeze the window."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from translucent.preview.tasks import CancelledError, Task
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.texture import Texture
 
-#: Seconds between looks whether anybody still waits for the result.
+#: Seconds between checks whether the result is still wanted.
 PATIENCE = 0.1
 
-#: How far these processes stand back where the window needs the processor.
+#: Niceness of worker processes, so that the window comes first.
 NICENESS = 10
 
-#: Seconds in which work that nobody waits for may come to an end, before its process is ended.
+#: Seconds that canceled work has to end, before its process is ended.
 PARTING = 5.0
 
-#: What is large and never changes: sent once, and kept for as long as it lives here.
+#: Types of large immutable values: sent once, and cached for as long as they live here.
 KEPT = (Mesh, EnvironmentMap, Texture, DensityGrid)
 
 Result = TypeVar("Result")
 
 
 def in_a_process(task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
-    """The result of `Companion.call` in a process for this alone."""
+    """Result of `Companion.call` in a worker process of its own."""
     companion = Companion()
     try:
         return companion.call(task, work, *arguments)
@@ -51,7 +51,7 @@ def in_a_process(task: Task, work: Callable[..., Result], *arguments: Any) -> Re
 
 
 class Companion:
-    """A process that does one thing after the other; it begins with the first of them, and again if it had to end."""
+    """Worker process that runs tasks one after the other; it starts with the first, and again if it had to end."""
 
     def __init__(self) -> None:
         self._running: _Running | None = None
@@ -59,7 +59,8 @@ class Companion:
         self._closed = False
 
     def call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
-        """The result of `work(report, *arguments)`, which calls ``report(share, detail)``; its warnings are given here.
+        """Run `work(report, *arguments)` and return its result, which calls ``report(share, detail)``; its warnings are
+        given here.
 
         Parameters
         ----------
@@ -117,7 +118,7 @@ class Companion:
         return content  # type: ignore[no-any-return]
 
     def close(self, patience: float = PARTING) -> None:
-        """End the process, whatever it is at, and begin none again; it has `patience` seconds to tidy up."""
+        """End the worker process for good, whatever it is doing; it has `patience` seconds to clean up."""
         self._closed = True
         self._end(patience)
 
@@ -128,7 +129,7 @@ class Companion:
 
 
 class _Running:
-    """A process, and what it has been sent."""
+    """Running worker process, with the record of values sent to it."""
 
     def __init__(self) -> None:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
@@ -143,7 +144,7 @@ class _Running:
         self._at = 0
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-        """Send work, after what it needs that has not been sent before."""
+        """Send work, preceded by the values that it needs and that were not sent before."""
         stream = io.BytesIO()
         pickler = _Pickler(stream, self._token)
         pickler.dump((work, arguments))
@@ -158,7 +159,7 @@ class _Running:
         self._pipe.send(("work", (self._at, stream.getvalue())))
 
     def answer(self, task: Task) -> tuple[bool, Any]:
-        """Whether the work failed, and its result or error."""
+        """Answer of the work: whether it failed, and its result or error."""
         while True:
             if not self._pipe.poll(PATIENCE):
                 task.report(task.share, task.detail)
@@ -172,7 +173,7 @@ class _Running:
                 task.report(*content)
 
     def stop(self) -> bool:
-        """Have the work end at its next report; whether it did so in time."""
+        """Stop the work at its next report; returns whether it did so in time."""
         end = time.monotonic() + PARTING
         try:
             self._pipe.send(("stop", self._at))
@@ -184,12 +185,12 @@ class _Running:
         return False
 
     def status(self) -> int | None:
-        """With what the process has ended."""
+        """Exit status of the worker process."""
         self._process.join()
         return self._process.exitcode
 
     def close(self, patience: float) -> None:
-        """End the process; it has some seconds to remove what it has half written."""
+        """End the worker process; it has some seconds to remove unfinished files."""
         self._process.terminate()
         self._process.join(patience)
         self._process.kill()
@@ -201,7 +202,7 @@ class _Running:
 
 
 class _Pickler(pickle.Pickler):
-    """Writes tokens for what is kept; `found` has the things themselves."""
+    """Pickler that writes tokens for cached values; `found` has the values themselves."""
 
     def __init__(self, stream: io.BytesIO, token: Callable[[object], int]) -> None:
         super().__init__(stream, protocol=pickle.HIGHEST_PROTOCOL)
@@ -217,7 +218,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Reads what `_Pickler` writes."""
+    """Unpickler for the output of `_Pickler`."""
 
     def __init__(self, stream: io.BytesIO, kept: dict[int, object]) -> None:
         super().__init__(stream)
@@ -228,7 +229,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _run(pipe: Connection) -> None:
-    """In the process: until nobody is at the other end."""
+    """Main loop of the worker process, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # not at once: files are removed that are half written
     warnings.showwarning = lambda message, *_, **__: pipe.send(("warning", str(message)))

@@ -1,4 +1,4 @@
-"""What goes on behind the window: the history, the model that is loaded, and the work under way. No window, no GPU."""
+"""Workspace behind the window: the history, the loaded model, and the work under way. No window, no GPU."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from translucent.preview.worker import PARTING, Companion, in_a_process
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable
 
-#: Lines that the window keeps.
+#: Largest number of messages that the window keeps.
 MAX_MESSAGES = 50
 
-#: Models that are kept for undo.
+#: Number of models that are cached for undo.
 KEPT_MODELS = 2
 
-#: Seconds for which a window that is closed waits for work: files are to be whole, and processes not left behind.
+#: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
 PATIENCE = {"write": 60.0, "bake": 2.5 * PARTING}
 
-#: Files that were opened lately.
+#: Largest number of recently opened files.
 MAX_RECENT = 8
 
 
 @dataclass(frozen=True)
 class Message:
-    """A line for the user."""
+    """Message for the user."""
 
     kind: Literal["info", "warning", "error"]
     text: str
@@ -53,7 +53,7 @@ class Message:
 
 
 class Workspace:
-    """A document under way.
+    """Workspace of a document.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Workspace:
         self.bake: Bake | None = None
         self.show_bake = True
         self.compiler = Compiler()
-        #: What takes a moment, and what takes long.
+        #: Worker processes for work that takes a moment, and for work that takes long.
         self._measuring, self._reference = Companion(), Companion()
         self.lanes = {
             "load": Lane("load"),
@@ -112,11 +112,11 @@ class Workspace:
 
     @property
     def document(self) -> Document:
-        """The one on show."""
+        """Document on show."""
         return self.history.present
 
     def do(self, action: Action) -> None:
-        """Do an action to the document, or tell why not."""
+        """Apply an action to the document, or tell why not."""
         if isinstance(action, Open):
             return self.open(Model(action.path, action.unit))
         try:
@@ -126,11 +126,11 @@ class Workspace:
         return None
 
     def undo(self) -> None:
-        """A step back."""
+        """Undo a step."""
         self._set(self.history.undone())
 
     def redo(self) -> None:
-        """A step forward again."""
+        """Redo a step."""
         self._set(self.history.redone())
 
     def open(self, model: Model, then: Document | None = None) -> None:
@@ -167,25 +167,25 @@ class Workspace:
             self.tell("info", done)
 
     def frame(self, number: int | None = None) -> None:
-        """See the whole model, or one of its objects, from the side where the camera is."""
+        """Frame the whole model, or one of its objects, from the side of the camera."""
         if self.loaded is not None:
             objects = self.loaded.scene.objects
             chosen = [objects[number]] if number is not None and number < len(objects) else objects
             self.do(View(orbiting.framed(self.document.orbit, chosen, self.size)))
 
     def reframe(self) -> None:
-        """See the model as it was seen when it was opened."""
+        """Reset the view of the model to that at its opening."""
         self._complete()
 
     def update(self) -> None:
-        """Take over what the background has done, and ask it for what is missing."""
+        """Take over results of background work, and request missing ones."""
         for lane in self.lanes.values():
             lane.poll(self.refuse)
         if self.loaded is None or self.document.model != self.loaded.model:
             self._want(self.document.model)
 
     def scene(self) -> Scene | None:
-        """What is to be seen; the same object for as long as nothing about it changes."""
+        """Scene on show; the same object for as long as nothing about it changes."""
         loaded = self.loaded
         if loaded is None or self.document.orbit is None:
             return None
@@ -203,17 +203,17 @@ class Workspace:
 
     @property
     def shown_bake(self) -> Bake | None:
-        """The map that the model is painted with, so that there is no medium to be seen; None if it is not."""
+        """Map that the model is painted with; None if it shows its medium."""
         return self.bake if self.show_bake else None
 
     @property
     def busy(self) -> list[Task]:
-        """Work that the user may want to see, or to cancel."""
+        """Tasks under way that the user may want to see or to cancel."""
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
         return [task for task in tasks if task.name or task is not self.compiler.lane.task]
 
     def prepare(self) -> None:
-        """Make what later pictures need, now that the first is there."""
+        """Prepare later pictures, now that the first is there."""
         if self.lanes["light"].task is None:
             self.lanes["light"].start("", prepare, lambda _: None)
 
@@ -290,12 +290,12 @@ class Workspace:
         return None
 
     def refuse(self, error: Exception) -> None:
-        """Tell why something was not done."""
+        """Show why something was not done."""
         self.failure = self.failure or error
         self.tell("error", problem(error))
 
     def tell(self, kind: Literal["info", "warning", "error"], text: str) -> None:
-        """A line for the user, unless it is what the last one said."""
+        """Add a message for the user, unless it repeats the last one."""
         if not self.messages or self.messages[-1].text != text or time.monotonic() - self.messages[-1].when > 1.0:
             self.messages.append(Message(kind, text))
 
@@ -311,7 +311,7 @@ class Workspace:
 
     @property
     def ended(self) -> bool:
-        """Whether none of the work is under way any more."""
+        """Whether all work has ended."""
         return all(lane.ended for lane in self.lanes.values())
 
     def _set(self, history: History) -> None:
@@ -324,7 +324,7 @@ class Workspace:
             self._complete()
 
     def _want(self, model: Model) -> None:
-        """Have the document's model loaded."""
+        """Request the document's model to be loaded."""
         for loaded in self._models:
             if loaded.model == model:
                 self._keep(loaded)
@@ -355,7 +355,7 @@ class Workspace:
             self.loaded, self.bake, self.changed = loaded, None, time.monotonic()
 
     def _complete(self) -> None:
-        """Give the document what only the model can tell: its own material, and where the camera is."""
+        """Complete the document from the model: its own material, and the camera."""
         if self.loaded is None:
             return
         present = self.document
@@ -366,7 +366,7 @@ class Workspace:
 
 
 def _first_orbit(loaded: Loaded, size: tuple[int, int]) -> Orbit:
-    """From where a file's own camera sees it, or framed."""
+    """First orbit of a model: that of the file's own camera, or a framed view."""
     from translucent.gltf.load import GltfScene
 
     if isinstance(loaded.scene, GltfScene):
@@ -375,6 +375,6 @@ def _first_orbit(loaded: Loaded, size: tuple[int, int]) -> Orbit:
 
 
 def _lit_alike(first: Document, second: Document) -> bool:
-    """Whether the looks differ in nothing but how the picture is developed."""
+    """Whether two looks differ only in exposure and tone curve."""
     developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
     return developed == second.look

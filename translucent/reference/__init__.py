@@ -1,4 +1,4 @@
-"""Ground truth in float64 on the CPU, independent of any GPU: `render`, `march`, `path_trace` and what is below."""
+"""Ground truth in float64 on the CPU, independent of any GPU: `render`, `march` and `path_trace`."""
 
 from translucent.reference.hits import Hits, camera_hits, line_hits
 from translucent.reference.intervals import Intervals

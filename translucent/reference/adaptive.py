@@ -1,4 +1,4 @@
-"""Integrals to a tolerance: Kronrod's rule of 15 points on intervals that are halved where the error is."""
+"""Adaptive integration to a tolerance: Kronrod's rule of 15 points on intervals that are halved where the error is."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from translucent.arrays import Array, Integers
 #: Values (m, p, 3) of the integrand of intervals (m,) at places (m, p) in them.
 Integrand = Callable[[Integers, Array], Array]
 
-#: Halvings of an interval, at most: float64 holds no more.
+#: Largest number of halvings of an interval: float64 holds no more.
 ROUNDS = 45
 
-#: Intervals of a sum are not halved any more when there are so many: rounding, not the rule, sets the error.
+#: Largest number of intervals of a sum: beyond it, rounding, not the rule, sets the error.
 MOST_INTERVALS = 4096
 
-#: A channel that is dimmer than this share of the brightest one of its sum need not be as accurate.
+#: Share of the brightest channel of a sum below which a channel need not be as accurate.
 DIM = 1e-3
 
 # Kronrod 1965: values of Piessens et al. 1983 (QUADPACK), for -1 to 1; from the outermost point to the middle.
@@ -64,7 +64,7 @@ NULL_RULES = _null_rules()
 
 @dataclass(frozen=True, eq=False)
 class Integral:
-    """Sums of integrals, and what they may be wrong by.
+    """Sums of integrals, with bounds of their errors.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Integral:
 def integrate(
     integrand: Integrand, start: Array, end: Array, group: Integers, groups: int, tolerance: float
 ) -> Integral:
-    """Sums over groups of intervals of the integral of three channels, each sum to a relative tolerance.
+    """Integrate three channels over intervals, with the sum over each group to a relative tolerance.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Colors with opacity, one behind the other (Porter & Duff 1984; Max 1995, section 4).
+"""Compositing of colors with opacity (Porter & Duff 1984; Max 1995, section 4).
 
 An associated (premultiplied) color is the radiance that a layer adds; an unassociated one is that divided by the
 layer's opacity, and has no meaning where this is 0.
@@ -18,7 +18,7 @@ from translucent.formulas import optics
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """A color and what it covers.
+    """Layer: a color and its opacity.
 
     Attributes
     ----------
@@ -43,13 +43,13 @@ class Layer:
 
 @np.errstate(under="ignore", over="ignore")
 def over(front: Layer, back: Layer) -> Layer:
-    """The layer that two make whose colors are associated: C = C_f + (1 - a_f) C_b."""
+    """Composite of two layers of associated colors: C = C_f + (1 - a_f) C_b."""
     return Layer(front.color + front.transmittance * back.color, front.optical_depth + back.optical_depth)
 
 
 @np.errstate(under="ignore", over="ignore")
 def over_unassociated(front: Layer, back: Layer) -> Layer:
-    """The layer that two make whose colors are unassociated: C = (a_f C_f + (1 - a_f) a_b C_b) / a."""
+    """Composite of two layers of unassociated colors: C = (a_f C_f + (1 - a_f) a_b C_b) / a."""
     both = front.opacity * front.color + front.transmittance * back.opacity * back.color
     depth = front.optical_depth + back.optical_depth
     return Layer(_divided(both, optics.opacity(depth)), depth)
@@ -57,13 +57,13 @@ def over_unassociated(front: Layer, back: Layer) -> Layer:
 
 @np.errstate(under="ignore")
 def associated(layer: Layer) -> Layer:
-    """A layer of unassociated color with its associated color, a C."""
+    """Layer with its unassociated color converted to the associated color, a C."""
     return Layer(layer.opacity * layer.color, layer.optical_depth)
 
 
 @np.errstate(under="ignore")
 def unassociated(layer: Layer) -> Layer:
-    """A layer of associated color with its unassociated color, C / a.
+    """Layer with its associated color converted to the unassociated color, C / a.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def unassociated(layer: Layer) -> Layer:
 
 
 def _divided(color: Array, opacity: Array) -> Array:
-    """color / opacity; 0 where there is no opacity."""
+    """Quotient color / opacity; 0 where there is no opacity."""
     return np.asarray(np.where(opacity > 0, color / np.where(opacity > 0, opacity, 1.0), 0.0))
 
 

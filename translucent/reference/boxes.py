@@ -1,4 +1,4 @@
-"""A tree of boxes around triangles, and the triangles that lines may meet."""
+"""Bounding volume hierarchy of triangles, and candidate triangles of lines."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
 
-#: Children of a node.
+#: Number of children of a node.
 BRANCHES = 8
 
-#: Lines that walk down the tree together: the working arrays stay below 100 MB.
+#: Number of lines that walk down the tree together: the working arrays stay below 100 MB.
 LINES = 1 << 12
 
-#: Boxes are larger by this share of the distances, so that rounding loses no triangle.
+#: Enlargement of boxes as a share of the distances, so that rounding loses no triangle.
 MARGIN = 1e-13
 
-#: No line meets a box of this half size.
+#: Half size of an empty box, which no line meets.
 _NOTHING = -1e300
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Straight lines, each from one distance to another.
+    """Line segments, each from one distance to another.
 
     Attributes
     ----------
@@ -44,13 +44,13 @@ class Lines:
         return len(self.directions)
 
     def where(self, chosen: Integers | slice) -> Lines:
-        """The lines that indices or a slice choose, numbered anew."""
+        """Selection of lines by indices or a slice, renumbered."""
         return Lines(self.origins[chosen], self.directions[chosen], self.start[chosen], self.end[chosen])
 
 
 @dataclass(frozen=True, eq=False)
 class BoxTree:
-    """Boxes around triangles, around groups of these, and so on.
+    """Bounding volume hierarchy of triangles.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class BoxTree:
 
     @classmethod
     def of(cls, corners: Array) -> BoxTree:
-        """The tree of triangles (m, 3, 3), in the order of a space-filling curve (Morton 1966)."""
+        """Build the tree of triangles (m, 3, 3), in the order of a space-filling curve (Morton 1966)."""
         low, high = corners.min(axis=1), corners.max(axis=1)
         order = np.argsort(_morton_codes(0.5 * (low + high)), kind="stable")
         low, high = low[order], high[order]
@@ -96,7 +96,7 @@ class BoxTree:
 
     @property
     def _real(self) -> npt.NDArray[np.bool_]:
-        """(6, 8): where the root has children."""
+        """(6, 8): mask of the children that the root has."""
         return np.broadcast_to(self.levels[-1][0, 3] != _NOTHING, (6, BRANCHES))
 
 

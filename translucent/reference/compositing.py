@@ -13,7 +13,8 @@ from translucent.reference.segments import Segments
 
 @np.errstate(over="ignore", under="ignore")
 def composite(segments: Segments, pixels: int) -> tuple[Array, Array]:
-    """Emitted radiance and optical depth of rays, front to back; exact for media that are constant in each segment.
+    """Composite emitted radiance and optical depth of rays, front to back; exact for media that are constant in each
+    segment.
 
     Max 1995, section 4: each segment adds what it emits times the transmittance of all before it.
 

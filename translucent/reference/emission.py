@@ -1,4 +1,4 @@
-"""What media emit where several fill a place and vary in different ways."""
+"""Emission of mixtures of media with different varying densities."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.volume import Volume, places
 
-#: Relative error of what each segment emits: far below that of anything to compare with.
+#: Relative error of the emission of each segment: far below that of anything to compare with.
 TOLERANCE = 1e-12
 
 
 def emission_of_mixtures(volume: Volume, rays: Rays, segments: Segments, filling: Array) -> Segments:
-    """The segments with the constant emission that adds the same radiance as theirs, where it is not in closed form.
+    """Segments with equivalent constant emission, where the emission of a mixture has no closed form.
 
     Emission and extinction of a single medium vary together, and their means will do. Those of mixtures need an
     integral, of T(t) q(t) over the segment (Max 1995, section 4).

@@ -6,13 +6,13 @@ import numpy as np
 
 from translucent.arrays import Array
 
-#: A light nearer to the line than this share of its distance from the ends counts as this far away. Any distance makes
-#: a valid variable; with this one it keeps its digits where the light is on the line, beyond the ends.
+#: Smallest distance of a light from the line, as a share of its distance from the ends. Any distance makes a valid
+#: variable; with this one it keeps its digits where the light is on the line, beyond the ends.
 CLOSEST = 1e-6
 
 
 def equiangular(start: Array, end: Array, middle: Array, distance: Array, u: Array) -> tuple[Array, Array]:
-    """t(u) and dt/du of t = middle + D tan(theta), theta from where t is `start`, at u = 0, to `end`, at u = 1.
+    """Equiangular map t(u) = middle + D tan(theta), from `start` at u = 0 to `end` at u = 1, and dt/du.
 
     Rearranged, so that no digits are lost where the light is far away and the angles are nearly equal.
 

@@ -28,7 +28,7 @@ CHUNK = 1 << 16
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Where rays cross a surface: flat arrays, sorted by pixel, then distance, entries before exits.
+    """Crossings of rays with a surface: flat arrays, sorted by pixel, then distance, entries before exits.
 
     Attributes
     ----------
@@ -51,11 +51,11 @@ class Hits:
     barycentric: Array
 
     def where(self, keep: npt.NDArray[np.bool_] | Integers | slice) -> Hits:
-        """The hits that a mask (k,), indices or a slice choose."""
+        """Selection of hits by a mask (k,), indices or a slice."""
         return Hits(self.pixel[keep], self.distance[keep], self.sign[keep], self.face[keep], self.barycentric[keep])
 
     def before(self, end: Array) -> Hits:
-        """The hits ahead of the origins, as far as the distance `end` (pixels,) where each ray stops."""
+        """Hits ahead of the origins, up to the distance `end` (pixels,) where each ray stops."""
         return self.where((self.distance >= 0) & (self.distance < end[self.pixel]))
 
 
@@ -76,7 +76,7 @@ def camera_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[i
 
 
 def line_hits(mesh: Mesh, matrix: npt.ArrayLike, camera: Camera, size: tuple[int, int]) -> Hits:
-    """As `camera_hits`, with the surfaces behind the origins too, at negative distances."""
+    """All surfaces of a mesh on the pixel rays, including those behind the origins at negative distances."""
     size = check_size(size)
     body = Object(mesh, transform=matrix)
     corners = camera_vertices(mesh, body.matrix, camera)[mesh.faces]
@@ -137,7 +137,9 @@ def from_eye(point: Array, matrix: Array, camera: Camera) -> Array:
 
 
 def _rotate(matrix: Array, vectors: Array) -> Array:
-    """matrix @ v for each v; unlike a matrix product, equal vectors give bit-equal results wherever they stand."""
+    """Product matrix @ v for each v; unlike a matrix product, equal vectors give bit-equal results wherever they
+    stand.
+    """
     x, y, z = vectors.T
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=-1)
 
@@ -145,7 +147,7 @@ def _rotate(matrix: Array, vectors: Array) -> Array:
 def _candidates(
     grid: PictureGrid, corners: Array, weight: Array, size: tuple[int, int]
 ) -> Iterator[tuple[Integers, Integers, Integers]]:
-    """Chunks of face, row and column: all pixels in the box around what of each face has a positive weight."""
+    """Chunks of face, row and column: all pixels in the bounding box of each face's part with positive weight."""
     pixels = grid.pixels(corners[..., :2], weight)
     first_column, columns = pixel_span(pixels[..., 0], weight, size[0])
     first_row, rows = pixel_span(pixels[..., 1], weight, size[1])
@@ -231,7 +233,7 @@ def _halves(value: Array) -> tuple[Array, Array]:
 
 
 def sorted_hits(parts: list[_Arrays], outwards: int) -> Hits:
-    """The parts as one, each hit once; `outwards` is -1 where the faces look into the body."""
+    """Merge parts, each hit once; `outwards` is -1 where the faces look into the body."""
     nothing = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int8), np.empty((0, 3)))
     pixel, face, distance, sign, barycentric = (np.concatenate(arrays) for arrays in zip(nothing, *parts, strict=True))
     sign = (sign * outwards).astype(np.int8)

@@ -1,4 +1,4 @@
-"""Where light is refracted or reflected: the first interface on each ray at which what it is in changes.
+"""Interfaces on rays: the first place on each ray at which its medium changes.
 
 Of several bodies at one place, the one of the highest priority decides what light is in; of equal ones, the one that
 the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries a record of
@@ -21,19 +21,19 @@ from translucent.reference.hits import Hits, world_normals
 from translucent.scene.scene import Scene
 from translucent.scene.surface import Surface
 
-#: Walls closer together than this share of the scene's diagonal are at one place.
+#: Distance within which surfaces coincide, as a share of the scene's diagonal.
 TOGETHER = 1e-9
 
-#: Least cosine between an interface's normal and a ray that meets it.
+#: Smallest cosine between an interface's normal and a ray that meets it.
 EDGE_ON = 1e-3
 
-#: Of what is in no body.
+#: Index meaning outside all bodies.
 AIR = -1
 
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """Which bodies rays are in.
+    """State of rays: the bodies that they are inside.
 
     Attributes
     ----------
@@ -47,13 +47,13 @@ class Inside:
     since: Integers
 
     def where(self, chosen: Integers | Mask) -> Inside:
-        """Those of the rays that indices or a mask choose."""
+        """Selection of rays by indices or a mask."""
         return Inside(self.windings[chosen], self.since[chosen])
 
 
 @dataclass(frozen=True, eq=False)
 class Interfaces:
-    """The first interface on each ray; all arrays (n,).
+    """First interface on each ray; all arrays (n,).
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Interfaces:
     there: Inside
 
     def where(self, chosen: Integers) -> Interfaces:
-        """Those of the rays that indices choose."""
+        """Selection of rays by indices."""
         return Interfaces(
             self.distance[chosen],
             self.item[chosen],
@@ -94,7 +94,7 @@ class Interfaces:
 
 
 class Optics:
-    """What light meets at the interfaces of a scene, for one color of light or for all alike.
+    """Optical properties of a scene's interfaces, for one color of light or for all together.
 
     Parameters
     ----------
@@ -115,9 +115,9 @@ class Optics:
         solid = [body.medium is not None and metres is None for body, metres in zip(scene.objects, sheets, strict=True)]
         self.solids = [i for i, is_solid in enumerate(solid) if is_solid]
         counts = [body.has_interface or scene.overlap == "priority" for body in scene.objects]
-        #: (objects,): bodies that decide what light is in.
+        #: (objects,): objects that determine the medium of light.
         self.decides = np.array(solid) & np.array(counts)
-        #: Sheets that do more than a path through them tells.
+        #: Sheets with an optical effect beyond absorption along the path.
         self.walls = [i for i, body in enumerate(scene.objects) if sheets[i] is not None and body.has_interface]
         _, self._rank = np.unique([body.priority for body in scene.objects], return_inverse=True)
         self._corner_normals: dict[int, Array] = {}
@@ -130,40 +130,40 @@ class Optics:
 
     @property
     def tolerance(self) -> float:
-        """Distance in metres within which walls are at one place."""
+        """Distance in metres within which surfaces coincide."""
         return TOGETHER * self.scene.diagonal
 
     def dominant(self, inside: Inside) -> Integers:
-        """(n,): object that light is in, or `AIR`."""
+        """(n,): dominant object around each ray, or `AIR`."""
         present = (inside.windings > 0) & self.decides
         key = np.where(present, self._rank * (1 << 40) + inside.since, -1)
         best = key.argmax(axis=1)
         return np.where(present.any(axis=1), best, AIR)
 
     def matters(self, before: Integers, after: Integers) -> Mask:
-        """(n,): whether light notices that what it is in changes."""
+        """(n,): whether a change of medium has an optical effect."""
         plain = np.array([surface.plain for surface in self.surfaces] + [True])
         changes = (self.iors[before] != self.iors[after]) | ~plain[before] | ~plain[after]
         return np.asarray((before != after) & changes)
 
     def outside(self, count: int) -> Inside:
-        """Of rays that are in no body."""
+        """State of rays outside all bodies."""
         shape = (count, len(self.scene.objects))
         return Inside(np.zeros(shape, np.int32), np.zeros(shape, np.int64))
 
     def at_origins(self, hits: Sequence[Hits], count: int) -> Inside:
-        """Which bodies the origins of rays are in, from all surfaces behind them."""
+        """State of rays at their origins, from all surfaces behind them."""
         behind = [line.where(line.distance < 0) for line in hits]
         return _Walk(self, behind, self.outside(count)).through()
 
     def first_interfaces(self, hits: Sequence[Hits], inside: Inside) -> Interfaces:
-        """The first interfaces among surfaces ahead, those of each object, on rays that start `inside` bodies."""
+        """First interfaces among the surfaces ahead of rays that start `inside` bodies."""
         return _Walk(self, hits, inside).to_interfaces()
 
 
 @dataclass(frozen=True, eq=False)
 class _Crossings:
-    """Surfaces of all objects on rays, in order."""
+    """Ordered crossings of rays with the surfaces of all objects."""
 
     pixel: Integers
     distance: Array
@@ -189,7 +189,7 @@ class _Crossings:
 
 
 class _Walk:
-    """Rays that go from surface to surface, all at once, until what they are in changes."""
+    """Walk of rays from surface to surface, all at once, until their medium changes."""
 
     def __init__(self, optics: Optics, hits: Sequence[Hits], inside: Inside) -> None:
         self.optics = optics
@@ -201,13 +201,13 @@ class _Walk:
         self.time = inside.since.max(axis=1, initial=0)
 
     def through(self) -> Inside:
-        """What rays are in behind all surfaces."""
+        """State of rays behind all surfaces."""
         for layer in _layers(self.crossings.pixel):
             self._cross(self.crossings.where(layer))
         return self.inside
 
     def to_interfaces(self) -> Interfaces:
-        """The first interface of each ray."""
+        """First interface of each ray."""
         count = len(self.time)
         self.here = Inside(self.inside.windings.copy(), self.inside.since.copy())
         self.before = self.optics.dominant(self.inside)

@@ -1,4 +1,4 @@
-"""Where rays are inside bodies: ordered intervals, from face signs and winding numbers."""
+"""Ordered intervals of rays inside bodies, from face signs and winding numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from translucent.reference.hits import Hits
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
-#: On a share of the scene's diagonal, rounding may wind a body's surface negatively.
+#: Share of the scene's diagonal on which rounding may wind a body's surface negatively.
 ROUNDING = 1e-9
 
 
@@ -74,7 +74,7 @@ def body_intervals(hits: Hits, origin: Integers, end: Array, body: int = 0) -> I
 
 
 def unbalanced(hits: Hits, origin: Integers, end: Array) -> Mask:
-    """(pixels,): rays that do not end outside: they leave a body more or less often than they are in it or enter it.
+    """(pixels,): mask of rays whose entries and exits of a body do not balance.
 
     What an opaque surface hides cannot tell, so a ray that it stops is none of them.
 
@@ -92,7 +92,7 @@ def sum_signs(hits: Hits, pixels: int) -> Integers:
 
 
 def origin_windings(body: Object, line: Hits, camera: Camera, pixels: int) -> Integers:
-    """How often a body contains the origin of each ray, (pixels,).
+    """Winding number of a body around the origin of each ray, (pixels,).
 
     For a solid this is the sum of the signs behind the origin. It agrees with the hits ahead even if the origin is on
     the surface, and differs from ray to ray for an orthographic camera. Behind the eye, the hole of an open body would
@@ -113,7 +113,7 @@ def origin_windings(body: Object, line: Hits, camera: Camera, pixels: int) -> In
 
 
 def merge(parts: Sequence[Intervals]) -> Intervals:
-    """The intervals of several bodies as one list, sorted by pixel, then entry; at least one part."""
+    """Merge the intervals of several bodies into one list, sorted by pixel, then entry; at least one part."""
     arrays = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Intervals)}
     order = np.lexsort((arrays["body"], arrays["t_enter"], arrays["pixel"]))
     return Intervals(**{name: array[order] for name, array in arrays.items()})

@@ -1,4 +1,4 @@
-"""Layers that cover a share of what is behind them (Porter and Duff's `over`), and the holes of thin sheets.
+"""Partly transparent layers (Porter and Duff's `over`), and the holes of thin sheets.
 
 A layer of opacity alpha that shows radiance S is a sheet of optical depth -log(1 - alpha) whose thickness emits S:
 then it passes 1 - alpha, and adds S (1 - (1 - alpha)) = alpha S.
@@ -16,12 +16,12 @@ from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import LEAST_COVER
 from translucent.scene.texture import Texture
 
-#: Share that an opaque layer leaves: what float32 can hold.
+#: Transmittance of an opaque layer: the smallest that float32 can hold.
 _LEAST_LEFT = 1e-37
 
 
 def without_holes(body: Object, hits: Hits) -> Hits:
-    """The hits of a sheet that are in none of its holes, and where it is seen."""
+    """Hits of a sheet outside its holes, on its visible sides."""
     if body.surface is None or not (body.covers or body.has_holes):
         return hits
     if body.covers and not body.surface.double_sided:
@@ -31,14 +31,14 @@ def without_holes(body: Object, hits: Hits) -> Hits:
 
 
 def layer_depth(body: Object, hits: Hits) -> Array:
-    """(k,): optical depth of a layer at its hits; 0 if the object is none."""
+    """(k,): optical depth of a layer at its hits; 0 if the object is not a layer."""
     if body.surface is None or body.surface.opacity is None:
         return np.zeros(len(hits.pixel))
     return np.asarray(-np.log(np.maximum(1.0 - body.surface.opacity * _painted(body, hits)[:, 3], _LEAST_LEFT)))
 
 
 def layer_radiance(scene: Scene, body: Object, hits: Hits, rays: Rays) -> Array:
-    """(k, 3): what a layer shows at its hits: it is matt, as opaque objects are here, and may glow."""
+    """(k, 3): radiance of a layer at its hits: diffuse, as opaque objects are here, plus emission."""
     if body.surface is None or not body.covers:
         return np.zeros((len(hits.pixel), 3))
     directions = rays.directions[hits.pixel]
@@ -67,5 +67,5 @@ def _sampled(body: Object, hits: Hits, texture: Texture | None) -> Array:
 
 
 def _across(body: Object, values: Array, hits: Hits) -> Array:
-    """(k, n): what is given at the vertices (v, n), at the hits."""
+    """(k, n): vertex attributes (v, n) interpolated at the hits."""
     return np.asarray(np.einsum("kc,kcn->kn", hits.barycentric, values[body.mesh.faces[hits.face]]))

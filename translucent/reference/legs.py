@@ -1,4 +1,4 @@
-"""Ray segments: the straight parts of refracted rays."""
+"""Ray segments: straight parts of refracted rays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from translucent.reference.rays import Rays
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """Straight parts of refracted rays.
+    """Ray segments: straight parts of refracted rays.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Legs:
         return len(self.owner)
 
     def where(self, chosen: Integers | Mask) -> Legs:
-        """Those that indices or a mask choose."""
+        """Selection of ray segments by indices or a mask."""
         index = np.flatnonzero(chosen) if chosen.dtype == bool else np.asarray(chosen, np.int64)
         return Legs(
             self.rays.where(index),
@@ -55,7 +55,7 @@ class Legs:
         )
 
     def turned(self, directions: Array, share: Array, inside: Inside, *, bent: bool, reflected: Mask | bool) -> Legs:
-        """Legs that begin here in other directions (k, 3), with a share (k, 3) of the light."""
+        """Ray segments from the same origins in other directions (k, 3), with a share (k, 3) of the light."""
         rays = Rays(self.rays.origins, directions, self.rays.backdrop)
         with np.errstate(under="ignore"):
             throughput = self.throughput * share
@@ -63,7 +63,7 @@ class Legs:
 
 
 def joined(parts: Sequence[Legs]) -> Legs:
-    """All legs as one; at least one part."""
+    """Concatenate ray segments; at least one part."""
     rays = Rays(
         np.concatenate([part.rays.origins for part in parts]),
         np.concatenate([part.rays.directions for part in parts]),

@@ -1,4 +1,4 @@
-"""Light on its way from lights to places in a scene: what bodies leave of it, and what stops it."""
+"""Light paths from lights to points of a scene: attenuation by bodies, and shadows."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight
 from translucent.scene.scene import Light, Scene
 
-#: Opaque surfaces within this share of the scene's size of a light, or of a lit place, do not shadow it: it lies on
-#: them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the rest.
+#: Distance, as a share of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it lies
+#: on them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the rest.
 CONTACT = 1e-9
 
-#: Paths that are followed at a time: the working arrays stay below 500 MB.
+#: Number of paths that are followed at a time: the working arrays stay below 500 MB.
 PATHS = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
 class Arrival:
-    """Light of one source that arrives at places.
+    """Light of one source that arrives at points.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Arrival:
 
 
 class LightPaths:
-    """The ways of light to places in a scene, straight and through its bodies.
+    """Straight light paths to points of a scene, through its bodies.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class LightPaths:
         self.lights = tuple(_placed(light, scene.camera.eye) for light in scene.lights)
 
     def arrival(self, light: Light, points: Array) -> Arrival:
-        """What arrives of one of `lights` at points (k, 3), before any scattering."""
+        """Light of one of `lights` that arrives at points (k, 3), unscattered."""
         parts = [self._arrival(light, points[i : i + PATHS]) for i in range(0, max(len(points), 1), PATHS)]
         return Arrival(*(np.concatenate([getattr(part, name) for part in parts]) for name in Arrival.__match_args__))
 
@@ -76,7 +76,7 @@ class LightPaths:
             return Arrival(travel, irradiance * transmittance, sound)
 
     def transmittance(self, points: Array, travel: Array, distance: Array) -> tuple[Array, Mask]:
-        """What is left of light (k, 3) that has traveled in directions (k, 3) over distances (k,) to points (k, 3).
+        """Transmittance (k, 3) of light paths in directions (k, 3) over distances (k,) to points (k, 3).
 
         Parameters
         ----------
@@ -105,14 +105,16 @@ class LightPaths:
         return np.where(self._shadowed(hits, length)[:, None], 0.0, optics.transmittance(depth)), sound
 
     def _hits(self, index: int, rays: Rays, length: Array) -> Hits:
-        """Surfaces of an object behind the origins and as far ahead as the way goes; of an open one on all the line."""
+        """Surfaces of an object behind the origins and ahead up to the end of each path; of an open one on the whole
+        line.
+        """
         traced = self.tracer.objects[index]
         open_body = traced.body.medium is not None and not traced.body.mesh.diagnosis.solid
         end = np.full(len(rays), np.inf) if open_body else length
         return traced.hits(Lines(rays.origins, rays.directions, np.full(len(rays), -np.inf), end))
 
     def _intervals(self, hits: list[Hits], length: Array) -> tuple[Intervals, Mask]:
-        """Parts of the ways inside solids, and (k,): where the entries and exits of each balance."""
+        """Intervals of the paths inside solids, and (k,): mask of paths on which entries and exits balance."""
         sound = np.ones(len(length), dtype=bool)
         parts = []
         for index, (body, line) in enumerate(zip(self.scene.objects, hits, strict=True)):
@@ -126,7 +128,7 @@ class LightPaths:
         return merge([nothing, *parts]), sound
 
     def _shadowed(self, hits: list[Hits], length: Array) -> Mask:
-        """(k,): whether an opaque surface is on the way."""
+        """(k,): whether an opaque surface blocks the path."""
         shadowed = np.zeros(len(length), dtype=bool)
         margin = CONTACT * self.tracer.radius
         for body, line in zip(self.scene.objects, hits, strict=True):

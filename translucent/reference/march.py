@@ -1,4 +1,4 @@
-"""Ray marching with a fixed number of steps: every scheme that a renderer may choose, to see what it costs."""
+"""Ray marching with a fixed number of steps, by every scheme that a renderer may choose."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from translucent.scene.scene import Light, Scene
 
 Compositing = Literal["front-to-back", "back-to-front"]
 
-#: Samples that are looked at together: the working arrays stay below 500 MB.
+#: Number of samples that are evaluated together: the working arrays stay below 500 MB.
 SAMPLES = 1 << 17
 
 
@@ -105,7 +105,7 @@ def march(
 
 @dataclass(frozen=True)
 class _Scheme:
-    """How to march, checked."""
+    """Checked marching scheme."""
 
     method: RayMarched
     aligned: bool
@@ -151,7 +151,7 @@ class _Spans:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """What a march adds up: emission or not, some lights, and the light whose variable its steps are even in."""
+    """Terms of a march: emission or not, some lights, and the light in whose variable its steps are even."""
 
     emission: bool
     lights: tuple[Light, ...]
@@ -159,14 +159,14 @@ class _Terms:
 
 
 class _March:
-    """The march of all rays of a picture."""
+    """March of all rays of a picture."""
 
     def __init__(self, scheme: _Scheme, paths: LightPaths, rays: Rays, media: CrossedMedia, width: int) -> None:
         self.scheme, self.paths, self.rays, self.media, self.width = scheme, paths, rays, media, width
         self.sound = ~media.defective
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """The arrays of a frame by their names, flat."""
+        """Flat arrays of a frame by their names."""
         first, *others = (self._composited(terms) for terms in self._all_terms())
         behind = seen_behind(self.paths.scene, self.rays, self.media.wall)
         with np.errstate(under="ignore"):
@@ -186,7 +186,7 @@ class _March:
         }
 
     def _all_terms(self) -> list[_Terms]:
-        """Equiangular steps are those of one light, so each point light has a march of its own."""
+        """Terms of all marches: one for each point light, as equiangular steps are those of one light."""
         lights = self.paths.lights if self.paths.volume.scatters else ()
         if self.scheme.method.quadrature != "equiangular":
             return [_Terms(True, lights)]
@@ -195,7 +195,7 @@ class _March:
         return [_Terms(True, other), *(_Terms(False, (light,), light) for light in point)]
 
     def _composited(self, terms: _Terms) -> Layer:
-        """All steps of each ray as one layer with associated color, (rays, 3)."""
+        """Composite of all steps of each ray as one layer with associated color, (rays, 3)."""
         shape = (len(self.rays), 3)
         total = Layer(np.zeros(shape), np.zeros(shape))
         front_to_back = self.scheme.compositing == "front-to-back"
@@ -213,11 +213,11 @@ class _March:
         return total if self.scheme.associated else blending.associated(total)
 
     def _stopped(self, layer: Layer) -> Mask:
-        """(k,): rays that end, since nearly nothing is seen through this layer."""
+        """(k,): rays that end, since this layer is nearly opaque."""
         return np.asarray(layer.transmittance.max(axis=1) < self.scheme.termination)
 
     def _spans(self) -> Iterator[_Spans]:
-        """What each ray marches through, from the eye; of each ray at most one span at a time."""
+        """Spans that each ray marches through, from the eye; at most one span of each ray at a time."""
         segments = self.media.segments
         if self.scheme.aligned:
             for number, owner in enumerate(_layers(segments.pixel)):
@@ -242,7 +242,7 @@ class _March:
         return layers if self.scheme.associated else [blending.unassociated(layer) for layer in layers]
 
     def _steps(self, spans: _Spans, terms: _Terms) -> Steps:
-        """Where the samples are."""
+        """Places of the samples."""
         method = self.scheme.method
         if method.quadrature == "gauss":
             return gauss_steps(spans.start, spans.end, method.steps)

@@ -1,4 +1,4 @@
-"""What becomes of light at interfaces: how much is reflected and refracted, where to, and what paint sends back."""
+"""Light at interfaces: reflected and refracted shares, their directions, and diffuse reflection."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from translucent.reference.microfacets import scattered_at_interface
 from translucent.reference.opaque import irradiance_at, seen_from
 from translucent.scene.lights import PointLight
 
-#: Passages of light through a rough sheet after which it counts as lost.
+#: Number of passages through a rough sheet after which light counts as lost.
 MOST_PASSAGES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What comes of light at interfaces.
+    """Outcome of light at interfaces.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Outcome:
 
 
 class Meetings:
-    """Legs that end at interfaces, and go on from there.
+    """Ray segments that end at interfaces, and continue from there.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Meetings:
         self.reflectance = optics.fresnel_dielectric(self.cosine, self.ior)
 
     def outcome(self) -> Outcome:
-        """What comes of all of them."""
+        """Outcome of all ray segments."""
         rough = (self.alpha > 0) & (self.ior != 1.0)
         ways = (
             (~self.is_sheet & (~rough if self.rng is None else np.ones_like(rough)), self._at_interfaces),
@@ -92,12 +92,12 @@ class Meetings:
         ]
 
     def _passing(self, chosen: Integers) -> Array:
-        """(k, 3): share of the light past the interface that goes on through it: the color tints what enters a body."""
+        """(k, 3): share of light that continues past the interface: the base color tints light that enters a body."""
         enters = self.is_sheet[chosen] | (self.interfaces.item[chosen] == self.interfaces.after[chosen])
         return self.transmission[chosen] * np.where(enters[:, None], self.color[chosen], 1.0)
 
     def _at_interfaces(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """Branches, and the share (k, 1) of the light that passes."""
+        """Branches at interfaces of solids, and the share (k, 1) of light that passes."""
         legs, here, there = self.legs.where(chosen), self.interfaces.here, self.interfaces.there
         directions, normals = legs.rays.directions, self.normals[chosen]
         back_way = reflected_direction(directions, normals)
@@ -123,7 +123,7 @@ class Meetings:
         return [reflected, refracted], share_on
 
     def _at_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """As `_at_interfaces`, for polished sheets: both sides of each at once."""
+        """Branches at polished sheets, as `_at_borders`: both sides of each at once."""
         legs, inside = self.legs.where(chosen), self.interfaces.here.where(chosen)
         metres, extinction, emission = self._matter(chosen)
         share, ior = self.reflectance[chosen], self.ior[chosen]
@@ -143,7 +143,7 @@ class Meetings:
         return branches, on
 
     def _at_rough_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """As `_at_interfaces`, for rough sheets: light goes from one side to the other until it leaves."""
+        """Branches at rough sheets, as `_at_borders`: light goes from one side to the other until it leaves."""
         assert self.rng is not None
         legs, inside, normals = self.legs.where(chosen), self.interfaces.here.where(chosen), self.normals[chosen]
         metres, extinction, emission = self._matter(chosen)
@@ -181,7 +181,7 @@ class Meetings:
         return metres[item], rows[item, 0], rows[item, 1]
 
     def _add_paint(self, chosen: Integers, passed: Array) -> None:
-        """Light that paint sends back diffusely of the share `passed` (k, 1 or 3) that meets it."""
+        """Add diffuse reflection of the share `passed` (k, 1 or 3) of the light."""
         share = passed * (1.0 - self.transmission[chosen])
         painted = np.flatnonzero((share > 0.0).any(axis=1))
         chosen, share = chosen[painted], share[painted]
@@ -195,7 +195,7 @@ class Meetings:
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Point and directional lights in rough interfaces, reflected by one microfacet; nothing shadows them."""
+        """Add highlights of point and directional lights in rough interfaces, by single reflection without shadows."""
         scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
         to_eye = -self.legs.rays.directions[rough]
         for light in scene.lights if rough.size else ():
@@ -221,6 +221,6 @@ class Meetings:
 
 
 def _towards(directions: Array, side: Array) -> Array:
-    """Directions (k, 3), mirrored where they do not lead to the `side` (k, 3) of a face: smooth normals may mislead."""
+    """Directions (k, 3), reflected to the `side` (k, 3) of a face where smooth normals mislead them."""
     across = np.einsum("ki,ki->k", directions, side)
     return np.where((across < 0)[:, None], directions - 2.0 * across[:, None] * side, directions)

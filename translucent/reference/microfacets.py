@@ -1,4 +1,4 @@
-"""Rough interfaces: light that wanders among the microfacets of a GGX surface until it leaves them (Heitz et al. 2016).
+"""Rough interfaces: random walks of light among the microfacets of a GGX surface (Heitz et al. 2016).
 
 "Multiple-scattering microfacet BSDFs with the Smith model": heights of the microfacets are not correlated, each one
 reflects or refracts by Fresnel and Snell, and no light is lost. Normals as they are visible are sampled as in Heitz
@@ -13,17 +13,18 @@ from translucent.arrays import Array, Mask
 from translucent.formulas import optics
 from translucent.formulas.interface import reflected_direction, refracted_direction
 
-#: Meetings with microfacets after which light counts as lost; at a roughness of 1 one in a million gets as far.
+#: Number of meetings with microfacets after which light counts as lost; at a roughness of 1 one in a million gets as
+#: far.
 MOST_MEETINGS = 100
 
-#: Directions as close to the surface's plane as this stay at their height.
+#: Largest slope of directions that stay at their height.
 LEVEL = 1e-6
 
 
 def scattered_at_interface(
     directions: Array, normals: Array, ior: Array, alpha: Array, rng: np.random.Generator
 ) -> tuple[Array, Mask]:
-    """Directions (n, 3) in which light leaves a rough interface, and whether it has passed it (n,).
+    """Random directions (n, 3) of light that leaves a rough interface, and whether it is transmitted (n,).
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def scattered_at_interface(
 
 
 def _meet(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
-    """Directions (n, 3) after meeting microfacets (n, 3), and whether they have passed them."""
+    """Directions (n, 3) after meeting microfacets (n, 3), and whether the light is transmitted."""
     cosine = np.clip(-np.einsum("ki,ki->k", way, facet), 0.0, 1.0)
     passed = rng.random(len(way)) >= optics.fresnel_dielectric(cosine, ior)
     turned = np.where(passed[:, None], refracted_direction(way, facet, ior), reflected_direction(way, facet))
@@ -74,7 +75,7 @@ def _meet(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tup
 
 @np.errstate(under="ignore", over="ignore", divide="ignore")
 def _next_height(way: Array, height: Array, alpha: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
-    """Heights (n,) of the next microfacets that light meets, and whether it leaves instead.
+    """Heights (n,) of the next microfacets on light's way, and whether it leaves the surface instead.
 
     Heights are evenly spread from 0 to 1: of all facets, the share `height` is lower.
     """
@@ -97,7 +98,7 @@ def _lambda(z: Array, alpha: Array) -> Array:
 
 
 def _visible_normals(towards: Array, alpha: Array, rng: np.random.Generator) -> Array:
-    """Microfacet normals (n, 3) as they are seen from unit directions (n, 3), from above or from below."""
+    """Random visible normals (n, 3) of microfacets from unit directions (n, 3), from above or from below."""
     stretched = towards * np.stack([alpha, alpha, np.ones_like(alpha)], axis=1)
     stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)
     first, second, _ = np.moveaxis(_axes(stretched), 1, 0)

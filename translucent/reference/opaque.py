@@ -1,4 +1,4 @@
-"""Opaque objects: where they stop the rays, and the light that they send back."""
+"""Opaque objects: ends of rays, and reflected radiance."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.scene.scene import Light, Object, Scene
 
 @dataclass(frozen=True, eq=False)
 class OpaqueHits:
-    """The nearest opaque surface on each ray, seen from either side.
+    """Nearest opaque surface on each ray, seen from either side.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class OpaqueHits:
 
 
 def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHits:
-    """The first opaque surface ahead of each origin; of several at one distance, that of the first object.
+    """Find the first opaque surface ahead of each origin; of several at one distance, that of the first object.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHit
 
 
 def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits) -> Array:
-    """Radiance that opaque surfaces reflect diffusely towards the origins, (n, 3); 0 on rays without one.
+    """Diffusely reflected radiance of opaque surfaces towards the origins, (n, 3); 0 on rays without one.
 
     Lambert: color / pi times the irradiance on the side that is seen. Nothing shadows, and no medium attenuates the
     light on its way to the surface.
@@ -69,7 +69,7 @@ def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits) -> Array:
 
 
 def _lambert(scene: Scene, body: Object, face: Integers, distance: Array, rays: Rays) -> Array:
-    """(k, 3): what faces of one object reflect along rays that meet them at `distance`."""
+    """(k, 3): radiance that one object reflects along rays that meet it at `distance`."""
     normals = world_normals(body, face)
     away = np.einsum("ki,ki->k", normals, rays.directions) > 0
     normals[away] *= -1.0
@@ -88,5 +88,5 @@ def irradiance_at(scene: Scene, points: Array, normals: Array) -> Array:
 
 
 def seen_from(light: Light, eye: Array) -> Light:
-    """The light with its position, where it has one, relative to the eye."""
+    """Light with its position, if it has one, relative to the eye."""
     return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light

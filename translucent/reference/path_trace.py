@@ -28,20 +28,20 @@ from translucent.reference.volume import places
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
 
-#: Paths that are followed together: the working arrays stay below 500 MB.
+#: Number of paths that are followed together: the working arrays stay below 500 MB.
 BATCH = 1 << 14
 
-#: Largest optical depth of the scene without a limit on events: light is scattered about as often as its square.
+#: Largest optical depth of a scene without a limit on events: light is scattered about as often as its square.
 MAX_DEPTH = 1e4
 
-#: Paths that carry less of the light than this end by chance, or go on with this much.
+#: Weight below which paths end by Russian roulette, or go on with this weight.
 ROULETTE = 0.1
 
 
 def path_trace(
     scene: Scene, size: tuple[int, int], paths: int = 64, seed: int = 0, max_events: int | None = None
 ) -> tuple[Frame, Array]:
-    """The scene with light that media scatter any number of times, of all lights, of the environment and emitted.
+    """Path trace a scene, with multiple scattering of all lights, of the environment and of emission.
 
     Opaque surfaces send back what they do for `render`, and a backdrop fixed to the picture lights like the mean of its
     squares. Light inside a medium has no finite variance: there the error bars say little.
@@ -145,7 +145,7 @@ def _estimate(
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """Where paths meet matter: number of each path that does, where, and what fills that place."""
+    """Collisions of paths with media: index of each path, place, and medium there."""
 
     path: Integers
     points: Array
@@ -166,7 +166,7 @@ class _Paths:
         self.found = np.zeros((len(rays), len(channels)))
 
     def radiance(self) -> Array:
-        """(n, c): what each path finds."""
+        """(n, c): radiance of each path."""
         rays, throughput, owner = self.rays, np.ones(len(self.rays)), np.arange(len(self.rays))
         events = 0
         while len(owner):
@@ -191,7 +191,7 @@ class _Paths:
         return crossed_media(self.scene, self.volume, rays, hits, self.light.sheets)
 
     def _fly(self, rays: Rays, media: CrossedMedia, throughput: Array, owner: Integers) -> _Events:
-        """Follow the rays to their first events; adds what media emit on the way."""
+        """Follow the rays to their first events; adds the emission of media on the way."""
         flying = np.ones(len(rays), dtype=bool)
         found = [_Events(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, len(self.extinction))))]
         segments = media.segments
@@ -216,7 +216,7 @@ class _Paths:
         return _Events(*(np.concatenate([getattr(part, name) for part in found]) for name in _Events.__match_args__))
 
     def _majorants(self, media: CrossedMedia, layer: Integers) -> Array:
-        """(k,): bounds of the extinction in segments; what emits without it is met about once, too."""
+        """(k,): majorants of the extinction in segments; a medium that only emits is met about once, too."""
         filling, segments = media.filling[layer], media.segments
         emits = (filling @ self.volume.emission > 0).any(axis=1)
         once = np.where(emits, 1.0 / segments.length[layer], 0.0)
@@ -234,7 +234,7 @@ class _Paths:
         self._add(owner[through], behind[through][:, self.channels] * throughput[through, None])
 
     def _add_lights(self, rays: Rays, weights: Array, throughput: Array, owner: Integers) -> None:
-        """Light that reaches the origins of `rays`, where they come from, and is scattered towards the eye."""
+        """Add light that reaches the origins of `rays` and is scattered towards the eye."""
         total = weights @ self.scattering
         for light in self.light.lights:
             arrival = self.light.arrival(light, rays.origins)
@@ -258,7 +258,7 @@ class _Paths:
         return np.asarray(self.volume.anisotropy[np.minimum(chosen, len(self.scattering) - 1)])
 
     def _roulette(self, throughput: Array) -> tuple[Integers, Array]:
-        """Paths that go on, and what each of all would then carry."""
+        """Russian roulette: mask of paths that go on, and the weight that each would then carry."""
         chance = np.minimum(throughput / ROULETTE, 1.0)
         lives = np.flatnonzero(self.rng.random(len(throughput)) < chance)
         return lives, throughput / np.where(chance > 0, chance, 1.0)

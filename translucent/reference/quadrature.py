@@ -1,4 +1,4 @@
-"""Where a march through an interval takes its samples, and what each of them stands for."""
+"""Quadrature of intervals: places of samples and the parts that they stand for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Words = npt.NDArray[np.uint64]
 
 _MASK = np.uint64(0xFFFFFFFF)
 
-#: Maps places (k, p) in intervals, 0 to 1, to distances (k, p) on the rays, and tells their derivative (k, p).
+#: Function from places (k, p) in intervals, 0 to 1, to distances (k, p) on the rays, and tells their derivative (k, p).
 Variable = Callable[[Array], tuple[Array, Array]]
 
 
@@ -39,7 +39,7 @@ class Steps:
 
 
 def even_steps(variable: Variable, offset: Array) -> Steps:
-    """Steps that are even in some variable, as a Riemann sum has them.
+    """Even steps in some variable, as in a Riemann sum.
 
     In the distance itself, offset 0 is the left rule, 0.5 the midpoint rule, and random ones are stratified sampling.
 
@@ -57,7 +57,7 @@ def even_steps(variable: Variable, offset: Array) -> Steps:
 
 
 def gauss_steps(start: Array, end: Array, count: int) -> Steps:
-    """The `count` points of Gauss and Legendre from `start` (k,) to `end` (k,).
+    """Gauss-Legendre steps with `count` points from `start` (k,) to `end` (k,).
 
     Each point stands for a step of the length of its weight; by the separation theorem (Szego 1939, section 3.41) these
     steps, put one after the other, hold one point each.
@@ -71,7 +71,7 @@ def gauss_steps(start: Array, end: Array, count: int) -> Steps:
 
 
 def hashed(column: Integers, row: Integers, number: Integers, seed: int) -> Array:
-    """Random numbers in 0 to 1 - 2^-24, all of them multiples of 2^-24, so that float32 holds them exactly.
+    """Hashed random numbers in 0 to 1 - 2^-24, all of them multiples of 2^-24, so that float32 holds them exactly.
 
     The first component of pcg3d (Jarzynski & Olano 2020) of column, row, and number + 2654435769 seed, mod 2^32.
 

@@ -1,4 +1,4 @@
-"""The rays of a picture, relative to the eye, so that they keep their digits wherever the scene is."""
+"""Rays of a picture, relative to the eye, so that they stay accurate far from the origin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from translucent.scene.camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays by number; all arrays are flat.
+    """Rays by index; all arrays are flat.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class Rays:
         return len(self.directions)
 
     def where(self, chosen: Integers | slice) -> Rays:
-        """The rays that indices or a slice choose, numbered anew."""
+        """Selection of rays by indices or a slice, renumbered."""
         return Rays(self.origins[chosen], self.directions[chosen], self.backdrop[chosen])
 
 
 def pixel_rays(camera: Camera, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> Rays:
-    """The rays of all pixels; the number of a ray is row * width + column.
+    """Rays of all pixels; the index of a ray is row * width + column.
 
     Parameters
     ----------

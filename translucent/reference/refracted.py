@@ -1,4 +1,4 @@
-"""Radiance along rays that bend and split at the interfaces of media: exact Fresnel and Snell, in float64.
+"""Radiance along rays that refract and split at interfaces: exact Fresnel and Snell, in float64.
 
 At every interface a ray becomes two, reflected and refracted, until they carry less than `FAINTEST` or have met as many
 interfaces as asked for; what is dropped is counted. With rough interfaces one of the two is chosen by chance, so that
@@ -34,19 +34,19 @@ from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.scene import Scene
 
-#: Rays that carry less than this of each color are not followed.
+#: Smallest share of each color that a ray must carry to be followed.
 FAINTEST = 1e-5
 
-#: Rays of the picture that are followed together: the working arrays stay below 500 MB.
+#: Number of rays of the picture that are followed together: the working arrays stay below 500 MB.
 BATCH = 1 << 13
 
-#: Rays that run as much across the view as this cosine tells never meet the backdrop.
+#: Smallest cosine between a ray and the view with which it meets the backdrop.
 ACROSS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class RefractedLight:
-    """What refracted rays see.
+    """Radiance along refracted rays.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class RefractedLight:
 
 
 class RefractedRays:
-    """Rays of the scene's camera that bend at interfaces.
+    """Tracer of the camera's rays that refract at interfaces.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class RefractedRays:
         self.channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
 
     def see(self, rays: Rays) -> RefractedLight:
-        """What rays of the camera see."""
+        """Trace rays of the camera."""
         found = RefractedLight(np.zeros((len(rays), 3)), np.zeros((len(rays), 3)), np.ones(len(rays), dtype=bool))
         for channel, own in enumerate(self.channels):
             carried = np.eye(3)[channel] if len(self.channels) > 1 else np.ones(3)
@@ -108,7 +108,9 @@ class RefractedRays:
         return found
 
     def on_backdrop(self, rays: Rays) -> tuple[Array, Mask]:
-        """Where rays meet a backdrop that stands across the view behind all objects (`Rays.backdrop`), and whether."""
+        """Places at which rays meet a backdrop that stands across the view behind all objects (`Rays.backdrop`), and a
+        mask.
+        """
         camera = self.scene.camera
         low, high = self.scene.bounds - camera.eye
         farthest = float(np.maximum(low * camera.forward, high * camera.forward).sum())
@@ -124,13 +126,13 @@ class RefractedRays:
 
 
 class _Tree:
-    """Follows rays from interface to interface, for light of which all has the same indices of refraction."""
+    """Ray tree from interface to interface, for light with the same indices of refraction."""
 
     def __init__(self, refracted: RefractedRays, own: Optics, found: RefractedLight) -> None:
         self.refracted, self.own, self.found, self.scene = refracted, own, found, refracted.scene
 
     def grow(self, rays: Rays, owner: Integers, carried: Array) -> None:
-        """Follow rays of the camera to all ends of theirs; each starts with the light `carried` (3,)."""
+        """Follow rays of the camera along all their branches; each starts with the light `carried` (3,)."""
         everywhere = np.full(len(rays), np.inf)
         behind = self.refracted.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, np.zeros(len(rays))))
         never = np.zeros(len(rays), dtype=bool)
@@ -172,7 +174,7 @@ class _Tree:
         return replace(legs, rays=replace(legs.rays, origins=points)), interfaces
 
     def _through_media(self, legs: Legs, hits: Sequence[Hits], interface: Array, wall: Array) -> Legs:
-        """Legs with what media leave of them where they end; adds what these emit and scatter."""
+        """Attenuate ray segments by the media, and add emitted and scattered radiance."""
         scene, volume, rays = self.scene, self.refracted.volume, legs.rays
         end = np.minimum(interface, wall)
         none = np.empty(0, np.int64)
@@ -197,7 +199,9 @@ class _Tree:
             return replace(legs, throughput=legs.throughput * optics.transmittance(depth))
 
     def _at_end(self, legs: Legs, wall: OpaqueHits, chosen: Integers) -> Array:
-        """(k, 3): radiance at the ends of legs, the `chosen` ones of all that met `wall`: opaque, or environment."""
+        """(k, 3): radiance at the ends of ray segments, the `chosen` ones of all that met `wall`: opaque, or
+        environment.
+        """
         own = OpaqueHits(wall.distance[chosen], wall.item[chosen], wall.face[chosen])
         seen = reflected_radiance(self.scene, legs.rays, own)
         free = np.flatnonzero(np.isinf(own.distance))
@@ -205,7 +209,7 @@ class _Tree:
         return seen
 
     def _environment(self, legs: Legs) -> Array:
-        """(k, 3): what legs see that nothing stops: in reflections what lights the scene, else its background."""
+        """(k, 3): radiance of unblocked ray segments: the environment's light in reflections, else its background."""
         environment, rays = self.scene.environment, legs.rays
         place, ahead = self.refracted.on_backdrop(rays)
         seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], place, rays.backdrop))

@@ -1,4 +1,4 @@
-"""Pictures along refracted rays: all pixels of `RefractedRays`, and where interfaces are rough, many rays for each."""
+"""Pictures with refraction: one ray per pixel, or many where interfaces are rough."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.volume import Volume
 from translucent.scene.scene import Scene
 
-#: Interfaces that a ray may meet, unless told otherwise.
+#: Default number of interfaces that a ray may meet.
 BOUNCES = 8
 
-#: Rays of each pixel before rough interfaces, unless told otherwise.
+#: Default number of rays per pixel before rough interfaces.
 PATHS = 64
 
-#: Rays that are averaged together: the working arrays stay below 500 MB.
+#: Number of rays that are averaged together: the working arrays stay below 500 MB.
 BATCH = 1 << 16
 
 
 def bends(scene: Scene) -> bool:
-    """Whether light changes at some interface of the scene, so that its rays are not all straight."""
+    """Whether any interface of the scene changes light, so that not all rays are straight."""
     return any(body.has_interface for body in scene.bodies)
 
 
@@ -38,7 +38,7 @@ def refracted_light(
     paths: int = PATHS,
     seed: int = 0,
 ) -> tuple[RefractedLight, Array]:
-    """What the pixels of a picture see along refracted rays, row by row from the top left.
+    """Radiance of a picture's pixels along refracted rays, row by row from the top left.
 
     Parameters
     ----------

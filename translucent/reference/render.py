@@ -1,4 +1,4 @@
-"""The ground truth of a picture: float64, on the CPU, from exact intervals."""
+"""Ground truth of a picture: float64, on the CPU, from exact intervals."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
 
-#: Surfaces, times objects, that are put in order at a time: the working arrays stay below 500 MB.
+#: Number of surfaces, times objects, that are sorted at a time: the working arrays stay below 500 MB.
 CHUNK = 1 << 24
 
-#: What the planner may count on: rays are traced, and light is followed into media.
+#: Capabilities of the reference for the planner: rays are traced, and light is followed into media.
 TRACED = Capabilities(shader_storage=False, opengl=False)
 
-#: Relative error of scattered light, unless told otherwise.
+#: Default relative error of scattered light.
 TOLERANCE = 1e-6
 
 
@@ -52,7 +52,7 @@ def render(
     paths: int = PATHS,
     seed: int = 0,
 ) -> Frame:
-    """True thickness, transmittance and radiance of a scene.
+    """Render true thickness, transmittance and radiance of a scene.
 
     Radiance holds what is behind, what media emit, what they scatter of `Scene.ambient`, and the light of all lights
     that solid media scatter once; not what they scatter out of the environment, what sheets scatter out of lights, or
@@ -137,7 +137,7 @@ def render(
 def shade_hits(
     scene: Scene, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
 ) -> dict[str, npt.NDArray[Any]]:
-    """What rays see, from all surfaces on them, wherever these come from.
+    """Shade rays from all surfaces on them, however these were found.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def shade_hits(
 
 @dataclass(frozen=True, eq=False)
 class CrossedMedia:
-    """What rays cross before an opaque surface stops them.
+    """Media and surfaces on rays up to the first opaque surface.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class CrossedMedia:
 def crossed_media(
     scene: Scene, volume: Volume, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
 ) -> CrossedMedia:
-    """What rays cross, from all surfaces on them; parameters as for `shade_hits`, and the `Volume` of the scene."""
+    """Media on rays, from all surfaces on them; parameters as for `shade_hits`, and the `Volume` of the scene."""
     wall = nearest_opaque(scene, hits, len(rays))
     solids = [i for i, body in enumerate(scene.objects) if body.medium is not None and sheets[i] is None]
     intervals, defective = scene_intervals(scene, hits, solids, wall.distance)
@@ -211,7 +211,7 @@ def crossed_media(
 
 
 def seen_behind(scene: Scene, rays: Rays, wall: OpaqueHits) -> npt.NDArray[np.float64]:
-    """(n, 3): radiance behind all media, of the environment or of what stops the rays."""
+    """(n, 3): radiance behind all media, of the environment or of the opaque surface."""
     return np.where(
         np.isinf(wall.distance)[:, None],
         scene.environment.radiance(rays.directions, rays.backdrop),
@@ -237,7 +237,7 @@ def _add_scattered(
 
 
 def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
-    """(h, w): how many surfaces of media each pixel's ray crosses before an opaque one stops it."""
+    """(h, w): number of surfaces of media on each pixel's ray before the first opaque one."""
     width, height = check_size(size)
     hits = scene_hits(scene, (width, height))
     end = nearest_opaque(scene, hits, width * height).distance
@@ -250,7 +250,7 @@ def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:
 
 
 def opaque_counts(scene: Scene, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], ...]:
-    """Two images (h, w): how many opaque surfaces each pixel's ray crosses, and of which object the nearest is.
+    """Two images (h, w): number of opaque surfaces on each pixel's ray, and index of the object of the nearest.
 
     Where neither changes, no edge of an opaque object is seen. Empty, if the scene has none.
     """
@@ -272,7 +272,7 @@ def scene_hits(scene: Scene, size: tuple[int, int]) -> list[Hits]:
 
 
 def _parts(hits: Sequence[Hits], pixels: int) -> Iterator[slice]:
-    """Runs of pixels, each with at most `CHUNK` surfaces times objects, or of one pixel."""
+    """Slices of pixels, each with at most `CHUNK` surfaces times objects, or of one pixel."""
     crossed = np.cumsum(np.sum([np.bincount(line.pixel, minlength=pixels) for line in hits], axis=0))
     cuts = np.searchsorted(crossed, np.arange(0, crossed[-1], max(CHUNK // len(hits), 1)), side="right")
     bounds = np.unique(np.concatenate([[0], cuts[1:], [pixels]]))
@@ -281,7 +281,7 @@ def _parts(hits: Sequence[Hits], pixels: int) -> Iterator[slice]:
 
 
 def _along(line: Hits, part: slice) -> Hits:
-    """The hits on a run of rays, these numbered from 0."""
+    """Hits on a slice of rays, renumbered from 0."""
     begin, end = np.searchsorted(line.pixel, [part.start, part.stop])
     own = line.where(slice(begin, end))
     return Hits(own.pixel - part.start, own.distance, own.sign, own.face, own.barycentric)

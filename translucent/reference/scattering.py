@@ -1,4 +1,4 @@
-"""Light that media scatter once towards the eye, to a tolerance (Max 1995, sections 5 and 6).
+"""Single scattering towards the eye, to a tolerance (Max 1995, sections 5 and 6).
 
 L = integral over the ray of T(t) sum sigma_s p(cos) E(t) dt, with the transmittance T from the eye to t and the
 irradiance E of each light there, attenuated by all bodies on its way and stopped by opaque objects.
@@ -24,13 +24,14 @@ from translucent.reference.volume import places
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
 
-#: Segments are cut where they begin, so that a rule of 15 points sees what little of a dense one is seen at all.
+#: Largest number of cuts near the start of segments: a rule of 15 points then resolves the thin visible layer of a
+#: dense one.
 MOST_CUTS = 60
 
 
 @dataclass(frozen=True, eq=False)
 class Scattered:
-    """Light scattered once towards the origins of rays.
+    """Singly scattered light towards the origins of rays.
 
     Attributes
     ----------
@@ -48,7 +49,7 @@ class Scattered:
 
 
 def scattered_once(paths: LightPaths, rays: Rays, segments: Segments, filling: Array, tolerance: float) -> Scattered:
-    """Light of all lights of a scene, scattered once.
+    """Integrate singly scattered light of all lights of a scene.
 
     Parameters
     ----------
@@ -79,7 +80,8 @@ def scattered_once(paths: LightPaths, rays: Rays, segments: Segments, filling: A
 
 @np.errstate(over="ignore", under="ignore")
 def _rounding(paths: LightPaths, rays: Rays, segments: Segments) -> Array:
-    """(n,): relative error of what is scattered, since distances are rounded: deep media show a thinner skin than that.
+    """(n,): relative error of scattered light from rounded distances: dense media scatter in a thinner layer than the
+    rounding.
 
     Of rays that scatter.
     """
@@ -111,7 +113,7 @@ class _Spans:
 
 
 class _InScatter:
-    """The integrand: of each span, in the variable of its light, 0 to 1."""
+    """Integrand of each span, in the variable of its light, 0 to 1."""
 
     def __init__(self, paths: LightPaths, rays: Rays, segments: Segments, filling: Array, spans: _Spans) -> None:
         self.paths, self.rays, self.segments, self.filling, self.spans = paths, rays, segments, filling, spans
@@ -191,7 +193,7 @@ def light_variable(
 
 @np.errstate(over="ignore")
 def depths_before(segments: Segments, pixels: int) -> Array:
-    """(k, 3): optical depth of each ray where each of its segments begins."""
+    """(k, 3): optical depth of each ray at the start of each of its segments."""
     before, depth = np.zeros((len(segments.pixel), 3)), np.zeros((pixels, 3))
     for layer in _layers(segments.pixel):
         pixel = segments.pixel[layer]
@@ -201,7 +203,7 @@ def depths_before(segments: Segments, pixels: int) -> Array:
 
 
 def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _Spans:
-    """Some segments, cut at the shadow edges of a light."""
+    """Spans of some segments, cut at shadow edges."""
     seen = np.unique(segments.pixel[chosen])
     light = paths.lights[number]
     edges = np.concatenate([outline_edges(traced, light) for traced in paths.tracer.objects])
@@ -226,7 +228,7 @@ def _joined(parts: list[_Spans]) -> _Spans:
 
 
 def _cut(work: _InScatter) -> tuple[Integers, Array, Array]:
-    """Spans, and parts 0 to 1 of them, each twice as large as the one before.
+    """Cut spans into parts, each twice as large as the one before.
 
     The first is at most one deep, or as short as float64 allows.
     """

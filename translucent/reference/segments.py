@@ -1,4 +1,4 @@
-"""What rays cross, in order: pieces of one mixture of media each, by the overlap policy of the scene."""
+"""Ordered segments of rays, each with one mixture of media, by the overlap policy of the scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from translucent.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Pieces of rays between neighboring surfaces: flat arrays, in order along each ray, without overlap.
+    """Segments of rays between neighboring surfaces: flat arrays, in order along each ray, without overlap.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Segments:
 
 
 def scene_segments(scene: Scene, intervals: Intervals, crossings: Crossings) -> Segments:
-    """The media on each ray, in order.
+    """Ordered segments of the media on each ray.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def scene_segments(scene: Scene, intervals: Intervals, crossings: Crossings) -> 
 
 
 def mix(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> tuple[Array, Array, Integers]:
-    """What fills places in at least one body, by the overlap policy of the scene.
+    """Mix of media at places in at least one body, by the overlap policy of the scene.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the light that reaches a view ray changes its way: at the outlines of bodies as the light sees them.
+"""Shadow edges on view rays: kinks of the incoming light at the outlines of bodies as seen from the light.
 
 There its path through a body begins to exist, or a shadow begins. Rules of quadrature take such a place for smooth
 unless an interval ends there, and miss what is between two of them.
@@ -15,7 +15,7 @@ from translucent.reference.tracer import TracedObject
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light
 
-#: Pairs of an edge and a ray that are looked at together: the working arrays stay below 100 MB.
+#: Number of pairs of an edge and a ray that are tested together: the working arrays stay below 100 MB.
 PAIRS = 1 << 18
 
 
@@ -37,7 +37,7 @@ def outline_edges(traced: TracedObject, light: Light) -> Array:
 
 
 def shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Array]:
-    """Numbers of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
+    """Indices of rays (k,), and distances (k,) at which light that grazes one of the edges (e, 2, 3) meets them."""
     found = [(np.empty(0, np.int64), np.empty(0))]
     each = max(PAIRS // max(len(edges), 1), 1)
     for begin in range(0, len(rays), each):

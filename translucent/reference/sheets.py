@@ -16,13 +16,13 @@ from translucent.reference.layers import layer_depth, layer_radiance, without_ho
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object, Scene
 
-#: A sheet that lies on an opaque surface is seen: it may be behind it by this share of the scene's diagonal.
+#: Share of the scene's diagonal by which a visible sheet may lie behind an opaque surface.
 SHEET_ON_OPAQUE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Where rays cross sheets: flat arrays.
+    """Crossings of rays with sheets: flat arrays.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Crossings:
 
 
 def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float | None, ...]:
-    """Thickness in metres of the sheet that each of `Scene.objects` is; None for the boundary of a solid.
+    """Sheet thickness in metres of each of `Scene.objects`; None for a solid.
 
     `ThinLayer` makes a sheet of every mesh that declares no thickness of its own. Opaque objects are never sheets.
     """
@@ -61,7 +61,7 @@ def sheet_thicknesses(scene: Scene, method: Method | None = None) -> tuple[float
 
 
 def sheet_hits(scene: Scene, body: Object, hits: Hits, end: Array) -> Hits:
-    """The surfaces of a sheet that rays cross before they stop at `end` (pixels,), or at most on what stops them."""
+    """Surfaces of a sheet that rays cross before they stop at `end` (pixels,), or on the surface that stops them."""
     last = end[hits.pixel] + SHEET_ON_OPAQUE * scene.diagonal
     return without_holes(body, hits.where((hits.distance >= 0) & (hits.distance <= last)))
 
@@ -69,7 +69,7 @@ def sheet_hits(scene: Scene, body: Object, hits: Hits, end: Array) -> Hits:
 def scene_crossings(
     scene: Scene, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None], end: Array
 ) -> Crossings:
-    """Where rays cross sheets.
+    """Crossings of rays with all sheets of a scene.
 
     Parameters
     ----------

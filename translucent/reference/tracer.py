@@ -16,13 +16,13 @@ from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.hits import Hits, cross_triangles, sorted_hits
 from translucent.scene.scene import Object, Scene
 
-#: The ball around the scene is larger than it by this share.
+#: Enlargement of the scene's bounding sphere, as a share.
 MARGIN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class TracedObject:
-    """An object that rays can be cast at, in metres from the eye.
+    """Object for ray casting, in metres from the eye.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class TracedObject:
 
     @classmethod
     def of(cls, body: Object, eye: Array) -> TracedObject:
-        """An object as seen from `eye` (3,)."""
+        """Object relative to `eye` (3,)."""
         x, y, z = (body.mesh.vertices - body.mesh.center).T[:, :, None] * body.matrix[:3, :3].T[:, None]
         # The mesh keeps its shape to the last digit wherever it is: only the one offset to the eye is large.
         corners = (x + y + z + center_from(body, eye))[body.mesh.faces]
@@ -63,7 +63,7 @@ def center_from(body: Object, eye: Array) -> Array:
 
 
 class Tracer:
-    """Casts rays at all objects of a scene.
+    """Ray caster for all objects of a scene.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Tracer:
         return [traced.hits(lines) for traced in self.objects]
 
     def ball(self, origins: Array, directions: Array) -> tuple[Array, Array]:
-        """Where lines enter and leave the ball around the scene: distances (n,), equal for lines that miss it."""
+        """Entry and exit of lines in the scene's bounding sphere: distances (n,), equal for lines that miss it."""
         to_center = self.center - origins
         middle = np.einsum("ki,ki->k", to_center, directions)
         across = np.linalg.norm(to_center - middle[:, None] * directions, axis=1)
@@ -93,7 +93,7 @@ class Tracer:
 
 
 def _sheared(vectors: Array, directions: Array) -> Array:
-    """(k, 3, 3): vectors (k, 3, 3) seen along unit directions (k, 3): right, up, and the distance along the ray.
+    """(k, 3, 3): vectors (k, 3, 3) in the frame of unit directions (k, 3): right, up, and the distance along the ray.
 
     Equal vectors give bit-equal results whatever triangle they belong to.
     """

@@ -1,4 +1,4 @@
-"""What fills each place of a scene: which media, how often, and how dense they are there."""
+"""Media at each place of a scene: their indices, multiplicities and densities."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class Volume:
 
 
 class _UnitBox:
-    """Where places are in the box of an object, 0 to 1 along each of its axes."""
+    """Unit box of an object: coordinates 0 to 1 along each of its axes."""
 
     def __init__(self, scene: Scene, index: int) -> None:
         body = scene.objects[index]
@@ -111,7 +111,7 @@ class _UnitBox:
         self._center = center_from(body, scene.camera.eye)
 
     def places(self, points: Array) -> Array:
-        """(k, 3): points (k, 3) in the box."""
+        """(k, 3): coordinates of points (k, 3) in the box."""
         return np.asarray(0.5 + (points - self._center) @ self._linear.T)
 
 
@@ -124,7 +124,7 @@ def places(rays: Rays, chosen: Integers, distance: Array) -> Array:
 def volume_segments(
     scene: Scene, volume: Volume, rays: Rays, intervals: Intervals, crossings: Crossings
 ) -> tuple[Segments, Array]:
-    """The media on each ray, in order, and what fills each segment where the density is 1.
+    """Ordered segments of the media on each ray, and the weights of media in each where the density is 1.
 
     Segments get the mean extinction and emission between their ends, so that their optical depth is exact. So is what
     they emit where it varies as the extinction does, that is in one medium; for mixtures see `emission_of_mixtures`.
@@ -155,7 +155,7 @@ def volume_segments(
 
 
 def _add_layers(extinction: Array, emission: Array, filling: Array, intervals: Intervals, crossings: Crossings) -> None:
-    """Add to coefficients (k, 3) those of the layers among the crossings."""
+    """Add the coefficients (k, 3) of layers among the crossings."""
     pieces = len(filling) - len(crossings.body)
     source = _order(intervals, crossings) - pieces
     row = np.flatnonzero(source >= 0)
@@ -165,7 +165,7 @@ def _add_layers(extinction: Array, emission: Array, filling: Array, intervals: I
 
 
 def _order(intervals: Intervals, crossings: Crossings) -> Integers:
-    """Where each segment that `scene_segments` makes comes from: the pieces of solids, and then the crossings."""
+    """Order of the segments of `scene_segments` by origin: the pieces of solids, and then the crossings."""
     pixel, t_enter, t_exit, _, _ = _pieces(intervals, crossings)
     at = crossings.distance
     columns = [np.concatenate(pair) for pair in ((t_exit, at), (t_enter, at), (pixel, crossings.pixel))]
@@ -173,7 +173,7 @@ def _order(intervals: Intervals, crossings: Crossings) -> Integers:
 
 
 def _filling(scene: Scene, intervals: Intervals, crossings: Crossings) -> Array:
-    """(k, n): what fills each segment that `scene_segments` makes of the same arguments."""
+    """(k, n): weights of media in each segment of `scene_segments` for the same arguments."""
     pixel, _, _, bodies, windings = _pieces(intervals, crossings)
     solid = np.zeros((len(pixel), len(scene.objects)))
     solid[:, bodies] = _weights(scene, bodies, windings).T
@@ -183,7 +183,7 @@ def _filling(scene: Scene, intervals: Intervals, crossings: Crossings) -> Array:
 
 
 def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> Array:
-    """(b, k): how often the medium of each body fills each place, by the overlap policy of the scene."""
+    """(b, k): multiplicity of each body's medium at each place, by the overlap policy of the scene."""
     inside = windings > 0
     if scene.overlap == "add" or not len(bodies):
         return np.maximum(windings, 0).astype(np.float64)
@@ -202,7 +202,7 @@ def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) ->
 
 
 def _medium_key(scene: Scene, index: int) -> tuple[object, ...]:
-    """Equal for bodies of one medium, which fill their common places once; what a density scales is only its body's."""
+    """Key of a medium, equal for bodies of one medium, which fill common places once; a density makes it unique."""
     body = scene.objects[index]
     medium = body.medium
     if medium is None or body.density is not None:

@@ -131,7 +131,7 @@ def _by_channel(path: str | Path, data: Bytes, rows: int, columns: int) -> Bytes
 
 
 def _by_pixel(path: str | Path, data: Bytes, count: int) -> Bytes:
-    """Decode pixels of four bytes; (1, 1, 1, n) repeats the last n times, several in a row are digits of n."""
+    """Decode pixels of four bytes, where (1, 1, 1, n) repeats the last one n times; several in turn are digits of n."""
     words = data[: len(data) // 4 * 4].reshape(-1, 4)
     repeats = (words[:, :3] == 1).all(axis=1)
     times = np.ones(len(words), dtype=np.int64)

@@ -176,7 +176,7 @@ class Object(Frozen):
         return np.stack([world.min(axis=0), world.max(axis=0)])
 
     def winding_number(self, point: npt.ArrayLike) -> float:
-        """How often the body contains a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
+        """Winding number around a world-space point: 0 or 1 for a simple solid; quick outside the bounds."""
         local = np.linalg.solve(self.matrix[:3, :3], np.asarray(point, dtype=np.float64) - self.matrix[:3, 3])
         if (local < self.mesh.bounds[0]).any() or (local > self.mesh.bounds[1]).any():
             return 0.0

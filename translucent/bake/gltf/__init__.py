@@ -1,1 +1,1 @@
-"""Baking whole glTF files: what to bake, and how maps and vertices go back into them."""
+"""Baking of whole glTF files: selection of targets, and writing of maps and vertices back."""

@@ -1,4 +1,4 @@
-"""A glTF file baked: each primitive that light enters, into a copy of the file, or into maps of their own.
+"""Baking of a glTF file: each primitive that light enters, into a copy of the file, or into maps of their own.
 
 In the file thickness is in the mesh's own space, as glTF has it; in maps it is in metres of the scene.
 """
@@ -25,7 +25,7 @@ from translucent.units import metres_per_unit
 
 
 def bake_gltf(job: Job, about: Record, progress: Progress | None = None) -> tuple[Record, Results]:
-    """Do a job whose model is a glTF file; see `translucent.bake.bake_file.bake_file`."""
+    """Run a job whose model is a glTF file; see `translucent.bake.bake_file.bake_file`."""
     metres = metres_per_unit(job.get("unit", "m"))
     output, vertices, inside = Path(job["output"]), bool(job.get("vertices")), stays_gltf(job)
     size = job.get("settings", {}).get("size", 1024)
@@ -51,7 +51,7 @@ def bake_gltf(job: Job, about: Record, progress: Progress | None = None) -> tupl
 
 
 def _placed(builder: GlbBuilder, targets: list[Target], metres: float) -> list[Target]:
-    """The targets where the nodes put them."""
+    """Targets as the nodes place them."""
     matrices = first_transforms(builder.file())
     placed = []
     for target in targets:

@@ -1,4 +1,4 @@
-"""Primitives of a glTF file as bodies: closed by those beside them, and where nodes put them.
+"""Bodies from primitives of a glTF file: closed by adjacent primitives, and placed by nodes.
 
 Modelling tools split a mesh by its materials: of a vase in four primitives none is closed, and all of them are. Such a
 primitive is joined with the other open ones of its mesh, if that closes edges, and has the thickness of all of them
@@ -25,12 +25,12 @@ Place = tuple[int, int]
 
 _TRIANGLES = (4, 5, 6)
 
-#: Nodes whose axes differ by less than this share show a mesh in one size.
+#: Relative difference of axes within which nodes show a mesh in one size.
 SAME_SIZE = 1e-4
 
 
 def read_primitive(file: GltfFile, place: Place, metres: float, tex_coord: int | None = None) -> Mesh:
-    """A primitive in its own space, in metres, with a set of its UVs or none."""
+    """Read a primitive in its own space, in metres, with a set of its UVs or none."""
     primitive = primitives(file, file.item("meshes", place[0]))[place[1]]
     attributes = {"POSITION": primitive["attributes"].get("POSITION")}
     if tex_coord is not None:
@@ -76,19 +76,19 @@ class Bodies:
         self._joined: dict[int, tuple[Mesh, dict[Place, int]] | None] = {}
 
     def is_closed(self, place: Place) -> bool:
-        """Whether a primitive, with those beside it that close it, has no hole."""
+        """Whether a primitive is closed, together with those adjacent to it."""
         whole = self.around(place) or self._outline(place)
         return whole.diagnosis.closed
 
     def around(self, place: Place) -> Mesh | None:
-        """An open primitive joined with the other open ones of its mesh, if that closes edges."""
+        """Body of an open primitive: joined with the other open ones of its mesh, if that closes edges."""
         if self._outline(place).diagnosis.closed:
             return None
         joined = self._join(place[0])
         return None if joined is None else joined[0]
 
     def wound(self, place: Place, mesh: Mesh) -> Mesh:
-        """The mesh of a primitive, its faces turned as they are in what is `around` it."""
+        """Mesh of a primitive, with the winding of its faces in the body `around` it."""
         joined = self._join(place[0])
         assert joined is not None
         whole, starts = joined
@@ -152,7 +152,7 @@ def first_transforms(file: GltfFile) -> dict[int, Array]:
 
 
 def _sizes(matrix: Array) -> Array:
-    """What lengths and angles become: the same for two matrices that differ by a turn, a shift or a mirror."""
+    """Metric of a matrix: the same for two that differ by a rotation, a translation or a reflection."""
     return np.asarray(matrix[:3, :3].T @ matrix[:3, :3])
 
 

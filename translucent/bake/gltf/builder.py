@@ -1,4 +1,4 @@
-"""A glTF file that grows: data at the end of its binary chunk, with views, accessors, images and materials of them.
+"""Builder of glTF files: data appended to the binary chunk, with views, accessors, images and materials.
 
 What the file has keeps its place and its index. Source: glTF 2.0, sections 3.6 (binary data) and 4.4 (GLB).
 """
@@ -29,7 +29,7 @@ _CODES = {dtype: code for code, dtype in COMPONENTS.items()}
 
 
 class GlbBuilder:
-    """A copy of a file, as a .glb, to which data can be added.
+    """Builder: a copy of a file, as a .glb, to which data can be added.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class GlbBuilder:
         self._data = bytearray(data)
 
     def file(self) -> GltfFile:
-        """The file as it is now; its JSON is the builder's own."""
+        """Current state of the file; its JSON is the builder's own."""
         if self._data:
             buffers = self.tree.setdefault("buffers", [{}])
             buffers[0]["byteLength"] = len(self._data)
@@ -65,13 +65,13 @@ class GlbBuilder:
         return GltfFile(self._path, self.tree, chunk + self._rest, self._allow_outside)
 
     def add(self, key: str, entry: Json) -> int:
-        """Put an object at the end of a list such as ``"materials"``; its index."""
+        """Append an object to a list such as ``"materials"``; returns its index."""
         entries: list[Json] = self.tree.setdefault(key, [])
         entries.append(entry)
         return len(entries) - 1
 
     def add_view(self, data: bytes, **fields: Any) -> int:
-        """Put bytes into a buffer view of their own; its index."""
+        """Put bytes into a buffer view of their own; returns its index."""
         self._data += b"\0" * (-len(self._data) % _ALIGNMENT)
         self.tree.setdefault("buffers", [{}])
         start = len(self._data)
@@ -81,7 +81,7 @@ class GlbBuilder:
     def add_accessor(
         self, values: npt.NDArray[Any], target: int | None = VERTICES, *, normalized: bool = False, bounds: bool = False
     ) -> int:
-        """Put an array (n,) or (n, 2..4) into an accessor; its index.
+        """Put an array (n,) or (n, 2..4) into an accessor; returns its index.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class GlbBuilder:
         return self.add("accessors", entry)
 
     def use_extension(self, name: str) -> None:
-        """Name an extension among those that the file uses."""
+        """Declare an extension that the file uses."""
         used = self.tree.setdefault("extensionsUsed", [])
         if not isinstance(used, list):
             raise InputError(f"glTF {str(self._path)!r}", f"extensionsUsed is {used!r}, not a list", "mend the file")
@@ -145,7 +145,7 @@ class GlbBuilder:
         return int(primitive["material"])
 
     def _users(self) -> Counter[int]:
-        """How many primitives and variants of primitives use each material."""
+        """Number of primitives and variants of primitives that use each material."""
         file = GltfFile(self._path, self.tree)
         users: Counter[int] = Counter()
         for mesh in file.items("meshes"):

@@ -1,4 +1,4 @@
-"""A mesh as a glTF file of its own: for meshes that come from formats without materials."""
+"""Export of a mesh as a glTF file of its own: for meshes that come from formats without materials."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from translucent.gltf.file import GltfFile, Json
 
 Indices = npt.NDArray[np.int64]
 
-#: A face whose normal is this far from the smooth one, in degrees, has its own at that corner: an edge stays an edge.
+#: Angle between face and smooth normal, in degrees, beyond which a corner keeps the face's: an edge stays an edge.
 CREASE = 30.0
 
 
 def mesh_file(mesh: Mesh) -> GltfFile:
-    """A .glb with this mesh, its UVs if it has any, normals, and a clear material; nothing is written yet.
+    """Make a .glb with this mesh, its UVs if it has any, normals, and a clear material; nothing is written yet.
 
     Raises
     ------

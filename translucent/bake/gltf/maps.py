@@ -1,4 +1,4 @@
-"""Thickness maps into a glTF file: thicknessFactor = max, and max * G / 255 is the thickness in mesh space.
+"""Writing of thickness maps into a glTF file: thicknessFactor = max, and max * G / 255 is the thickness in mesh space.
 
 Per primitive: a material of its own, KHR_materials_volume with factor and texture, and KHR_materials_transmission with
 factor 1 where no light came in so far. Then metallicFactor becomes 0, too, since metal transmits nothing. doubleSided
@@ -105,7 +105,7 @@ def _give(
     metres: float,
     medium: Medium | None,
 ) -> Record:
-    """Write a map into the material of one primitive; what the record says of it."""
+    """Write a map into the material of one primitive; returns its entry in the record."""
     index = builder.own_material(*target.place)
     material = builder.tree["materials"][index]
     extensions = material.setdefault("extensions", {})
@@ -136,7 +136,7 @@ def _let_light_in(material: Json, extensions: Json) -> None:
 
 
 def _texture_info(old: Json, texture: int, target: Target) -> Json:
-    """Where the new texture is read; the transform of the old one stays if the map was baked for it."""
+    """Texture info of the new texture; the transform of the old one stays if the map was baked for it."""
     extensions = {
         k: v for k, v in old.get("extensions", {}).items() if k != TEXTURE_TRANSFORM or target.keeps_transform
     }
@@ -161,7 +161,7 @@ def _add_texture(builder: GlbBuilder, result: BakedMap, encoding: Encoding) -> i
 
 
 def wrapping(mesh: Mesh) -> Json:
-    """How a sampler reads a map of this mesh.
+    """Wrapping mode of a sampler for a map of this mesh.
 
     Clamped, it does not mix the map's left and right sides; UVs beyond 0..1 mean that the map repeats.
     """

@@ -1,4 +1,4 @@
-"""Which primitives of a glTF file get thickness, and their meshes as a baker takes them.
+"""Targets of a bake: the primitives of a glTF file that get thickness, and their meshes.
 
 Those whose material lets light in, but for open meshes that it makes thin walls: they have no inside. Where no material
 lets light in, all triangles, whose materials then will. Each is baked in the mesh's own space, as glTF states
@@ -35,7 +35,7 @@ _COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_m
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A primitive that gets thickness.
+    """Target: a primitive that gets thickness.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def _material(materials: list[GltfMaterial], primitive: Json) -> GltfMaterial | 
 
 
 def left_out(file: GltfFile, targets: list[Target]) -> list[str]:
-    """What gets no thickness beside the targets, a line for each reason."""
+    """Primitives that get no thickness, a line for each reason."""
     materials, chosen = materials_of(file), {target.place for target in targets}
     reasons: dict[str, list[Place]] = {}
     for place, primitive in triangle_primitives(file).items():
@@ -149,7 +149,7 @@ def _is_sheet(material: GltfMaterial | None, place: Place, bodies: Bodies) -> bo
 
 
 def _places(file: GltfFile, materials: list[GltfMaterial]) -> list[Place]:
-    """Triangles of meshes that nodes use: with a material that lets light in, or all."""
+    """Triangle primitives of meshes that nodes use: those with a translucent material, or all."""
     everything = {place: primitive.get("material") for place, primitive in triangle_primitives(file).items()}
     if not everything:
         raise InputError(f"glTF {str(file.path)!r}", "no node has triangles", "give a file with a mesh")
@@ -164,7 +164,7 @@ def _tex_coord(primitive: Json, material: GltfMaterial | None) -> int | None:
 
 
 def _transformed(mesh: Mesh, material: GltfMaterial | None, tex_coord: int) -> tuple[Mesh, bool]:
-    """The mesh with UVs as the thickness texture that the material has sees them, where that is of use."""
+    """Mesh with the UVs of the material's thickness texture, if they apply."""
     if material is None or not material.has_thickness_texture or mesh.uv is None:
         return mesh, False
     transform = material.thickness_transform
@@ -177,14 +177,14 @@ def _transformed(mesh: Mesh, material: GltfMaterial | None, tex_coord: int) -> t
 
 
 def _medium(material: GltfMaterial | None, metres: float) -> Medium | None:
-    """What attenuation the material states, whatever its thickness is so far."""
+    """Medium of the material's attenuation, whatever its thickness."""
     if material is None or not np.isfinite(material.attenuation_distance):
         return None
     return Medium(absorption=extinction_at(material.attenuation_color, material.attenuation_distance) / metres)
 
 
 def add_uv(builder: GlbBuilder, place: Place, size: int) -> int:
-    """Give a primitive new UVs as its next set; vertices on seams are repeated with all that belongs to them.
+    """Give a primitive new UVs as its next set; vertices on seams are repeated with all their attributes.
 
     Raises
     ------

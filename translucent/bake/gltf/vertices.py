@@ -1,4 +1,5 @@
-"""Thickness per vertex into a glTF file: a float attribute ``_THICKNESS`` of its primitives, in units of the file.
+"""Writing of thickness per vertex into a glTF file: a float attribute ``_THICKNESS`` of its primitives, in units of the
+file.
 
 Materials and everything else in the file stay as they are: no extension reads thickness from vertices.
 """

@@ -1,4 +1,4 @@
-"""A hard case, an input that breaks renderers: how it is measured against what is promised for it."""
+"""Hard cases: inputs that break renderers, each measured against its promise."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from translucent.scene.scene import Scene
 
 Size = tuple[int, int]
 
-#: What float32 may be off by where a promise is called exact: a hundred roundings of a path as long as the diagonal.
+#: Largest error of an exact promise in float32: a hundred roundings of a path as long as the diagonal.
 EXACT = 100 * float(np.finfo(np.float32).eps) / 2
 
-#: Frames are small: each case takes a fraction of a second.
+#: Size of frames, small so that each case takes a fraction of a second.
 SIZE: Size = (96, 96)
 
 
 @dataclass
 class Checks:
-    """What one hard case has found, while it goes on.
+    """Findings of one hard case, gathered while it runs.
 
     Attributes
     ----------
@@ -46,17 +46,17 @@ class Checks:
     failed: list[str] = field(default_factory=list)
 
     def error(self, what: str, value: float) -> None:
-        """Note an error, which has to stay within the limit; NaN does not."""
+        """Record an error, which must stay within the limit; NaN does not."""
         value = abs(float(value))
         self.worst = value if self.worst is None else float(np.maximum(self.worst, value))
         self._note(f"{what} {value:.1e}", value <= self.limit)
 
     def holds(self, what: str, held: bool | np.bool_) -> None:
-        """Note something that has to be true."""
+        """Record a condition that must be true."""
         self._note(what, bool(held))
 
     def refused(self, what: str, make: Callable[[], object], word: str) -> None:
-        """Note that something has to be an `InputError` whose message has this word."""
+        """Record that a call must raise an `InputError` whose message has this word."""
         try:
             made = make()
         except InputError as error:
@@ -65,7 +65,7 @@ class Checks:
             self._note(f"{what} gave {type(made).__name__}, no error", held=False)
 
     def picture(self, what: str, scene: Scene) -> Frame:
-        """Render, and note the error in thickness: its 99.9th percentile, as a share of the diagonal."""
+        """Render, and record the error in thickness: its 99.9th percentile, as a share of the diagonal."""
         frame, truth = self.render(scene, SIZE), reference.render(scene, SIZE)
         inside = interior(reference.hit_counts(scene, SIZE))
         self.error(what, compare(frame, truth, mask=inside).p999 / scene.diagonal)
@@ -73,11 +73,11 @@ class Checks:
         return frame
 
     def compared(self, frame: Frame, truth: Frame, scene: Scene, quantity: Quantity = "thickness") -> Errors:
-        """Errors away from silhouettes."""
+        """Errors of a frame away from silhouettes."""
         return compare(frame, truth, quantity, mask=interior(reference.hit_counts(scene, frame.size)))
 
     def render(self, scene: Scene, size: Size = SIZE, method: Method | None = None) -> Frame:
-        """Render without a word about pixels that are not valid."""
+        """Render without warnings about invalid pixels."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TranslucentWarning)
             return self.renderer.render(scene, size, method)
@@ -109,7 +109,7 @@ class Hard:
     unit: str = "of the diagonal"
 
     def measure(self, renderer: Renderer) -> HardCase:
-        """Its record; what raises has failed."""
+        """Measure the case; one that raises has failed."""
         checks = Checks(renderer, self.limit)
         try:
             self.check(checks)

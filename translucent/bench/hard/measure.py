@@ -1,4 +1,4 @@
-"""H01 to H26, all of the hard cases: each measured now, against what is promised for it."""
+"""All hard cases, H01 to H26, each measured against its promise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from translucent.renderer import Renderer
 
 
 def measure_hard_cases(renderer: Renderer) -> Iterator[HardCase]:
-    """All of them, in their order."""
+    """Measure all hard cases, in their order."""
     cases = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
     for case in sorted(cases, key=lambda case: case.id):
         yield case.measure(renderer)

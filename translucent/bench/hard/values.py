@@ -21,7 +21,7 @@ from translucent.scene.lights import PointLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import showcase
 
-#: Roundings of float64 in a formula of a few steps, relative.
+#: Relative rounding error of a formula of a few steps in float64.
 ROUNDING = 1e-14
 
 

@@ -1,4 +1,4 @@
-"""What to use for a scene, read off its rows by a rule that the page prints."""
+"""Advice on the method for a scene, from its rows by a rule that the page prints."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ GOOD_ENOUGH: Mapping[Quantity, float] = {"thickness": 1e-4, "transmittance": 1 /
 #: Times that, up to which the error of one pixel in a thousand may be: beyond it, flaws are few but plain.
 WORST = 10.0
 
-#: Share of the covered pixels that a method may mark as invalid and still be advised.
+#: Largest share of covered pixels that an advised method may mark as invalid.
 MAX_INVALID = 1e-3
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What to use for a scene.
+    """Advice on the method for a scene.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Advice:
 
 
 def advise(case: CaseRecord) -> Advice | None:
-    """What to use for the scene of a case; None where nothing was measured."""
+    """Advice for the scene of a case; None where nothing was measured."""
     measured = [row for row in case.rows if row.ratio is not None and error_of(row, case.quantity) is not None]
     kept = [row for row in measured if (row.invalid or 0.0) <= MAX_INVALID]
     # Without OpenGL only where nothing else runs.
@@ -73,7 +73,7 @@ def advise(case: CaseRecord) -> Advice | None:
 
 @dataclass(frozen=True)
 class Summary:
-    """One line of the answer: in these scenes, this method.
+    """Summary line of the advice: the scenes of one method.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Summary:
 
 
 def summarize(cases: Sequence[tuple[CaseRecord, Advice | None]]) -> list[Summary]:
-    """The methods that are good enough, those for the most scenes first."""
+    """Summarize the methods that are good enough, those for the most scenes first."""
     by_method: dict[str, list[tuple[CaseRecord, Row]]] = {}
     for case, advice in cases:
         if advice is not None and advice.good_enough:

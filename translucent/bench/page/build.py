@@ -136,7 +136,7 @@ def _parts(rows: list[Any], count: int) -> list[list[Any]]:
 
 
 def _columns(count: int) -> int:
-    """Of pictures: up to eight in a row, the rows as equal as can be."""
+    """Number of columns of pictures: up to eight in a row, the rows as equal as can be."""
     rows = max(1, math.ceil(count / 8))
     return max(6, math.ceil(count / rows))
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 Arguments = ParamSpec("Arguments")
 
-#: Of labels, in units of the SVG. Layout measures the widest of the common fonts, which comes with matplotlib.
+#: Font size of labels, in units of the SVG. Layout measures the widest of the common fonts, which comes with
+#: matplotlib.
 FONT_SIZE = 12.0
 
 #: Characters of a name.
@@ -114,7 +115,7 @@ def standalone(svg: str) -> str:
 
 
 def _settings() -> dict[str, Any]:
-    """What all figures share; the same record gives the same bytes."""
+    """Settings that all figures share; the same record gives the same bytes."""
     ink, muted, line = placeholder("ink"), placeholder("muted"), placeholder("line")
     return {
         "font.family": "DejaVu Sans",

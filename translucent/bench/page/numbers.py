@@ -23,7 +23,7 @@ def limit_text(value: float) -> str:
 
 
 def signed_error_text(value: float | None) -> str:
-    """As `error_text`, with its sign."""
+    """Error as in `error_text`, with its sign."""
     return f"+{error_text(value)}" if value is not None and value > 0 else error_text(value)
 
 

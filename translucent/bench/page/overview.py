@@ -1,4 +1,4 @@
-"""The one figure that stands for the whole report, as a file of its own."""
+"""Overview figure of the whole report, as a separate file."""
 
 from __future__ import annotations
 

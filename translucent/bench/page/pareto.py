@@ -20,14 +20,14 @@ from translucent.bench.row import Quantity, Row
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: What errors are measured in, for axes.
+#: Units of errors, for axes.
 UNITS: Mapping[Quantity, str] = {
     "thickness": "in thickness, share of the diagonal",
     "transmittance": "in transmittance, 0 to 1",
     "radiance": "in radiance, share of its mean",
 }
 
-#: Where errors below it are drawn, and those of zero.
+#: Error at which smaller ones, and those of zero, are drawn.
 _ZERO = 1e-9
 _SYMBOL = 9.0
 
@@ -88,7 +88,7 @@ def tooltip(row: Row, quantity: Quantity) -> str:
 
 
 def identifier(name: str) -> str:
-    """What may stand in an HTML identifier."""
+    """Name with only the characters of an HTML identifier."""
     return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "x"
 
 

@@ -15,7 +15,7 @@ from translucent.bench.record import Series
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: What each axis counts.
+#: Quantity that each axis counts.
 AXES = {
     "triangles": "triangles",
     "pixels": "pixels of the frame",
@@ -23,7 +23,7 @@ AXES = {
     "media": "different media",
 }
 
-#: From the axes to the names of the lines, in pixels.
+#: Distance from the axes to the names of the lines, in pixels.
 _LEADER = 14.0
 
 

@@ -26,7 +26,7 @@ COLORS = {
 
 @dataclass(frozen=True)
 class Style:
-    """How a family is drawn: the name of its color, and a symbol of matplotlib."""
+    """Style of a family: the name of its color, and a symbol of matplotlib."""
 
     color: str
     marker: str

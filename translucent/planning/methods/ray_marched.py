@@ -19,7 +19,7 @@ MAX_STEPS = 65536
 #: Largest number of Gauss-Legendre points in an interval; smooth sources need far fewer for all digits of float64.
 MAX_GAUSS_POINTS = 256
 
-#: Where less than this share of the light of every channel gets through, a march on the GPU looks for no more sources.
+#: Transmittance of every channel below which a march on the GPU looks for no more sources.
 LEAST_SEEN = 1e-5
 
 Quadrature = Literal["left", "midpoint", "exponential", "jittered", "equiangular", "gauss"]

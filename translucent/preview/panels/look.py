@@ -12,7 +12,7 @@ ENVIRONMENTS = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040
 
 
 def look_panel(desk: Desk) -> None:
-    """The whole panel."""
+    """Draw the panel."""
     imgui.separator_text("Camera")
     orbit = desk.work.document.orbit
     if orbit is not None and begin_rows("camera"):
@@ -59,7 +59,7 @@ def _environment(desk: Desk, label: str, name: str, empty: str) -> None:
 
 
 def files_panel(desk: Desk) -> None:
-    """Pictures and turntables of the view, the session, the medium written into a file; what is baked."""
+    """Draw the files panel: pictures and turntables, the session, export of the medium, and baking."""
     imgui.separator_text("Picture of this view")
     changed, value = imgui.checkbox("transparent background", desk.export["transparent"])
     if changed:

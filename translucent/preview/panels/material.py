@@ -1,4 +1,6 @@
-"""The material panel: what fills the bodies, by the names of glTF, with the numbers of ``translucent extinction``."""
+"""The material panel: the medium of the bodies, by the names of glTF, with the numbers of ``translucent
+extinction``.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ from translucent.units import metres_per_unit
 #: Systems that the medium is copied for, with their names on buttons.
 COPIES = {"gltf": "glTF", "openpbr": "OpenPBR", "blender": "Blender", "unreal": "Unreal", "json": "JSON"}
 
-#: Of curves: red, green and blue that are told apart on a dark background.
+#: Colors of curves: red, green and blue that are told apart on a dark background.
 CURVES = ((0.95, 0.36, 0.33, 1.0), (0.38, 0.80, 0.42, 1.0), (0.36, 0.58, 1.0, 1.0))
 
 numbers_told = lru_cache(maxsize=4)(numbers.told)
@@ -44,7 +46,7 @@ swatches = lru_cache(maxsize=4)(numbers.swatches)
 
 
 def material_panel(desk: Desk) -> None:
-    """The whole panel."""
+    """Draw the panel."""
     material = desk.work.document.material
     _source(desk, material)
     imgui.separator_text("Volume")
@@ -127,7 +129,7 @@ def _color(desk: Desk, material: Material) -> None:
 
 
 def _typed_color(desk: Desk, text: str) -> str:
-    """What stays in the field: nothing, or what could not be read."""
+    """Text that stays in the field: none, or the one that could not be parsed."""
     try:
         color = np.asarray(parse_color(text))
     except InputError as error:
@@ -211,7 +213,7 @@ _averages: dict[int, tuple[object, Medium, str]] = {}
 
 
 def _average_hex(measured: object, medium: Medium) -> str:
-    """The average color of the model; kept until either changes."""
+    """Average color of the model; cached until either changes."""
     known = _averages.get(0)
     if known is None or known[0] is not measured or known[1] != medium:
         seen = measured.seen  # type: ignore[attr-defined]
@@ -241,7 +243,7 @@ def _copies(desk: Desk, material: Material) -> None:
 
 
 def copied_text(material: Material, target: str) -> str:
-    """The block of text that a target gets: what ``translucent extinction --as`` prints."""
+    """Text that is copied for a target, as ``translucent extinction --as`` prints it."""
     medium, distance = medium_of(material), float(numbers.told(material)["distance"])
     return text_block(target, medium, medium.transmittance(distance), distance)
 

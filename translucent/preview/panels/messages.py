@@ -1,4 +1,4 @@
-"""What the window has to say, the latest first."""
+"""The messages panel, the latest first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ COLORS = {"info": FAINT, "warning": WARNING, "error": ERROR}
 
 
 def messages_panel(desk: Desk) -> None:
-    """The whole panel."""
+    """Draw the panel."""
     for text in (desk.stage.problem, desk.stage.shader_problem):
         if text:
             wrapped(text, ERROR)

@@ -1,4 +1,4 @@
-"""The method panel: what runs and why, how long it takes, how wrong it is, and what is to be seen beside it."""
+"""The method panel: the plan and its reasons, times, errors, and the comparison."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from translucent.preview.stage import Timing
 
 NAMES = (AUTO, *METHODS)
 
-#: What to do about pixels that cannot be trusted, by a word in the plan's limits or the diagnosis.
+#: Advice about invalid pixels, by a word in the plan's limits or the diagnosis.
 CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
 
 
 def method_panel(desk: Desk) -> None:
-    """The whole panel."""
+    """Draw the panel."""
     display = desk.work.document.display
     if begin_rows("method"):
         choice(desk, "method", "display.method", NAMES, tip="auto: the cheapest one that is exact for the scene.")

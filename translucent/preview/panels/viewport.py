@@ -1,4 +1,4 @@
-"""The viewport: the picture, what the mouse does in it, and what is drawn over it."""
+"""The viewport: the picture, mouse input, and overlays."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WHITE, BLACK, SHADE = 0xFFFFFFFF, 0xFF000000, 0xB0181818
 
 
 def viewport_panel(desk: Desk) -> None:
-    """The picture in the whole window, and all over it."""
+    """Draw the picture in the whole window, and its overlays."""
     corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     scale = imgui.get_io().display_framebuffer_scale
     pixels = max(int(room.x * scale.x), 8), max(int(room.y * scale.y), 8)
@@ -135,7 +135,7 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
 
 
 def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    """The false colors with their lengths, or the meaning of those of validity."""
+    """Draw the scale of false colors with lengths, or the legend of validity."""
     display = desk.work.document.display
     if display.mode not in ("thickness", "validity"):
         return
@@ -166,7 +166,7 @@ def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
 
 
 def _inset(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    """The reference, as it was measured against, in the corner."""
+    """Draw the reference of the measurement in the corner."""
     measured = desk.work.measured
     if not desk.get("display.inset") or measured is None or measured.scene is not desk.work.scene():
         return
@@ -203,7 +203,7 @@ def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
 
 
 def probe_lines(desk: Desk, place: tuple[float, float]) -> list[str]:
-    """What there is to say of a pixel: of the frame on show, and of the float64 reference when that is there."""
+    """Lines about a probed pixel: values of the frame on show, and of the float64 reference when they are there."""
     scene, viewport = desk.work.scene(), desk.stage.viewport
     if scene is None:
         return []
@@ -239,7 +239,7 @@ def probe_lines(desk: Desk, place: tuple[float, float]) -> list[str]:
 
 
 def why_not(desk: Desk, right: bool) -> str:
-    """Why a pixel cannot be trusted."""
+    """Reason why a pixel is invalid."""
     plan = desk.stage.plans[1 if right else 0]
     return "; ".join(plan.limits) if plan is not None and plan.limits else "its surfaces do not balance"
 
@@ -257,7 +257,7 @@ def _ask_crossing(desk: Desk, probed: Probed) -> None:
 
 
 def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    """Why the picture is not what it should be, and what is under way."""
+    """Draw the status: why the picture is incomplete, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
     lines = [text for text in (desk.stage.problem, desk.stage.shader_problem) if text]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
@@ -269,7 +269,7 @@ def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) ->
 
 
 def folded(text: str, width: float) -> list[str]:
-    """A text in lines that are no wider than this."""
+    """Fold a text into lines that are no wider than this."""
     found: list[str] = []
     for paragraph in text.splitlines():
         line = ""
