@@ -123,7 +123,7 @@ class Meetings:
         return [reflected, refracted], share_on
 
     def _at_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """Branches at polished sheets, as `_at_borders`: both sides of each at once."""
+        """Branches at polished sheets, as `_at_interfaces`: both sides of each at once."""
         legs, inside = self.legs.where(chosen), self.interfaces.here.where(chosen)
         metres, extinction, emission = self._matter(chosen)
         share, ior = self.reflectance[chosen], self.ior[chosen]
@@ -143,7 +143,7 @@ class Meetings:
         return branches, on
 
     def _at_rough_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
-        """Branches at rough sheets, as `_at_borders`: light goes from one side to the other until it leaves."""
+        """Branches at rough sheets, as `_at_interfaces`: light goes from one side to the other until it leaves."""
         assert self.rng is not None
         legs, inside, normals = self.legs.where(chosen), self.interfaces.here.where(chosen), self.normals[chosen]
         metres, extinction, emission = self._matter(chosen)
