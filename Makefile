@@ -1,5 +1,5 @@
 # Everything happens in .venv of this checkout. Needs make and a Python 3.11 to 3.13 with venv, nothing else.
-# Another Python: make PYTHON=/path/to/python3.12 test     Arguments for pytest: make test PYTEST_ARGS="-k optics"
+# Another Python: make PYTHON=/path/to/python3.12 test     Arguments for pytest: make test PYTEST_ARGS="-n 0 -k optics"
 # What changed since an old report: make bench BENCH_ARGS="--compare docs/reports/software.json"
 
 # The first that runs (a pyenv shim may exist and fail), has the right version and can make environments.
@@ -26,9 +26,9 @@ demo: ## render a few pictures into out/
 	$(BOOTSTRAP)
 	@$(BIN)/python tools/demo.py
 
-test: ## run the tests
+test: ## run the tests, in two processes
 	$(BOOTSTRAP) --group test
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
 test-drivers: ## run the tests of rendering on every OpenGL driver that is here: it takes long, see docs/drivers.md
 	$(BOOTSTRAP) --group test
