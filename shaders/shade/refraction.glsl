@@ -3,6 +3,8 @@
 // After Wyman 2005, "An approximate image-space approach for interactive refraction", whose guess of the path's length a
 // search along the refracted ray replaces.
 
+#include "shade/environment_beyond.glsl"
+
 uniform sampler2D entered;      // interface towards the eye: normal, place
 #if !ONE_INTERFACE
 uniform sampler2D left;         // first interface away from it beyond
@@ -12,25 +14,6 @@ const int EXIT_STEPS = 16;
 const int EXIT_HALVINGS = 6;
 const int OPAQUE_STEPS = 16;
 const int OPAQUE_HALVINGS = 5;
-
-// Point at a place on the ray through a pixel.
-vec3 point_at(vec2 pixel, float place) {
-    vec2 ndc = 2.0 * pixel / frame_size.xy - 1.0;
-    float ahead = surface_ahead.x + place * surface_ahead.y;
-    float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
-    return ahead * ray_forward.xyz + spread * (ndc.x * surface_right.xyz - ndc.y * surface_up.xyz) - surface_off_axis.xyz;
-}
-
-// Where a point is in the picture: pixels right and down from the top left corner, and place. Behind the eye: no place.
-vec3 seen_at(vec3 point) {
-    float ahead = dot(point, ray_forward.xyz);
-    float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
-    vec3 aside = point + surface_off_axis.xyz;
-    vec2 ndc = vec2(dot(aside, surface_right.xyz) / dot(surface_right.xyz, surface_right.xyz),
-                    -dot(aside, surface_up.xyz) / dot(surface_up.xyz, surface_up.xyz)) / spread;
-    return spread > 0.0 ? vec3(0.5 * (ndc + 1.0) * frame_size.xy, (ahead - surface_ahead.x) / surface_ahead.y)
-                        : vec3(-1.0, -1.0, -NOTHING);
-}
 
 // The nearest texel: samples aside from the centers of pixels reach past the last ones, where nothing may be fetched.
 ivec2 texel_of(vec2 pixel) {
@@ -111,31 +94,6 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
     return result;
 }
 #endif
-
-// The squares of a checkerboard, averaged over a box of this width in squares.
-float blurred_checkerboard_share(vec2 at, float tiles, float width) {
-    vec2 cell = at * tiles;
-    vec2 to_edge = 0.5 - abs(fract(cell) - 0.5);
-    vec2 side = 1.0 - 2.0 * mod(floor(cell), 2.0);
-    vec2 wave = side * clamp(2.0 * to_edge / max(width, 1e-6), 0.0, 1.0) * clamp(2.0 - width, 0.0, 1.0);
-    return 0.5 - 0.5 * wave.x * wave.y;
-}
-
-// The environment along a ray that has left a body. A checkerboard stands behind the bodies as a wall across the view.
-vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
-#if SEEN_LIGHTS
-    return environment_light(direction, roughness);
-#else
-    if (seen_kind != ENVIRONMENT_CHECKERBOARD) { return seen_environment(vec2(0.0), direction); }
-    float towards = dot(direction, ray_forward.xyz);
-    if (towards < 1e-2) { return seen_scale * mix(seen_first.rgb, seen_second.rgb, 0.5); }
-    float path = max(surface_ahead.w - dot(point, ray_forward.xyz), 0.0) / towards;
-    vec3 wall = seen_at(point + path * direction);
-    float heights = roughness * roughness * path / (length(surface_up.xyz) * (surface_right.w == 1.0 ? surface_ahead.w + surface_ahead.z : 1.0));
-    float share = blurred_checkerboard_share(wall.xy / frame_size.y, seen_tiles, heights * seen_tiles);
-    return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
-#endif
-}
 
 #if OPAQUE
 // Opaque surfaces around a point of the picture, and how much of it they fill. width: of the blur, in pixels.

@@ -1,0 +1,113 @@
+// Light that interfaces of bodies reflect, and give back from paint and from many scattering events. Needs <constants>,
+// <View>, <Lights>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
+// scattered once is found elsewhere.
+
+#include "lib/interface.glsl"
+#include "lib/optics.glsl"
+#include "lib/two_stream.glsl"
+#include "shade/highlight.glsl"
+
+uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
+
+struct Finish {
+    float ior;
+    float dispersion;
+    bool is_sheet;
+    bool scatters_much;   // show what is scattered more than once
+    vec3 sheet_depth;     // optical depth straight through a sheet
+    vec3 painted_through; // share of light on the paint that passes to the other side, with its color,
+    float painted_share;  // and without
+    vec3 stream_absorption;
+    vec3 stream_scattering;
+    float longest;        // metres across the body
+    float roughness;
+    float transmission;
+    vec3 color;
+    float unoccluded;     // share of the light of the environment that reaches it
+};
+
+// surface: object, roughness, transmission.
+Finish finish_of(vec4 surface) {
+    SurfaceRow row = surface_table_row(int(surface.x + 0.5));
+    return Finish(row.ior, row.dispersion, row.is_sheet > 0.5, row.scatters_much > 0.5, row.sheet_depth, row.painted_through,
+        row.painted_share, row.stream_absorption, row.stream_scattering, row.longest, surface.y, surface.z, vec3(1.0), 1.0);
+}
+
+// Reflectance of a rough interface: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
+float interface_reflectance(float cosine, float ior, float roughness) {
+    float polished = fresnel_dielectric(cosine, ior);
+    if (roughness == 0.0 || polished >= 1.0) { return polished; }
+    float facing = fresnel_dielectric(1.0, ior);
+    vec2 rough = texture(reflectance_table, reflectance_place(cosine, roughness)).rg;
+    vec2 smooth_one = texture(reflectance_table, reflectance_place(cosine, 0.0)).rg;
+    return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
+}
+
+// An interface that turns microfacets by small angles turns reflections by twice these, and refracted light by (ior - 1)
+// times them at each of two interfaces.
+float refraction_roughness(float roughness, float ior) {
+    return roughness * sqrt(min(abs(ior - 1.0) * 0.70710678, 1.0));
+}
+
+vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
+    vec4 place = light_place[light];
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    vec3 towards = place.xyz - place.w * from_eye;
+    float distance_m = max(length(towards), 1e-18);
+    irradiance = light_power[light].rgb / (place.w == 0.0 ? 1.0 : distance_m * distance_m);
+    return towards / distance_m;
+}
+
+// Microfacets that mirror the lights; nothing shadows them.
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
+    vec3 sum = vec3(0.0);
+    float cos_view = max(-dot(normal, ray), 1e-3);
+    for (int light = 0; light < light_count; ++light) {
+        vec3 irradiance;
+        vec3 towards = towards_light(light, point, irradiance);
+        float cos_light = dot(normal, towards);
+        if (cos_light <= 0.0) { continue; }
+        vec3 half_way = normalize(towards - ray);
+        float mirrored = fresnel_dielectric(max(dot(half_way, towards), 0.0), ior)
+            * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
+        sum += mirrored * cos_light * irradiance;
+    }
+    return sum;
+}
+
+// unoccluded: share of the environment's light.
+vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
+    vec3 sum = unoccluded * environment_irradiance(normal);
+    for (int light = 0; light < light_count; ++light) {
+        vec3 irradiance;
+        vec3 towards = towards_light(light, point, irradiance);
+        sum += max(dot(normal, towards), 0.0) * irradiance;
+    }
+    return sum;
+}
+
+// Light of lights alone; irradiance_on has the environment's, too.
+vec3 lights_on(vec3 point, vec3 normal) {
+    return irradiance_on(point, normal, 0.0);
+}
+
+// Diffuse light out of the body: as a layer gives it back, and lets it through from behind. What passes without an event
+// is seen as it is, and left out here.
+vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3 passed) {
+    vec3 absorbed = finish.stream_absorption * thickness;
+    vec3 turned = finish.stream_scattering * thickness;
+    vec3 through = max(two_stream_transmittance(absorbed, turned) - passed, vec3(0.0));
+    vec3 back = two_stream_reflectance(absorbed, turned);
+    vec3 sum = environment_irradiance(normal) * back + environment_irradiance(-normal) * through;
+#if SINGLE_SCATTERING
+    // Light of lights that is scattered once is in the emitted radiance.
+    back = multiple_reflectance(absorbed, turned);
+#endif
+    sum += lights_on(point, normal) * back + lights_on(point, -normal) * through;
+    return sum / PI;
+}
+
+vec3 paint(Finish finish, vec3 point, vec3 normal) {
+    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal, finish.unoccluded);
+    return (front + finish.painted_through * irradiance_on(point, -normal, finish.unoccluded)) / PI;
+}
