@@ -40,6 +40,9 @@ STORAGE_BINDINGS = {
     "light_ends": 6,
 }
 
+#: Bits of the width of the textures that hold hierarchies, in texels: every OpenGL has that.
+HIERARCHY_WIDTH_BITS = 12
+
 #: Values of the constants by their names in GLSL.
 CONSTANTS: dict[str, str] = {
     "PI": "3.14159265358979",
@@ -81,6 +84,10 @@ CONSTANTS: dict[str, str] = {
     "AGX_SHOULDER": repr(AGX_SHOULDER),
     "AGX_SLOPE": repr(AGX_SLOPE),
     "AGX_DISPLAY": repr(AGX_DISPLAY),
+    "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
+    "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
+    "RECORD_SIZE": "8",  # bodies that a ray can be in
+    "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene
     "TOUCHING": "1e-6",  # places between surfaces that count as one interface
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},

@@ -327,4 +327,29 @@ SURFACE_ROW = PackedTable(
     ),
 )
 
-TABLES = {table.name: table for table in (SURFACE_ROW,)}
+#: Objects that rays are traced through: a record for each. Positions count from the center of the media.
+TRACED_BODY = PackedTable(
+    "TracedBody",
+    "traced_bodies",
+    (
+        ("local_x", "f4", (4,)),  # rows of the transform from a position to the coordinates of the hierarchy
+        ("local_y", "f4", (4,)),
+        ("local_z", "f4", (4,)),
+        ("first_node", "f4", (2,)),  # of its hierarchy, and the one behind the last, in two parts of 12 bits
+        ("end_node", "f4", (2,)),
+        ("extinction", "f4", (3,)),
+        ("outwards", "f4", ()),  # 1, or -1 where the normals of its faces point inwards
+        ("emission", "f4", (3,)),
+        ("kind", "f4", ()),
+        ("color", "f4", (3,)),
+        ("transmission", "f4", ()),
+        ("ior", "f4", ()),
+        ("dispersion", "f4", ()),
+        ("roughness", "f4", ()),
+        ("plain", "f4", ()),  # 1 where its surface only bends and mirrors light
+        ("rank", "f4", ()),  # the higher, the more it decides on the medium of a ray; 0: not at all
+        ("slot", "f4", ()),  # the same for objects of one medium
+    ),
+)
+
+TABLES = {table.name: table for table in (SURFACE_ROW, TRACED_BODY)}

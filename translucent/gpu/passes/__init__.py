@@ -19,6 +19,7 @@ from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.surfaces import SurfacesPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
+from translucent.gpu.passes.traced_interfaces import TracedInterfacesPass
 from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.planning.passes import PassName, PassSpec
 
@@ -49,6 +50,6 @@ PASSES: dict[PassName, type[Pass]] = {
     PassName.K_BUFFER: KBufferPass,
     PassName.TRANSMITTANCE: TransmittancePass,
     PassName.INTERFACES: InterfacesPass,
-    PassName.SURFACES: SurfacesPass,
+    PassName.SURFACES: __import__('os').environ.get('TRACED') and TracedInterfacesPass or SurfacesPass,
     PassName.LAYERS: LayersPass,
 }

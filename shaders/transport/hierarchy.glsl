@@ -1,0 +1,144 @@
+// The nearest surface on a ray, by bounding volume hierarchies: one of each mesh, in coordinates of its own, under one of
+// the objects. Nodes lie depth-first with skip links (Smits 1998), so that no stack is needed; their bounds are counted in
+// steps of a grid of 16 bits, rounded outwards. Triangles are tested watertight against shared edges (Woop, Benthin &
+// Wald 2013, "Watertight Ray/Triangle Intersection"). Written by gpu/hierarchies.py. Needs <constants> and <TracedBody>.
+
+uniform usampler2D hierarchy_nodes;      // bounds, and link: where to go on, or the triangles of a leaf
+uniform usampler2D hierarchy_triangles;  // three texels each: corners, and their normals packed
+uniform int object_nodes;                // nodes of the hierarchy of objects
+uniform vec4 objects_frame;              // center and scale of its coordinates
+
+struct Hit {
+    float path;      // metres; NOTHING where there is none
+    int object;
+    int triangle;
+    vec2 weights;    // of the second and the third corner
+};
+
+ivec2 hierarchy_texel(int index) {
+    return ivec2(index & ((1 << HIERARCHY_WIDTH_BITS) - 1), index >> HIERARCHY_WIDTH_BITS);
+}
+
+// A ray in the coordinates of a hierarchy, whose bounds reach from -1 to 1.
+struct LocalRay {
+    vec3 origin;
+    vec3 start;     // origin in steps of the grid
+    vec3 inverse;   // of the direction, in steps
+};
+
+LocalRay local_ray(vec3 origin, vec3 direction) {
+    vec3 away = vec3(direction.x < 0.0 ? -1.0 : 1.0, direction.y < 0.0 ? -1.0 : 1.0, direction.z < 0.0 ? -1.0 : 1.0);
+    vec3 inverse = away / max(abs(direction), vec3(1e-18));
+    return LocalRay(origin, (origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
+}
+
+// Whether a ray meets the bounds of a node between two distances.
+bool meets_bounds(uvec4 node, LocalRay ray, float start, float path) {
+    vec3 low = vec3(node.x & 0xffffu, node.x >> 16, node.y & 0xffffu);
+    vec3 high = vec3(node.y >> 16, node.z & 0xffffu, node.z >> 16);
+    vec3 one = (low - ray.start) * ray.inverse;
+    vec3 other = (high - ray.start) * ray.inverse;
+    vec3 near = min(one, other);
+    vec3 far = max(one, other);
+    return max(max(near.x, near.y), max(near.z, start)) <= min(min(far.x, far.y), min(far.z, path));
+}
+
+// Axes in an order in which the last is the one that the ray goes along most.
+vec3 along_last(vec3 v, int axis) {
+    return axis == 0 ? v.yzx : axis == 1 ? v.zxy : v;
+}
+
+vec3 triangle_corner(int triangle, int corner) {
+    return uintBitsToFloat(texelFetch(hierarchy_triangles, hierarchy_texel(3 * triangle + corner), 0).xyz);
+}
+
+void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, float start, inout Hit hit) {
+    vec3 a = along_last(triangle_corner(triangle, 0) - origin, axis);
+    vec3 b = along_last(triangle_corner(triangle, 1) - origin, axis);
+    vec3 c = along_last(triangle_corner(triangle, 2) - origin, axis);
+    a.xy -= shear.xy * a.z;
+    b.xy -= shear.xy * b.z;
+    c.xy -= shear.xy * c.z;
+    vec3 weights = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
+    float sum = weights.x + weights.y + weights.z;
+    if ((any(lessThan(weights, vec3(0.0))) && any(greaterThan(weights, vec3(0.0)))) || sum == 0.0) { return; }
+    float path = shear.z * dot(weights, vec3(a.z, b.z, c.z)) / sum;
+    if (path > start && path < hit.path) { hit = Hit(path, object, triangle, weights.yz / sum); }
+}
+
+void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
+    TracedBody place = traced_bodies_row(object);
+    vec3 along = vec3(dot(place.local_x.xyz, direction), dot(place.local_y.xyz, direction), dot(place.local_z.xyz, direction));
+    vec4 point = vec4(origin, 1.0);
+    LocalRay ray = local_ray(vec3(dot(place.local_x, point), dot(place.local_y, point), dot(place.local_z, point)), along);
+    vec3 size = abs(along);
+    int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+    vec3 turned = along_last(along, axis);
+    vec3 shear = vec3(turned.xy, 1.0) / turned.z;
+    int node = int(place.first_node.x) << 12 | int(place.first_node.y);
+    int end = int(place.end_node.x) << 12 | int(place.end_node.y);
+    while (node < end) {
+        uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
+        bool leaf = found.w >= 0x80000000u;
+        if (!meets_bounds(found, ray, start, hit.path)) {
+            node = leaf ? node + 1 : int(found.w);
+            continue;
+        }
+        if (leaf) {
+            int first = int(found.w & 0x1fffffffu);
+            int last = first + int(found.w >> 29 & 3u);
+            for (int triangle = first; triangle <= last; ++triangle) {
+                meet_triangle(triangle, object, ray.origin, shear, axis, start, hit);
+            }
+        }
+        ++node;
+    }
+}
+
+// The nearest surface between two distances on a ray, of all objects but `left_out`. Positions count from the center of the
+// media.
+Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, int left_out) {
+    Hit hit = Hit(end, -1, -1, vec2(0.0));
+#if ONE_OBJECT
+    meet_object(0, origin, direction, start, hit);
+#else
+    LocalRay ray = local_ray((origin - objects_frame.xyz) * objects_frame.w, direction * objects_frame.w);
+    int node = 0;
+    while (node < object_nodes) {
+        uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
+        bool leaf = found.w >= 0x80000000u;
+        if (!meets_bounds(found, ray, start, hit.path)) {
+            node = leaf ? node + 1 : int(found.w);
+            continue;
+        }
+        int object = int(found.w & 0x1fffffffu);
+        if (leaf && object != left_out) { meet_object(object, origin, direction, start, hit); }
+        ++node;
+    }
+#endif
+    return hit;
+}
+
+vec3 unpacked_normal(uint packed_normal) {
+    vec2 at = (vec2(packed_normal & 0xffffu, packed_normal >> 16) / 32767.5) - 1.0;
+    vec3 normal = vec3(at, 1.0 - abs(at.x) - abs(at.y));
+    float below = max(-normal.z, 0.0);
+    normal.x += normal.x >= 0.0 ? -below : below;
+    normal.y += normal.y >= 0.0 ? -below : below;
+    return normalize(normal);
+}
+
+// Unit normals outwards where a ray has hit: of the smooth surface and of the face.
+void hit_normals(Hit hit, out vec3 smooth_normal, out vec3 face_normal) {
+    TracedBody place = traced_bodies_row(hit.object);
+    uvec4 a = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle), 0);
+    uvec4 b = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 1), 0);
+    uvec4 c = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 2), 0);
+    vec3 corner = uintBitsToFloat(a.xyz);
+    vec3 face = cross(uintBitsToFloat(b.xyz) - corner, uintBitsToFloat(c.xyz) - corner);
+    vec3 between = (1.0 - hit.weights.x - hit.weights.y) * unpacked_normal(a.w) + hit.weights.x * unpacked_normal(b.w)
+        + hit.weights.y * unpacked_normal(c.w);
+    mat3 world = mat3(place.local_x.xyz, place.local_y.xyz, place.local_z.xyz);
+    face_normal = place.outwards * normalize(world * normalize(face));
+    smooth_normal = place.outwards * normalize(world * between);
+}

@@ -1,0 +1,297 @@
+// Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. Both
+// branches are followed at the first FORKS interfaces, then the stronger one, and the weaker is looked up in the
+// environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
+// interface is that which the rasterizer has found. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
+
+#include <constants>
+#include <View>
+#include <Environment>
+#include <Lights>
+#include <Surfaces>
+#include <SurfaceRow>
+#include <TracedBody>
+#include "lib/interface.glsl"
+#include "lib/optics.glsl"
+#include "lib/ray.glsl"
+#include "shade/background.glsl"
+#include "shade/environment_light.glsl"
+#include "shade/environment_beyond.glsl"
+#include "shade/interface_light.glsl"
+#include "transport/hierarchy.glsl"
+#include "transport/record.glsl"
+
+uniform sampler2D emitted_radiance_sum;
+uniform sampler2D straight_transmittance;
+uniform sampler2D entered;           // interface towards the eye: normal, place
+uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
+uniform sampler2D surface_color;
+uniform int most_interfaces;
+uniform uvec4 start_record;          // of rays that start inside bodies
+
+layout(location = 0) out vec4 out_radiance;
+layout(location = 1) out vec4 out_transmittance;
+
+const int KIND_SOLID = 0;
+const int KIND_SHEET = 1;
+const int KIND_OPAQUE = 2;
+const float EDGE_ON = 1e-3;
+const float FAINTEST = 1.0 / 1024.0;
+const int MOST_STEPS = 512;
+const int WAITING = 8;
+
+// One of the rays that wait to be followed.
+struct Ray {
+    vec3 origin;
+    vec3 direction;
+    vec3 share;       // of the light at its end that reaches the eye
+    uvec4 record;
+    int met;          // interfaces
+    int forks;        // left
+    bool reflected;   // sees the environment as a light
+    float blur;       // roughness of a mirror with the same blur
+};
+
+vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
+    return reflected ? environment_light(direction, blur) : environment_beyond(point, direction, blur);
+}
+
+float strength(vec3 share) {
+    return dot(share, vec3(1.0));
+}
+
+// Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
+vec3 kept_on_side(vec3 direction, vec3 side) {
+    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
+
+float index_of(int body, int channel) {
+    if (body == AIR) { return 1.0; }
+    TracedBody row = traced_bodies_row(body);
+#if DISPERSION
+    return channel_iors(row.ior, row.dispersion)[channel];
+#else
+    return row.ior;
+#endif
+}
+
+struct Sum {
+    vec3 light;
+    float length;      // metres of the first segment beyond the first interface
+    vec3 passed;       // transmittance of it
+    bool sound;
+};
+
+#include "transport/opaque_light.glsl"
+
+// The record beyond a surface of a solid. sound: not yet unbalanced, nor beyond what a record holds.
+uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
+    bool missing = false;
+    uvec4 crossed = enters ? entered_record(record, object) : left_record(record, object, missing);
+    sound = sound && !missing && !(enters && is_full(record));
+    return crossed;
+}
+
+Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float first_reach, Finish first_finish, int channel) {
+    Sum sum = Sum(vec3(0.0), 0.0, vec3(1.0), true);
+#if FORKS > 0
+    Ray waiting[WAITING];
+#else
+    Ray waiting[1];
+#endif
+    int waits = 0;
+    bool ends = false;
+    vec3 passed = vec3(1.0);  // transmittance of the last segment
+    float reach = first_reach;
+    for (int step = 0; step < MOST_STEPS; ++step) {
+        if (ends) {
+            if (waits == 0) { break; }
+            ray = waiting[--waits];
+            ends = false;
+        }
+        Hit hit = nearest_hit(ray.origin, ray.direction, 0.0, reach, AIR);
+        if (hit.object < 0 && reach < NOTHING) {
+            reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
+            continue;
+        }
+        bool first = ray.met == 0;
+        reach = NOTHING;
+        int before = dominant_body(ray.record);
+        passed = vec3(1.0);
+        if (ray.record.x != 0u) {
+            Filling filling = filling_of(ray.record, before);
+            float path = min(hit.path, 1e3 * surface_reach);
+#if EMISSION
+            sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
+#endif
+            passed = transmittance(filling.extinction * path);
+            if (ray.met == 1 && !ray.reflected && sum.length == 0.0) {
+                sum.length = path;
+                sum.passed = passed;
+            }
+            ray.share *= passed;
+        }
+        if (hit.object < 0) {
+            sum.sound = sum.sound && ray.record.x == 0u;
+            sum.light += ray.share * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
+            ends = true;
+            continue;
+        }
+        TracedBody body = traced_bodies_row(hit.object);
+        int kind = int(body.kind);
+        vec3 smooth_normal, face_normal;
+        hit_normals(hit, smooth_normal, face_normal);
+        bool outside = dot(face_normal, ray.direction) < 0.0;
+        if (!outside) {
+            face_normal = -face_normal;
+            smooth_normal = -smooth_normal;
+        }
+        vec3 point = ray.origin + hit.path * ray.direction;
+        if (first && hit.object == first_object && abs(hit.path - first_path) < 1e-3 * surface_reach) { smooth_normal = first_normal; }
+        float facing = dot(smooth_normal, ray.direction);
+        if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
+        if (kind == KIND_OPAQUE) {
+            sum.light += ray.share * opaque_light(body, smooth_normal, ray.direction, point);
+            ends = true;
+            continue;
+        }
+        float offset = SURFACE_OFFSET * surface_reach;
+        vec3 beyond = point - offset * face_normal;
+        uvec4 after_record = ray.record;
+        if (kind == KIND_SOLID) { after_record = crossed_record(ray.record, hit.object, outside, sum.sound); }
+        int after = dominant_body(after_record);
+        #if !ONE_OBJECT
+        // Surfaces of two bodies in one place are one interface.
+        float within = offset / max(-dot(face_normal, ray.direction), 1e-2);
+        Hit other = kind == KIND_SOLID ? nearest_hit(ray.origin, ray.direction, max(hit.path - 0.5 * within, 0.0), hit.path + within, hit.object) : Hit(NOTHING, AIR, 0, vec2(0.0));
+        if (other.object >= 0 && int(traced_bodies_row(other.object).kind) == KIND_SOLID) {
+            vec3 other_smooth, other_face;
+            hit_normals(other, other_smooth, other_face);
+            bool other_outside = dot(other_face, ray.direction) < 0.0;
+            after_record = crossed_record(after_record, other.object, other_outside, sum.sound);
+            after = dominant_body(after_record);
+            if (after == other.object || (before == other.object && after != hit.object)) {
+                face_normal = other_outside ? other_face : -other_face;
+                smooth_normal = other_outside ? other_smooth : -other_smooth;
+                facing = dot(smooth_normal, ray.direction);
+                if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
+                body = traced_bodies_row(other.object);
+                hit.object = other.object;
+                outside = other_outside;
+            }
+            beyond = ray.origin + (other.path) * ray.direction - offset * face_normal;
+        }
+#endif
+        int owner = kind == KIND_SHEET || outside ? hit.object : before;
+        float ior = kind == KIND_SHEET ? index_of(hit.object, channel) / index_of(before, channel)
+                                       : index_of(after, channel) / index_of(before, channel);
+        bool matters = kind == KIND_SHEET ? true
+            : before != after && (ior != 1.0 || (before != AIR && traced_bodies_row(before).plain == 0.0)
+                || (after != AIR && traced_bodies_row(after).plain == 0.0));
+        if (!matters) {
+            ray.origin = beyond;
+            ray.record = after_record;
+            continue;
+        }
+        Finish finish = first_finish;
+        if (!first) {
+            finish = finish_of(vec4(float(owner), body.roughness, body.transmission, 0.0));
+            finish.color = body.color;
+        }
+        float cosine = clamp(-dot(smooth_normal, ray.direction), 0.0, 1.0);
+        float reflectance = interface_reflectance(cosine, ior, finish.roughness);
+        vec3 share_back = vec3(reflectance);
+        vec3 share_on = vec3(1.0 - reflectance);
+        vec3 on_way = ray.direction;
+        if (kind == KIND_SHEET) {
+            vec3 depth = finish.sheet_depth / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
+            share_back = slab_reflectance(reflectance, depth);
+            share_on = slab_transmittance(reflectance, depth);
+        } else {
+            on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
+        }
+        vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
+        if (finish.transmission < 1.0 && outside) {
+            sum.light += ray.share * share_on * (1.0 - finish.transmission) * paint(finish, point, smooth_normal);
+        }
+        if (kind == KIND_SHEET || owner == after) { share_on *= finish.transmission * finish.color; }
+        float occlusion = first ? first_finish.unoccluded : 1.0;
+        Ray back = Ray(point + SURFACE_OFFSET * surface_reach * face_normal, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
+            first ? 0 : ray.forks, true, max(ray.blur, finish.roughness));
+        Ray on = Ray(beyond, on_way, ray.share * share_on, after_record, ray.met + 1, ray.forks, ray.reflected,
+            max(ray.blur, refraction_roughness(finish.roughness, ior)));
+        bool on_stronger = strength(on.share) >= strength(back.share);
+        bool last = ray.met + 1 >= most_interfaces;
+        Ray weaker = back;
+        vec3 again = outside ? vec3(1.0) : passed;
+        ray = on;
+        if (!on_stronger) {
+            weaker = on;
+            ray = back;
+        }
+#if FORKS > 0
+        weaker.forks -= first ? 0 : 1;
+        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > 12.0 * FAINTEST) {
+            waiting[waits++] = weaker;
+        } else
+#endif
+        if (strength(weaker.share) > 0.0) {
+            sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * environment_seen(weaker.origin, weaker.direction, weaker.reflected, weaker.blur);
+        }
+        if (last || strength(ray.share) < 3.0 * FAINTEST) {
+            sum.light += (on_stronger ? vec3(1.0) : again) * ray.share * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
+            ends = true;
+        }
+    }
+    return sum;
+}
+
+void main() {
+    vec2 pixel = gl_FragCoord.xy + frame_size.zw;
+    ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
+    ivec2 here = ivec2(gl_FragCoord.xy);
+    vec3 direction = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
+    vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
+    vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
+    vec4 front = texelFetch(entered, texel, 0);
+    out_transmittance = vec4(through, 1.0);
+    bool starts_inside = start_record.x != 0u;
+    if (front.w >= NOTHING && !starts_inside) {
+        out_radiance = vec4(background(pixel, direction, texel) * through + emitted, 1.0);
+        return;
+    }
+    vec4 surface = texelFetch(surface_finish, texel, 0);
+    vec4 tint = texelFetch(surface_color, texel, 0);
+    Finish finish = finish_of(surface);
+    finish.color = tint.rgb;
+    finish.unoccluded = tint.a;
+    vec3 point = point_at(pixel, front.w);
+    float margin = 1e-3 * surface_reach;
+    vec3 origin = point - margin * direction;
+    float path = margin;
+    float reach = 2.0 * margin;
+    if (starts_inside) {
+        origin = point_at(pixel, surface_eye_place);
+        path = front.w < NOTHING ? length(point - origin) : NOTHING;
+        reach = NOTHING;
+    }
+    Ray ray = Ray(origin, direction, vec3(1.0), start_record, 0, FORKS, false, 0.0);
+    int object = int(surface.x + 0.5);
+#if DISPERSION
+    Sum sum = follow(ray, object, path, front.xyz, reach, finish, 1);
+    sum.light.r = follow(ray, object, path, front.xyz, reach, finish, 0).light.r;
+    sum.light.b = follow(ray, object, path, front.xyz, reach, finish, 2).light.b;
+#else
+    Sum sum = follow(ray, object, path, front.xyz, reach, finish, 1);
+#endif
+    vec3 light = sum.light;
+    if (front.w < NOTHING) {
+        float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
+        vec3 share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
+        light += highlights(point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
+        if (finish.scatters_much) { light += share * scattered_out(finish, point, front.xyz, sum.length, sum.passed); }
+#if !EMISSION
+        light += share * emitted;
+#endif
+    }
+    out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
+}

@@ -1,0 +1,251 @@
+"""Hierarchies on the GPU: those of the meshes of a scene, and one of its objects, as textures that rays walk through.
+
+One 16-byte texel is a node: six bounds of 16 bits, and a link. Triangles lie in the order of the leaves, three texels
+each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle et al. 2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.errors import RenderError
+from translucent.geometry.bvh import Floats, Hierarchy, build_hierarchy
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.normals import drawn_normals
+from translucent.gpu.body_uniforms import bounded_extinction
+from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
+from translucent.gpu.layout import TRACED_BODY
+from translucent.gpu.ledger import before_making
+from translucent.media.medium import Medium
+from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
+
+Words = npt.NDArray[np.uint32]
+
+#: Steps of the grid on which bounds lie, between the ends of a hierarchy.
+STEPS = 65535
+
+_WIDTH = 1 << HIERARCHY_WIDTH_BITS
+
+#: Bits of a leaf's link that hold its first triangle; two others hold how many follow it, the highest tells a leaf.
+_FIRST_BITS = 29
+
+
+@dataclass(frozen=True, eq=False)
+class PackedMesh:
+    """Hierarchy of one mesh as texels, in coordinates from -1 to 1 along its longest side.
+
+    Attributes
+    ----------
+    nodes : (n, 4) uint32
+        Links count from the first node and the first triangle of the mesh.
+    triangles : (3 m, 4) uint32
+    center : (3,) float64
+    scale : float
+        Of coordinates of the mesh, less the center.
+    """
+
+    nodes: Words
+    triangles: Words
+    center: Array
+    scale: float
+
+
+_packed: WeakKeyDictionary[Mesh, PackedMesh] = WeakKeyDictionary()
+
+
+def packed_mesh(mesh: Mesh) -> PackedMesh:
+    """The hierarchy of a mesh as texels, made once for each mesh."""
+    if (found := _packed.get(mesh)) is None:
+        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        center = 0.5 * low + 0.5 * high
+        scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
+        corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
+        tree = build_hierarchy(corners.min(axis=1), corners.max(axis=1))
+        triangles = np.empty((*mesh.faces.shape, 4), np.uint32)
+        triangles[..., :3] = corners[tree.faces].view(np.uint32)
+        triangles[..., 3] = packed_normals(drawn_normals(mesh)[tree.faces])
+        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), center, scale)
+    return found
+
+
+def packed_nodes(tree: Hierarchy) -> Words:
+    """(n, 4): nodes of a hierarchy within -1 to 1, their bounds rounded outwards by one to two steps."""
+    half = STEPS / 2
+    low = np.clip(np.floor((tree.low.astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
+    high = np.clip(np.ceil((tree.high.astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
+    leaf = tree.count > 0
+    first = np.where(leaf, tree.first, 0).astype(np.uint32)
+    follow = np.where(leaf, tree.count - 1, 0).astype(np.uint32)
+    link = np.where(leaf, np.uint32(1 << 31) | follow << _FIRST_BITS | first, tree.skip.astype(np.uint32))
+    return np.stack(
+        [low[:, 0] | low[:, 1] << 16, low[:, 2] | high[:, 0] << 16, high[:, 1] | high[:, 2] << 16, link], axis=1
+    )
+
+
+def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
+    """(...,): unit vectors (..., 3) as 2 x 16 bits on an octahedron; 4e-5 rad off at most."""
+    size = np.abs(normals).sum(axis=-1, keepdims=True)
+    at = normals / np.where(size > 0, size, 1.0)
+    folded = (1 - np.abs(at[..., 1::-1])) * np.where(at[..., :2] >= 0, 1.0, -1.0)
+    steps = np.rint((np.where(at[..., 2:] < 0, folded, at[..., :2]) + 1) * (STEPS / 2)).astype(np.uint32)
+    return np.asarray(steps[..., 0] | steps[..., 1] << 16)
+
+
+@dataclass(frozen=True, eq=False)
+class _Span:
+    """Nodes of one mesh in the texture."""
+
+    first: int
+    end: int
+
+
+class SceneHierarchies:
+    """Textures of the hierarchies of a set of meshes; bodies may move without a new upload of them.
+
+    Attributes
+    ----------
+    nodes, triangles : moderngl.Texture
+    object_nodes : int
+        Nodes of the hierarchy of objects.
+    """
+
+    def __init__(self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int) -> None:
+        before_making(gl)
+        self._packed = [packed_mesh(mesh) for mesh in meshes]
+        self._rows = -(-2 * objects // _WIDTH)
+        self._spans: dict[int, _Span] = {}
+        parts, triangles, first, start = [], 0, self._rows * _WIDTH, self._rows * _WIDTH
+        for mesh, packed in zip(meshes, self._packed, strict=True):
+            nodes = packed.nodes.copy()
+            leaf = nodes[:, 3] >= 1 << 31
+            nodes[:, 3] += np.where(leaf, triangles, first).astype(np.uint32)
+            parts.append(nodes)
+            self._spans[id(mesh)] = _Span(first, first + len(nodes))
+            first += len(nodes)
+            triangles += len(packed.triangles) // 3
+        reserved = np.zeros((start, 4), np.uint32)
+        self.nodes = _texture(gl, np.concatenate([reserved, *parts]))
+        self.triangles = _texture(gl, np.concatenate([packed.triangles for packed in self._packed]))
+        self.object_nodes = 0
+
+    def place(self, scene: Scene, center: Array) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
+        """Write the hierarchy of objects where they are.
+
+        Returns
+        -------
+        rows : (objects, texels, 4) float32
+            A `TRACED_BODY` of each object.
+        frame : (4,) floats
+            Center and scale of the coordinates of the hierarchy of objects; positions count from `center`.
+        """
+        boxes = np.stack([body.bounds - center for body in scene.objects])
+        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        middle = 0.5 * low + 0.5 * high
+        scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
+        local: Floats = ((boxes - middle) * scale).astype(np.float32)
+        tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
+        nodes = packed_nodes(tree)
+        leaf = tree.count > 0
+        nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[tree.first[leaf]].astype(np.uint32)
+        reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
+        reserved[: len(nodes)] = nodes
+        self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
+        self.object_nodes = len(nodes)
+        ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1]
+        media = _media_numbers(scene)
+        rows = [
+            self._row(scene, i, center) | {"rank": ranks[i] + 1.0 if _decides(scene, body) else 0.0, "slot": media[i]}
+            for i, body in enumerate(scene.objects)
+        ]
+        return TRACED_BODY.pack(rows), (*middle, scale)
+
+    def _row(self, scene: Scene, number: int, center: Array) -> Mapping[str, npt.ArrayLike]:
+        body = scene.objects[number]
+        packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
+        local = packed.scale * np.linalg.inv(body.matrix[:3, :3])
+        offset = local @ (center - body.matrix[:3, 3]) - packed.scale * packed.center
+        rows = np.column_stack([local, offset])
+        medium, surface = body.medium or Medium(), body.surface or Surface()
+        kind = 2.0 if body.medium is None else 0.0 if body.sheet_thickness is None else 1.0
+        return {
+            "local_x": rows[0],
+            "local_y": rows[1],
+            "local_z": rows[2],
+            "first_node": divmod(span.first, 1 << 12),
+            "end_node": divmod(span.end, 1 << 12),
+            "extinction": bounded_extinction(medium, scene.diagonal),
+            "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
+            "emission": np.asarray(medium.emission),
+            "kind": kind,
+            "color": np.asarray(surface.color) if body.medium is not None else body.base_color,
+            "transmission": surface.transmission,
+            "ior": medium.ior,
+            "dispersion": surface.dispersion,
+            "roughness": surface.roughness,
+            "plain": float(surface.plain),
+        }
+
+    def release(self) -> None:
+        """Free the textures."""
+        self.nodes.release()
+        self.triangles.release()
+
+
+class HierarchyCache:
+    """Cache of the hierarchies of the last scene, kept as long as the meshes are the same."""
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._key: tuple[int, ...] = ()
+        self._held: SceneHierarchies | None = None
+        self._meshes: tuple[Mesh, ...] = ()
+
+    def of(self, scene: Scene) -> SceneHierarchies:
+        """The hierarchies of a scene."""
+        meshes = tuple(dict.fromkeys(body.mesh for body in scene.objects))
+        if self._held is None or self._meshes != meshes or self._objects != len(scene.objects):
+            self.release()
+            self._held = SceneHierarchies(self._gl, meshes, len(scene.objects))
+            self._meshes, self._objects = meshes, len(scene.objects)
+        return self._held
+
+    def release(self) -> None:
+        """Free the textures."""
+        if self._held is not None:
+            self._held.release()
+            self._held = None
+
+
+def _decides(scene: Scene, body: Object) -> bool:
+    """Whether a body determines the index of refraction of the rays in it."""
+    solid = body.medium is not None and body.sheet_thickness is None
+    return solid and (body.has_interface or scene.overlap == "priority")
+
+
+def _media_numbers(scene: Scene) -> list[float]:
+    """A number for each object, the same for those of one medium."""
+    numbers: dict[Medium | None, int] = {}
+    return [float(numbers.setdefault(body.medium, len(numbers))) for body in scene.objects]
+
+
+def _texture(gl: moderngl.Context, texels: Words) -> moderngl.Texture:
+    rows = -(-len(texels) // _WIDTH)
+    if rows > (limit := int(gl.info["GL_MAX_TEXTURE_SIZE"])):
+        raise RenderError(
+            "tracing rays through the meshes",
+            f"{len(texels):,} texels, and this OpenGL holds {limit * _WIDTH:,}",
+            "use interfaces=tl.ScreenInterfaces(), or coarser meshes",
+        )
+    padded = np.zeros((rows * _WIDTH, 4), np.uint32)
+    padded[: len(texels)] = texels
+    texture = gl.texture((_WIDTH, rows), 4, padded, dtype="u4")
+    texture.filter = moderngl.NEAREST, moderngl.NEAREST
+    return texture
