@@ -34,7 +34,8 @@ def test_one_interface_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
     assert [step.name for step in both.passes] == [step.name for step in front.passes]
     assert front.geometry_passes == both.geometry_passes - 1
     assert front.cost < both.cost
-    assert front.unmodelled == (*both.unmodelled, ONE_INTERFACE)
+    assert ONE_INTERFACE in front.unmodelled
+    assert tuple(note for note in front.unmodelled if note != ONE_INTERFACE) == both.unmodelled
     assert "not modelled: FrontInterface: bends once, where a ray enters; leaves without bending" in str(front)
     assert front.summary()["interfaces"] == "FrontInterface()"
 
@@ -153,6 +154,8 @@ def test_scenes_without_interfaces_have_one_plan(kind: str) -> None:
 def test_each_way_of_finding_interfaces_has_a_name_and_traits_of_its_own() -> None:
     assert [type(one) for one in CHOICES] == list(INTERFACES.values())
     assert list(INTERFACES) == list(INTERFACE_NAMES)
+    for one in CHOICES:
+        assert all(step.reason and step.cost > 0 for step in one.passes(scene(body(DIAMOND)), straight=False))
     assert [(one.traced, one.finds_exits, one.one_interface) for one in CHOICES] == [
         (True, False, False),
         (False, True, False),
