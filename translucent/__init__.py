@@ -59,6 +59,9 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.presets import preset as preset
     from translucent.media.presets import presets as presets
     from translucent.mesh_files import load_mesh as load_mesh
+    from translucent.planning.interfaces import FrontInterface as FrontInterface
+    from translucent.planning.interfaces import ScreenInterfaces as ScreenInterfaces
+    from translucent.planning.interfaces import TracedInterfaces as TracedInterfaces
     from translucent.planning.methods import BackFaceDepth as BackFaceDepth
     from translucent.planning.methods import DepthPeeling as DepthPeeling
     from translucent.planning.methods import FragmentLists as FragmentLists
@@ -107,6 +110,7 @@ _NAMES = {
     "media.medium": "Medium",
     "media.presets": "Preset preset presets",
     "mesh_files": "load_mesh",
+    "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
     "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer RayMarched SignedDepth ThinLayer",
     "planning.plan": "plan",
     "planning.render_plan": "Capabilities RenderPlan",

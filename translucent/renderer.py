@@ -17,11 +17,12 @@ from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
-from translucent.planning.interfaces import check_interfaces
+from translucent.planning.interface_choice import check_interfaces
+from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan, plan_over_backdrop
-from translucent.planning.render_plan import Interfaces, RenderPlan
+from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.environment import Environment
@@ -64,7 +65,9 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool, str], RenderPlan]] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool, Interfaces | None], RenderPlan]] = (
+            WeakKeyDictionary()
+        )
         self._closed = False
         self._asked = backend, context
         self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
@@ -111,7 +114,7 @@ class Renderer:
         method: Method | None = None,
         *,
         over_backdrop: bool = False,
-        interfaces: Interfaces = "both",
+        interfaces: Interfaces | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
         if method is not None and not isinstance(method, Method):
@@ -132,7 +135,7 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None = None,
         *,
         transparent: bool = False,
-        interfaces: Interfaces = "both",
+        interfaces: Interfaces | None = None,
     ) -> Frame:
         """Render a scene.
 
@@ -152,9 +155,10 @@ class Renderer:
             Leave out the environment as far as it is seen behind everything, and give the frame an `alpha`; it still
             lights, and is mirrored. Costs a second rendering: alpha is one minus the difference between frames before
             white and before black (Smith & Blinn 1996).
-        interfaces : {"both", "front"}
-            Where rays bend that cross a body: where they enter and where they leave it, or only where they enter, as
-            viewers of glTF do. That is quicker, and wrong for curved bodies; absorption is that of the straight ray.
+        interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
+            How to find the interfaces at which light refracts and reflects: by rays through the meshes, drawn in screen
+            space, or drawn where rays enter alone; None lets the planner pick. Thickness, optical depth and
+            transmittance stay those of the straight ray.
 
         Returns
         -------
@@ -166,7 +170,7 @@ class Renderer:
         ------
         InputError
             If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
-            scene has opaque objects besides it; if rays start inside a body that has only a front interface.
+            scene has opaque objects besides it; if interfaces cannot be found as asked for.
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
@@ -192,7 +196,7 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None,
         *,
         transparent: bool,
-        interfaces: Interfaces,
+        interfaces: Interfaces | None,
     ) -> Frame:
         if transparent:
             return self._render_transparent(
@@ -231,7 +235,7 @@ class Renderer:
         exposure: float = 0.0,
         tone: str = "none",
         *,
-        interfaces: Interfaces = "both",
+        interfaces: Interfaces | None = None,
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -245,7 +249,7 @@ class Renderer:
             Stops brighter.
         tone : {"none", "neutral", "agx"}
             Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
-        interfaces : {"both", "front"}
+        interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
             As for `render`.
 
         Raises

@@ -87,8 +87,11 @@ BAD_RENDER_OPTIONS = [
     (["--camera", "first"], "Invalid value for '--camera'"),
     (
         ["--interfaces", "front", "--opaque-with", "pyrender"],
-        "--interfaces front; --opaque-with, where rays bend at both",
+        "--interfaces front; --opaque-with, whose interfaces are those of the screen",
     ),
+    (["--interfaces", "both"], "Invalid value for '--interfaces': 'both' is not one of 'traced', 'screen', 'front'"),
+    (["--interface-depth", "3"], "--interface-depth; only --interfaces traced takes it; add --interfaces traced"),
+    (["--interfaces", "traced", "--interface-forks", "9"], "TracedInterfaces forks 9; not a whole number in 0 to 4"),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]
 
@@ -189,15 +192,15 @@ class TestRendering:
     def test_render_bends_rays_at_one_interface_or_both(self, run: Run, tmp_path: Path) -> None:
         glass = {"extensions": GLASS | {"KHR_materials_ior": {"ior": 1.5}}}
         model, frames = write_scene(tmp_path / "scene.glb", glass), {}
-        for interfaces in ("both", "front"):
+        for interfaces in ("screen", "front"):
             output = tmp_path / f"{interfaces}.npz"
             result = run("render", model, "-o", output, "--size", "9x5", "--samples", "1", "--interfaces", interfaces)
             assert (result.code, result.err) == (0, "")
             assert ("leaves without bending" in result.out) == (interfaces == "front")
             with np.load(output) as arrays:
                 frames[interfaces] = arrays["radiance"], arrays["thickness"]
-        assert (frames["both"][0] != frames["front"][0]).any()
-        assert (frames["both"][1] == frames["front"][1]).all()
+        assert (frames["screen"][0] != frames["front"][0]).any()
+        assert (frames["screen"][1] == frames["front"][1]).all()
 
     def test_render_as_json_prints_one_object(self, run: Run, cube: Path, tmp_path: Path) -> None:
         output = tmp_path / "cube.exr"

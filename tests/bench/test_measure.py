@@ -276,7 +276,7 @@ def test_one_interface_lies_between_two_and_straight_rays_in_passes_and_is_not_e
     assert two.promise.startswith("refraction and reflection beyond the first interval")
     assert none.promise == "none: interfaces are left out"
     assert [row.passes for row in (two, one, none)] == [3, 2, 1]
-    assert one.parameters == 'SignedDepth(anchored=True), interfaces="front"'
+    assert one.parameters == "SignedDepth(anchored=True), interfaces=FrontInterface()"
     assert "rays leave curved bodies in wrong directions" in one.promise
     # The root mean square of all of them is that of reflections inside, which none follows on.
     assert one.radiance.median > 3 * two.radiance.median  # type: ignore[union-attr]

@@ -9,9 +9,10 @@ import translucent as tl
 from tests.values.plan_scenes import DIAMOND, EMBER, FIRE, GLASS, MILK, NO_STORAGE, OPEN, WINE, body, scene, sheet
 from translucent.gpu.features import FrameFeatures
 from translucent.planning.assembly import FALLBACK_SHEET
+from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
 from translucent.planning.plan import plan
-from translucent.planning.render_plan import Capabilities, Interfaces
+from translucent.planning.render_plan import Capabilities
 
 FLAGS = (
     "has_opaque",
@@ -22,6 +23,7 @@ FLAGS = (
     "has_unlit",
     "scatters",
     "one_interface",
+    "traced",
     "finds_exits",
     "marches",
     "emits",
@@ -35,7 +37,7 @@ def features(
     found: tl.Scene,
     method: Method | None = None,
     capabilities: Capabilities | None = None,
-    interfaces: Interfaces = "both",
+    interfaces: Interfaces | None = None,
 ) -> FrameFeatures:
     return FrameFeatures(found, plan(found, method, capabilities or Capabilities(), interfaces=interfaces))
 
@@ -53,9 +55,14 @@ CASES: dict[str, tuple[FrameFeatures, set[str], str]] = {
     "open": (features(scene(body(mesh=OPEN))), {"accumulates", "has_fallback"}, "transmittance"),
     "interfaces": (features(scene(body(DIAMOND))), {"accumulates", "has_surfaces"}, "surfaces"),
     "one interface": (
-        features(scene(body(DIAMOND)), interfaces="front"),
+        features(scene(body(DIAMOND)), interfaces=tl.FrontInterface()),
         {"accumulates", "has_surfaces", "one_interface"},
         "surfaces",
+    ),
+    "traced interfaces": (
+        features(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces()),
+        {"accumulates", "has_surfaces", "one_interface", "traced"},
+        "traced_interfaces",
     ),
     "interfaces in order": (
         features(scene(body(DIAMOND)), tl.FragmentLists()),

@@ -78,7 +78,7 @@ def test_rays_of_an_orthographic_picture_that_cuts_a_body_bend_where_they_leave(
 def test_white_furnace_of_one_interface(renderer: tl.Renderer, kind: str) -> None:
     medium, surface = LOSSLESS[kind]
     scene = shown(tl.load_mesh(mesh_path("knot")), medium, WHITE, surface=surface)
-    frame = renderer.render(scene, SIZE, interfaces="front")
+    frame = renderer.render(scene, SIZE, interfaces=tl.FrontInterface())
     assert frame.coverage.sum() > 1000
     np.testing.assert_allclose(frame.radiance, 1.0, atol=1e-5)
 
@@ -160,7 +160,7 @@ def test_a_pane_with_one_interface_turns_light_once(renderer: tl.Renderer, ior: 
     pane = tl.Object(Box((-4.0, -4.0, -0.2), (4.0, 4.0, 0.2)).tessellate(), tl.Medium(absorption=sigma, ior=ior))
     camera = tl.Camera.look_at((2.0, 1.0, 3.0), (0, 0, 0), fov_y=10)
     scene = tl.Scene([pane], camera, environment=SKY)
-    frame = renderer.render(scene, SIZE, interfaces="front")
+    frame = renderer.render(scene, SIZE, interfaces=tl.FrontInterface())
     ray = rays(camera)
     cosine = -ray[..., 2]
     share = optics.fresnel_dielectric(cosine, ior)[..., None]
@@ -183,7 +183,7 @@ def test_one_interface_without_a_step_in_index_is_not_there(renderer: tl.Rendere
         plain = tl.Scene([tl.Object(BALL, medium), *opaque], camera, environment=SKY)
         tinted = tl.Scene([tl.Object(BALL, medium, surface=tl.Surface(color=color)), *opaque], camera, environment=SKY)
         straight = renderer.render(plain, SIZE)
-        found = renderer.render(tinted, SIZE, interfaces="front").radiance[straight.coverage]
+        found = renderer.render(tinted, SIZE, interfaces=tl.FrontInterface()).radiance[straight.coverage]
         error = np.abs(found / (straight.radiance[straight.coverage] * color) - 1).max(axis=-1)
         assert error.size > 3000
         # Opaque surfaces are found at whole pixels: all is well but for the edge of the core.
@@ -192,16 +192,16 @@ def test_one_interface_without_a_step_in_index_is_not_there(renderer: tl.Rendere
 
 def test_one_interface_leaves_out_the_draw_of_the_other(renderer: tl.Renderer) -> None:
     scene = shown(BALL, tl.Medium(absorption=1.0, ior=1.5), SKY)
-    both, front = renderer.render(scene, SIZE), renderer.render(scene, SIZE, interfaces="front")
+    both, front = renderer.render(scene, SIZE), renderer.render(scene, SIZE, interfaces=tl.FrontInterface())
     assert both.plan.geometry_passes == front.plan.geometry_passes + 1
-    assert (both.plan.interfaces, front.plan.interfaces) == ("both", "front")
+    assert (both.plan.interfaces, front.plan.interfaces) == (tl.ScreenInterfaces(), tl.FrontInterface())
     for name in ("thickness", "optical_depth", "transmittance", "coverage", "valid", "normals"):
         np.testing.assert_array_equal(getattr(both, name), getattr(front, name))
     assert np.abs(both.radiance - front.radiance).max() > 0.1
     # What has been drawn with one interface leaves nothing behind.
     np.testing.assert_array_equal(renderer.render(scene, SIZE).radiance, both.radiance)
     # Averages and frames with alpha have it, too.
-    averaged = renderer.render(scene, SIZE, samples=2, transparent=True, interfaces="front")
+    averaged = renderer.render(scene, SIZE, samples=2, transparent=True, interfaces=tl.FrontInterface())
     assert averaged.plan == front.plan
     assert averaged.alpha is not None
 

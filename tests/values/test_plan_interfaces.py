@@ -2,37 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+import re
+from typing import Any
 
+import numpy as np
 import pytest
 
 import translucent as tl
-from tests.values.plan_scenes import DIAMOND, OPEN, ORDERED, TORUS, WINE, body, scene, sheet
-from translucent.planning.interfaces import ONE_INTERFACE
+from tests.values.plan_scenes import DIAMOND, NO_STORAGE, OPEN, ORDERED, SCENES, TORUS, WINE, body, scene, sheet
+from translucent.commands.common import INTERFACE_NAMES
+from translucent.planning import interface_choice
+from translucent.planning.interfaces import INTERFACES, Interfaces
+from translucent.planning.interfaces.front import ONE_INTERFACE
+from translucent.planning.interfaces.traced import TRACE_COST
 from translucent.planning.notes import NoteKind
-from translucent.planning.plan import plan
-from translucent.planning.render_plan import Capabilities, Interfaces
+from translucent.planning.passes import PassName
+from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.planning.render_plan import Capabilities
+
+TRACED, SCREEN, FRONT = tl.TracedInterfaces(), tl.ScreenInterfaces(), tl.FrontInterface()
+CHOICES: list[Interfaces] = [TRACED, SCREEN, FRONT]
+ALWAYS: list[Any] = [None, tl.SignedDepth(), *ORDERED]
 
 
-@pytest.mark.parametrize("method", [None, tl.SignedDepth(), *ORDERED])
+@pytest.mark.parametrize("method", ALWAYS)
 def test_one_interface_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
     asked = scene(body(DIAMOND), body(None, TORUS))
-    both, front = plan(asked, method), plan(asked, method, interfaces="front")
-    assert plan(asked, method, interfaces="both") == both
-    assert (both.interfaces, front.interfaces) == ("both", "front")
+    both, front = plan(asked, method), plan(asked, method, interfaces=FRONT)
+    assert plan(asked, method, interfaces=SCREEN) == both
+    assert (both.interfaces, front.interfaces) == (SCREEN, FRONT)
     assert [step.name for step in both.passes] == [step.name for step in front.passes]
     assert front.geometry_passes == both.geometry_passes - 1
     assert front.cost < both.cost
-    assert front.unmodelled == (*both.unmodelled, ONE_INTERFACE)
-    assert 'not modelled: interfaces="front": bends once, where a ray enters; leaves without bending' in str(front)
-    assert front.summary()["interfaces"] == "front"
+    assert ONE_INTERFACE in front.unmodelled
+    assert tuple(note for note in front.unmodelled if note != ONE_INTERFACE) == both.unmodelled
+    assert "not modelled: FrontInterface: bends once, where a ray enters; leaves without bending" in str(front)
+    assert front.summary()["interfaces"] == "FrontInterface()"
 
 
 @pytest.mark.parametrize(
     ("objects", "method"), [([body()], None), ([sheet(DIAMOND)], None), ([body(DIAMOND)], tl.ThinLayer())]
 )
 def test_one_interface_changes_nothing_where_nothing_bends(objects: list[tl.Object], method: Any) -> None:
-    assert plan(scene(*objects), method, interfaces="front") == plan(scene(*objects), method)
+    assert plan(scene(*objects), method, interfaces=FRONT) == plan(scene(*objects), method, interfaces=SCREEN)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +68,7 @@ def test_a_method_that_misses_where_rays_leave_touching_bodies_is_told(
 def test_one_interface_needs_no_order_where_bodies_touch() -> None:
     touching = scene(body(DIAMOND), body(WINE, x=0.5))
     assert plan(touching).ordered
-    assert not plan(touching, interfaces="front").ordered
+    assert not plan(touching, interfaces=FRONT).ordered
 
 
 @pytest.mark.parametrize(
@@ -72,24 +84,40 @@ def test_one_interface_needs_no_order_where_bodies_touch() -> None:
 def test_one_interface_cannot_be_entered_from_inside(camera: tl.Camera, inside: bool) -> None:
     asked = tl.Scene([body(DIAMOND)], camera)
     if not inside:
-        assert plan(asked, interfaces="front").interfaces == "front"
+        assert plan(asked, interfaces=FRONT).interfaces == FRONT
         return
-    message = r'^interfaces="front"; rays start inside .*; use interfaces="both", or move the camera outside$'
+    message = r"^FrontInterface\(\); rays start inside .*; use ScreenInterfaces\(\), or move the camera outside$"
     with pytest.raises(tl.InputError, match=message):
-        plan(asked, interfaces="front")
-    assert plan(asked).interfaces == "both"
+        plan(asked, interfaces=FRONT)
+    assert plan(asked).interfaces == SCREEN
 
 
 def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
     ring = tl.Scene([body(DIAMOND, TORUS)], tl.Camera.look_at((0, 0, 0), (1, 0, 0)))
-    assert plan(ring, interfaces="front").interfaces == "front"
+    assert plan(ring, interfaces=FRONT).interfaces == FRONT
 
 
-def test_interfaces_that_are_not_known_are_refused() -> None:
-    with pytest.raises(tl.InputError, match=r"^interfaces 'back'; not known; use one of both, front$"):
-        plan(scene(body()), interfaces="back")  # type: ignore[arg-type]
-    with tl.Renderer("cpu") as renderer, pytest.raises(tl.InputError, match=r"^interfaces \['front'\]; not known"):
-        renderer.plan(scene(body()), interfaces=["front"])  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("asked", "do"),
+    [
+        ("both", "write interfaces=tl.ScreenInterfaces()"),
+        ("front", "write interfaces=tl.FrontInterface()"),
+        *(
+            (other, f"give tl.{TRACED}, tl.{SCREEN} or tl.{FRONT}")
+            for other in ("back", ["front"], tl.FrontInterface, 8)
+        ),
+    ],
+)
+def test_what_is_no_choice_of_interfaces_is_refused(asked: Any, do: str) -> None:
+    message = f"^{re.escape(f'interfaces {asked!r}; not a choice of interfaces; {do}')}$"
+    for make in (plan, plan_over_backdrop, planned_on_the_cpu):
+        with pytest.raises(tl.InputError, match=message):
+            make(scene(body()), interfaces=asked)
+
+
+def planned_on_the_cpu(asked: tl.Scene, *, interfaces: Any) -> tl.RenderPlan:
+    with tl.Renderer("cpu") as renderer:
+        return renderer.plan(asked, interfaces=interfaces)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +138,125 @@ def test_sheets_have_one_interface_and_bend_no_ray(objects: list[tl.Object], met
 
 def test_one_interface_names_the_sheets_too() -> None:
     asked = scene(sheet(DIAMOND, OPEN), body(DIAMOND))
-    for interfaces in get_args(Interfaces):
+    for interfaces in CHOICES:
         (step,) = (step for step in plan(asked, interfaces=interfaces).passes if step.name == "interfaces")
         assert step.reason.startswith("'open box', 'box': ")
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_scenes_without_interfaces_have_one_plan(kind: str) -> None:
+    for capabilities in (Capabilities(), NO_STORAGE):
+        found = [plan(SCENES[kind], None, capabilities, interfaces=one) for one in (None, *CHOICES)]
+        assert found == found[:1] * 4
+        assert found[0].interfaces is None
+
+
+def test_each_way_of_finding_interfaces_has_a_name_and_traits_of_its_own() -> None:
+    assert [type(one) for one in CHOICES] == list(INTERFACES.values())
+    assert list(INTERFACES) == list(INTERFACE_NAMES)
+    for one in CHOICES:
+        assert all(step.reason and step.cost > 0 for step in one.passes(scene(body(DIAMOND)), straight=False))
+    assert [(one.traced, one.finds_exits, one.one_interface) for one in CHOICES] == [
+        (True, False, False),
+        (False, True, False),
+        (False, False, True),
+    ]
+
+
+@pytest.mark.parametrize(("what", "least", "most", "example"), [("depth", 1, 64, 8), ("forks", 0, 4, 2)])
+def test_depth_and_forks_are_whole_numbers_in_range(what: str, least: int, most: int, example: int) -> None:
+    assert tl.TracedInterfaces(**{what: least}) != tl.TracedInterfaces(**{what: most})
+    assert tl.TracedInterfaces() == tl.TracedInterfaces(depth=8, forks=2)
+    for wrong in (least - 1, most + 1, 2.0, True, None, "3", np.nan):
+        message = (
+            f"TracedInterfaces {what} {wrong!r}; not a whole number in {least} to {most}; give for example {example}"
+        )
+        with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
+            tl.TracedInterfaces(**{what: wrong})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("method", ALWAYS)
+def test_traced_interfaces_draw_the_first_and_trace_the_others(method: Any) -> None:
+    asked = scene(body(DIAMOND), body(None, TORUS))
+    drawn, traced = plan(asked, method, interfaces=SCREEN), plan(asked, method, interfaces=TRACED)
+    assert [step.name for step in traced.passes] == [
+        PassName.TRACED if step.name is PassName.SURFACES else step.name for step in drawn.passes
+    ]
+    steps = {step.name: step for step in traced.passes}
+    front = {step.name: step for step in plan(asked, method, interfaces=FRONT).passes}
+    assert (steps[PassName.INTERFACES].geometry_passes, steps[PassName.INTERFACES].objects) == (1, (0,))
+    assert steps[PassName.INTERFACES].cost == front[PassName.INTERFACES].cost
+    assert steps[PassName.TRACED].cost == TRACE_COST
+    assert "at most 8 interfaces, and both ways at the first 2" in steps[PassName.TRACED].reason
+    assert traced.interfaces == TRACED
+    assert traced.limits == drawn.limits
+    assert traced.summary()["interfaces"] == "TracedInterfaces(depth=8, forks=2)"
+
+
+def test_traced_interfaces_tell_what_they_cut_off_and_no_more() -> None:
+    found = plan(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces(3, 1))
+    (note,) = found.unmodelled
+    assert note.kind is NoteKind.CUT_OFF_PATHS
+    assert note.startswith(
+        "light that meets more than 3 interfaces, and the weaker of reflected and refracted light after 1 fork: "
+    )
+    (note,) = plan(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces(1, 0)).unmodelled
+    assert note.startswith("light that meets more than 1 interface, and the weaker of reflected and refracted light: ")
+
+
+def test_traced_interfaces_need_no_order_where_bodies_touch() -> None:
+    touching = scene(body(DIAMOND), body(WINE, x=0.5))
+    for method in (None, tl.SignedDepth(), tl.DepthPeeling()):
+        found = plan(touching, method, interfaces=TRACED)
+        assert found.ordered is (method == tl.DepthPeeling())
+        assert not found.says(NoteKind.TOUCHING_INTERFACES)
+
+
+INSIDE = tl.Scene([body(DIAMOND)], tl.Camera.look_at((0, 0, 0.2), (0, 0, -1)))
+CUT = tl.Scene([body(DIAMOND)], tl.Camera.orthographic((0, 0, 0.2), (0, 0, -1), height=1))
+DENSITY = scene(body(DIAMOND, density=tl.LinearDensity(1, 0.1, 2.0)))
+UNTRACED = {
+    "cut": (CUT, "the orthographic picture's plane, where rays start, cuts 'box'"),
+    "density": (DENSITY, "'box': the density varies, and rays cross media in one step"),
+}
+
+
+def test_traced_rays_may_start_inside_a_body() -> None:
+    assert plan(INSIDE, interfaces=TRACED).interfaces == TRACED
+
+
+@pytest.mark.parametrize(("asked", "why"), UNTRACED.values(), ids=UNTRACED)
+def test_what_rays_cannot_be_traced_through_is_refused_or_drawn(
+    asked: tl.Scene, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(tl.InputError, match=rf"^{re.escape(f'{TRACED}; {why}; use {SCREEN}')}"):
+        plan(asked, interfaces=TRACED)
+    drawn = plan(asked, interfaces=SCREEN)
+    monkeypatch.setattr(interface_choice, "default_interfaces", lambda *_: TRACED)
+    assert plan(scene(body(DIAMOND))).interfaces == TRACED
+    found = plan(asked)
+    assert found.interfaces == SCREEN
+    assert [step.name for step in found.passes] == [step.name for step in drawn.passes]
+    (shading,) = (step for step in found.passes if step.name is PassName.SURFACES)
+    assert shading.reason.endswith(f"; in screen space, since {why}")
+
+
+def test_bodies_that_a_picture_cuts_do_not_matter_as_sheets_or_without_interfaces() -> None:
+    assert plan(CUT, tl.ThinLayer(), interfaces=TRACED).interfaces == TRACED
+    assert plan(tl.Scene([body()], CUT.camera), interfaces=TRACED).interfaces is None
+
+
+def test_nothing_is_traced_before_a_backdrop(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = scene(body(DIAMOND))
+    with pytest.raises(tl.InputError, match=r"has no mesh that a ray could meet; use ScreenInterfaces\(\)$"):
+        plan_over_backdrop(asked, interfaces=TRACED)
+    monkeypatch.setattr(interface_choice, "default_interfaces", lambda *_: TRACED)
+    assert plan_over_backdrop(asked).interfaces == SCREEN
+    assert plan_over_backdrop(asked, interfaces=FRONT).interfaces == FRONT
+
+
+def test_interfaces_are_those_of_the_plan_without_opengl() -> None:
+    without = Capabilities(opengl=False)
+    for one in (None, *CHOICES):
+        found = plan(scene(body(DIAMOND)), None, without, interfaces=one)
+        assert (found.interfaces, found.says(NoteKind.REFRACTION)) == (None, True)

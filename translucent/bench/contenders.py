@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from translucent.bench.row import Kind
 from translucent.errors import InputError
+from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces
 from translucent.planning.methods import (
     METHODS,
     BackFaceDepth,
@@ -22,7 +23,6 @@ from translucent.planning.methods import (
 )
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.planning.methods.ray_marched import Quadrature
-from translucent.planning.render_plan import Interfaces
 from translucent.scene.scene import Scene
 
 #: Kinds of contenders: by the plan for its method, by a shortcut of the bench, or without OpenGL.
@@ -40,6 +40,8 @@ _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 
 #: Largest number of steps with light scattered into each: more take seconds for a frame.
 _MOST_LIT_STEPS = 128
+
+_SCREEN = ScreenInterfaces()
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ class Contender:
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
-    interfaces : {"both", "front"}
-        Where rays bend, as `translucent.Renderer.render` has it.
+    interfaces : Interfaces
+        How they are found, as `translucent.Renderer.render` has it.
     """
 
     name: str
@@ -77,7 +79,7 @@ class Contender:
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
-    interfaces: Interfaces = "both"
+    interfaces: Interfaces = _SCREEN
 
     @property
     def fitted(self) -> bool:
@@ -90,7 +92,7 @@ class Contender:
             return "the shortcuts are drawn without opaque objects"
         if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
             return "signed distances of a sheet mean nothing"
-        if self.interfaces == "front" and all(body.sheet_thickness is not None for body in scene.bodies):
+        if self.interfaces.one_interface and all(body.sheet_thickness is not None for body in scene.bodies):
             return "sheets have one interface, at which nothing bends"
         return None
 
@@ -177,7 +179,7 @@ CONTENDERS: tuple[Contender, ...] = (
         SignedDepth(),
         effects=("interfaces",),
         pictured=("interfaces",),
-        interfaces="front",
+        interfaces=FrontInterface(),
     ),
     Contender(
         "straight rays",

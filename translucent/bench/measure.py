@@ -220,7 +220,7 @@ def _parameters(contender: Contender) -> str:
         "cpu": 'Renderer(backend="cpu")',
         "march": f"reference.march with {contender.method}",
         "plan": str(contender.method)
-        + ("" if contender.interfaces == "both" else f', interfaces="{contender.interfaces}"'),
+        + ("" if contender.interfaces.finds_exits else f", interfaces={contender.interfaces}"),
     }[contender.technique]
 
 

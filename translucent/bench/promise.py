@@ -19,6 +19,7 @@ _BESIDE_THICKNESS = (
     NoteKind.ONLY_REMOVES,
     NoteKind.REFRACTION,
     NoteKind.LATER_REFRACTION,
+    NoteKind.CUT_OFF_PATHS,
 )
 
 

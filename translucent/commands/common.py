@@ -17,11 +17,15 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from translucent.media.medium import Medium
+    from translucent.planning.interfaces import Interfaces
     from translucent.planning.methods import Method
     from translucent.scene.environment import Environment
 
 #: Names of tone curves, as in `translucent.formulas.tone.TONES`, which only rendering imports.
 TONE_NAMES = ("none", "neutral", "agx")
+
+#: Names of the ways of finding interfaces, as in `translucent.planning.interfaces.INTERFACES`, likewise.
+INTERFACE_NAMES = ("traced", "screen", "front")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -129,15 +133,38 @@ def outside_option(command: F) -> F:
     )(command)
 
 
-def interfaces_option(command: F) -> F:
-    """Option for where rays bend."""
+def interface_options(command: F) -> F:
+    """Options for how the interfaces are found at which light refracts and reflects."""
+    command = click.option(
+        "--interface-forks",
+        type=int,
+        metavar="N",
+        help="Of --interfaces traced: interfaces at which reflected and refracted light are both followed. Default: 2.",
+    )(command)
+    command = click.option(
+        "--interface-depth",
+        type=int,
+        metavar="N",
+        help="Of --interfaces traced: interfaces that light may meet. Default: 8.",
+    )(command)
     return click.option(
         "--interfaces",
-        type=click.Choice(["both", "front"]),
-        default="both",
-        show_default=True,
-        help="Where rays bend: where they enter bodies and where they leave them, or only where they enter (quicker).",
+        "interfaces_name",
+        type=click.Choice(INTERFACE_NAMES),
+        help="Where light bends and is mirrored: at all interfaces, traced through the meshes; where it enters bodies "
+        "and where it leaves them, in screen space; or only where it enters (quicker). Default: by plan.",
     )(command)
+
+
+def read_interfaces(name: str | None, depth: int | None, forks: int | None) -> Interfaces | None:
+    """The way of finding interfaces that the options choose, if any."""
+    from translucent.planning.interfaces import INTERFACES, TracedInterfaces
+
+    given = {key: value for key, value in (("depth", depth), ("forks", forks)) if value is not None}
+    if given and name != TracedInterfaces.name:
+        asked = f"--interface-{next(iter(given))}"
+        raise InputError(asked, "only --interfaces traced takes it", "add --interfaces traced")
+    return TracedInterfaces(**given) if given else None if name is None else INTERFACES[name]()
 
 
 def read_medium(

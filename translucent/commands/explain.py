@@ -9,9 +9,10 @@ import click
 
 from translucent.commands.common import (
     common_options,
-    interfaces_option,
+    interface_options,
     medium_options,
     outside_option,
+    read_interfaces,
     read_medium,
     read_method,
     unit_option,
@@ -21,7 +22,7 @@ from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
     from translucent.geometry.mesh import Mesh
-    from translucent.planning.render_plan import Interfaces, RenderPlan
+    from translucent.planning.render_plan import RenderPlan
     from translucent.scene.scene import Object, Scene
 
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 @unit_option
 @outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
-@interfaces_option
+@interface_options
 @common_options
 def explain(
     model: str,
@@ -42,7 +43,9 @@ def explain(
     unit: str,
     allow_outside: bool,
     method_name: str | None,
-    interfaces: Interfaces,
+    interfaces_name: str | None,
+    interface_depth: int | None,
+    interface_forks: int | None,
     as_json: bool,
 ) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
@@ -54,6 +57,7 @@ def explain(
     medium = read_medium(color, distance, preset_name, clamp)
     scene = read_scene(model, unit, medium, allow_outside=allow_outside)
     method = read_method(method_name, None)
+    interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     chosen = plan(scene, method, interfaces=interfaces) if scene.bodies else None
     if as_json:
         echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))

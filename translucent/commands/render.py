@@ -5,19 +5,19 @@ from __future__ import annotations
 import json
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from translucent.commands.common import (
     common_options,
-    interfaces_option,
+    interface_options,
     look_options,
     medium_options,
     method_option,
     outside_option,
     overwrite_option,
     read_environment,
+    read_interfaces,
     read_medium,
     read_method,
     read_size,
@@ -38,9 +38,6 @@ from translucent.commands.model import (
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
 
-if TYPE_CHECKING:
-    from translucent.planning.render_plan import Interfaces
-
 
 @click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
 @click.argument("model")
@@ -60,7 +57,7 @@ if TYPE_CHECKING:
 @click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
 @look_options
 @method_option
-@interfaces_option
+@interface_options
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -94,7 +91,9 @@ def render(
     tone: str,
     roughness: float | None,
     method_name: str | None,
-    interfaces: Interfaces,
+    interfaces_name: str | None,
+    interface_depth: int | None,
+    interface_forks: int | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -116,8 +115,10 @@ def render(
     if transparent and (opaque_with is not None or output.suffix.lower() == ".mp4"):
         other = "--opaque-with, which draws what is behind" if opaque_with else "a film, which holds no alpha"
         raise InputError("--transparent", other, "leave out one of the two")
-    if interfaces == "front" and opaque_with is not None:
-        raise InputError("--interfaces front", "--opaque-with, where rays bend at both", "leave out one of the two")
+    interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
+    if interfaces is not None and not interfaces.finds_exits and opaque_with is not None:
+        found = "--opaque-with, whose interfaces are those of the screen"
+        raise InputError(f"--interfaces {interfaces.name}", found, "leave out one of the two")
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     refuse_overwriting(output, model, environment, background)

@@ -36,7 +36,7 @@ class FrameFeatures:
     @property
     def has_surfaces(self) -> bool:
         """Whether any body has an interface that changes light."""
-        return self.plan.has(PassName.SURFACES)
+        return self.plan.has(PassName.SURFACES, PassName.TRACED)
 
     @property
     def has_layers(self) -> bool:
@@ -70,8 +70,13 @@ class FrameFeatures:
 
     @property
     def one_interface(self) -> bool:
-        """Whether rays refract where they enter a body, and not where they leave it."""
-        return self.plan.interfaces == "front"
+        """Whether only the first interface on each ray is drawn, and not the one where the ray leaves."""
+        return self.plan.interfaces is not None and not self.plan.interfaces.finds_exits
+
+    @property
+    def traced(self) -> bool:
+        """Whether rays are traced from the first interface on."""
+        return self.plan.has(PassName.TRACED)
 
     @property
     def finds_exits(self) -> bool:

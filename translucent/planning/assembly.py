@@ -7,7 +7,8 @@ from dataclasses import replace
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ, open_bodies, scatters, sheets_of, solids_of
 from translucent.planning.effects import unmodelled_effects
-from translucent.planning.interfaces import interface_passes, touching_interfaces
+from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces.places import touching_interfaces, with_interfaces
 from translucent.planning.layers import layer_passes
 from translucent.planning.limits import (
     MAX_SCATTER_LIGHTS,
@@ -30,13 +31,13 @@ from translucent.scene.scene import Scene, object_names
 FALLBACK_SHEET = 0.01
 
 #: Time of a pass in multiples of drawing the same geometry into a depth buffer, as measured on a software rasterizer
-#: (`translucent report`); those of methods are theirs. Passes that shade pixels (resolve, surfaces): beside 90,000
-#: triangles; beside fewer ones, which cost less, they count for more.
-COSTS = {"opaque": 2.8, "resolve": 0.4, "interfaces": 4.0, "surfaces": 8.0, "layers": 3.0}
+#: (`translucent report`); those of methods and of interfaces are theirs. Passes that shade pixels (resolve): beside
+#: 90,000 triangles; beside fewer ones, which cost less, they count for more.
+COSTS = {"opaque": 2.8, "resolve": 0.4, "layers": 3.0}
 
 
-def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities) -> RenderPlan:
-    """The plan of a method, which was chosen for the reason `why`, with OpenGL and both interfaces of bodies.
+def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, capabilities: Capabilities) -> RenderPlan:
+    """The plan of a method, which was chosen for the reason `why`, with OpenGL.
 
     Raises
     ------
@@ -49,18 +50,22 @@ def assembled(scene: Scene, method: Method, why: str, capabilities: Capabilities
     beside = () if method.makes_sheets else (*_declared_sheets(scene), *_fallback_passes(scene, spectral))
     # Sheets go first where intervals are in order: their sums are read where the intervals are resolved.
     passes = (*beside, *_light_views(scene, method), *own) if method.ordered else (*own, *beside)
-    interfaces = interface_passes(scene, method, COSTS["interfaces"], COSTS["surfaces"])
+    found = _interface_passes(scene, method, interfaces)
     passes = (
         *_opaque_passes(scene),
         *passes,
-        *interfaces[:1],
+        *found[:1],
         PassSpec(PassName.TRANSMITTANCE, _shading(scene, method), cost=COSTS["resolve"]),
-        *interfaces[1:],
+        *found[1:],
         *layer_passes(scene, COSTS["layers"]),
     )
     lit = any(step.name is PassName.LIGHT_VIEWS for step in passes)
-    unmodelled = (*unmodelled_effects(scene, scattering=lit, interfaces=True), *_touching(scene, method))
-    return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled)
+    unmodelled = (
+        *unmodelled_effects(scene, scattering=lit, interfaces=interfaces),
+        *_touching(scene, method, interfaces),
+    )
+    used = interfaces if found else None
+    return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled, interfaces=used)
 
 
 def with_unlit_marked(scene: Scene, chosen: RenderPlan) -> RenderPlan:
@@ -92,9 +97,19 @@ def _check(scene: Scene, method: Method, capabilities: Capabilities) -> None:
     method.check(scene)
 
 
-def _touching(scene: Scene, method: Method) -> tuple[Note, ...]:
+def _interface_passes(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[PassSpec, ...]:
+    """Passes that find and shade interfaces; none where no interface changes light."""
+    if not (found := with_interfaces(scene)):
+        return ()
+    straight = method.makes_sheets or all(scene.objects[i].sheet_thickness is not None for i in found)
+    return interfaces.passes(scene, straight=straight)
+
+
+def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Note, ...]:
     """Note for a method that does not find where rays leave all bodies, and so refracts them between touching ones."""
-    if method.finds_exits or method.makes_sheets or (touching := touching_interfaces(scene)) is None:
+    if not interfaces.finds_exits or method.finds_exits or method.makes_sheets:
+        return ()
+    if (touching := touching_interfaces(scene)) is None:
         return ()
     text = f"{touching}; {type(method).__name__} does not find it, and takes the interface between them for the last"
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from translucent.planning.interfaces import Interfaces
 from translucent.planning.layers import layer_effects
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName
@@ -13,7 +14,7 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Object, Scene, object_names
 
 
-def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: bool = False) -> tuple[Note, ...]:
+def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces | None = None) -> tuple[Note, ...]:
     """Notes on effects that the scene asks for and a plan does not render.
 
     Parameters
@@ -21,19 +22,19 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: bool = Fal
     scene : Scene
     scattering : bool
         The plan has light scattered into the rays.
-    interfaces : bool
-        The plan has what the interfaces of bodies and the surfaces of opaque objects do to light.
+    interfaces : Interfaces, optional
+        How the plan finds interfaces; None if it leaves out what they and the surfaces of opaque objects do to light.
     """
-    effects = _scattering_effects(scene, followed=scattering, interfaces=interfaces) + _refraction_effects(
-        scene, interfaces
-    )
+    surfaces = interfaces is not None
+    effects = _scattering_effects(scene, followed=scattering, interfaces=surfaces)
+    effects += _refraction_effects(scene, interfaces)
     if clear := [body for body in scene.bodies if _is_invisible(body)]:
         text = f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits"
         effects.append(Note(NoteKind.INVISIBLE, text))
-    if not interfaces and (finished := [item for item in scene.opaque if item.surface is not None]):
+    if not surfaces and (finished := [item for item in scene.opaque if item.surface is not None]):
         text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
-    effects += layer_effects(scene, interfaces=interfaces)
+    effects += layer_effects(scene, interfaces=surfaces)
     if scene.opaque:
         effects.append(Note(NoteKind.SHADOWS, "shadows: light reaches opaque objects through everything"))
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
@@ -82,18 +83,14 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     return []
 
 
-def _refraction_effects(scene: Scene, interfaces: bool) -> list[Note]:
+def _refraction_effects(scene: Scene, interfaces: Interfaces | None) -> list[Note]:
     """Notes on refracted and reflected light that is not rendered."""
     if not any(body.has_interface for body in scene.bodies):
         return []
-    if not interfaces:
+    if interfaces is None:
         text = "refraction and reflection: rays go straight, though interfaces bend and mirror them"
         return [Note(NoteKind.REFRACTION, text)]
-    text = (
-        "refraction and reflection beyond the first interval of a ray: what lies farther on is crossed straight, "
-        "and interfaces mirror the environment only"
-    )
-    return [Note(NoteKind.LATER_REFRACTION, text)]
+    return interfaces.unmodelled()
 
 
 def _is_invisible(body: Object) -> bool:

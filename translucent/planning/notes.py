@@ -35,6 +35,7 @@ class NoteKind(StrEnum):
     REFRACTION = "refraction"
     TOUCHING_INTERFACES = "touching interfaces"
     LATER_REFRACTION = "later refraction"
+    CUT_OFF_PATHS = "cut-off paths"
     ONE_INTERFACE = "one interface"
     OPAQUE_SURFACES = "opaque surfaces"
     LAYERS = "layers"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from translucent.planning.bodies import media_differ
-from translucent.planning.interfaces import touching_interfaces
+from translucent.planning.interfaces import Interfaces
+from translucent.planning.interfaces.places import touching_interfaces
 from translucent.planning.methods import Method
-from translucent.planning.render_plan import Interfaces
 from translucent.planning.slots import MAX_SLOTS, medium_slots, overlapping_pair
 from translucent.scene.scene import Scene
 
@@ -15,7 +15,7 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
     bodies = scene.bodies
     if media_differ(scene) and any(body.medium is not None and body.medium.emits for body in bodies):
         return "emission among several media: what is in front dims what is behind"
-    if method is None and interfaces == "both" and (touching := touching_interfaces(scene)) is not None:
+    if method is None and interfaces.finds_exits and (touching := touching_interfaces(scene)) is not None:
         return touching
     if method is None and (why := _inside_out(scene)) is not None:
         return why

@@ -25,6 +25,7 @@ class PassName(StrEnum):
     INTERFACES = "interfaces"
     TRANSMITTANCE = "transmittance"
     SURFACES = "surfaces"
+    TRACED = "traced_interfaces"
     LAYERS = "layers"
 
     # Without OpenGL.

@@ -8,13 +8,14 @@ from translucent.errors import InputError
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
 from translucent.planning.effects import unmodelled_effects, with_ambient_told
-from translucent.planning.interfaces import check_interfaces, with_one_interface
+from translucent.planning.interface_choice import check_interfaces, chosen_interfaces, with_fallback_told
+from translucent.planning.interfaces import Interfaces, ScreenInterfaces
 from translucent.planning.limits import marching_method, mesh_limits, open_limits
 from translucent.planning.methods import DepthPeeling, FragmentLists, Method, SignedDepth, ThinLayer
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
-from translucent.planning.render_plan import Capabilities, Interfaces, RenderPlan
+from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
@@ -24,7 +25,7 @@ def plan(
     method: Method | None = None,
     capabilities: Capabilities | None = None,
     *,
-    interfaces: Interfaces = "both",
+    interfaces: Interfaces | None = None,
 ) -> RenderPlan:
     """Choose the passes for a scene.
 
@@ -35,14 +36,13 @@ def plan(
         How to find thickness; None picks the cheapest way that is exact.
     capabilities : Capabilities, optional
         Of the machine; default: all.
-    interfaces : {"both", "front"}
-        Where rays bend: at the interface where they enter a body and at the one where they leave it, or only at the
-        first, which saves finding the second and is wrong for curved bodies.
+    interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
+        How to find the interfaces at which light refracts and reflects; None lets the planner pick.
 
     Raises
     ------
     InputError
-        If no available method can render the scene, or the camera is inside a body that has only a front interface.
+        If no available method can render the scene, or its interfaces cannot be found as asked for.
     """
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
@@ -59,11 +59,13 @@ def plan(
     if scene.overlap == "priority":
         require_clear_priorities(scene)
     if not capabilities.opengl:
-        return _plan_traced(scene, method, capabilities)
-    chosen = assembled(scene, *_choice(scene, method, capabilities, interfaces), capabilities)
+        return _plan_traced(scene, method, interfaces, capabilities)
+    sheets = method is not None and method.makes_sheets
+    bending, instead = chosen_interfaces(scene, interfaces, capabilities, sheets=sheets)
+    chosen = assembled(scene, *_choice(scene, method, capabilities, bending), bending, capabilities)
     if scatters(scene) and not capabilities.shader_storage:
         chosen = with_unlit_marked(scene, chosen)
-    return chosen if interfaces == "both" else with_one_interface(scene, chosen)
+    return with_fallback_told(chosen, instead) if instead else chosen
 
 
 def _choice(
@@ -113,14 +115,14 @@ def plan_over_backdrop(
     method: Method | None = None,
     capabilities: Capabilities | None = None,
     *,
-    interfaces: Interfaces = "both",
+    interfaces: Interfaces | None = None,
 ) -> RenderPlan:
     """Plan for a scene before a `Backdrop`, which another renderer has drawn.
 
     Raises
     ------
     InputError
-        As `plan`, and if the scene has opaque objects of its own.
+        As `plan`, and if the scene has opaque objects of its own, or interfaces are to be traced.
     """
     if scene.opaque:
         raise InputError(
@@ -128,7 +130,11 @@ def plan_over_backdrop(
             f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
             "leave them out, or to whoever draws the backdrop",
         )
-    chosen = plan(scene, method, capabilities, interfaces=interfaces)
+    check_interfaces(interfaces)
+    if interfaces is not None and interfaces.traced:
+        found = "what is drawn elsewhere has no mesh that a ray could meet"
+        raise InputError(f"{interfaces} before a backdrop", found, "use ScreenInterfaces()")
+    chosen = plan(scene, method, capabilities, interfaces=interfaces or ScreenInterfaces())
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
     return dataclasses.replace(
         chosen,
@@ -140,8 +146,11 @@ def plan_over_backdrop(
     )
 
 
-def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities) -> RenderPlan:
+def _plan_traced(
+    scene: Scene, method: Method | None, interfaces: Interfaces | None, capabilities: Capabilities
+) -> RenderPlan:
     """Plan for a renderer without OpenGL, which finds all surfaces on each ray, whatever the method."""
+    followed = _followed(scene, interfaces)
     chosen = method or FragmentLists()
     sheets = chosen.makes_sheets
     reason = "no OpenGL: all surfaces on each ray, in float64"
@@ -152,5 +161,10 @@ def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities
         PassSpec(PassName.SHADE, "sheets in order" if sheets else "the intervals between them in order, exactly"),
     )
     limits = (*(chosen.limits(scene) if sheets else open_limits(scene)), *mesh_limits(scene, chosen))
-    unmodelled = unmodelled_effects(scene, scattering=capabilities.scattering and scatters(scene))
-    return RenderPlan(chosen, passes, True, limits, unmodelled, traced=True)
+    unmodelled = unmodelled_effects(scene, scattering=capabilities.scattering and scatters(scene), interfaces=followed)
+    return RenderPlan(chosen, passes, True, limits, unmodelled, interfaces=followed, traced=True)
+
+
+def _followed(scene: Scene, interfaces: Interfaces | None) -> Interfaces | None:
+    """The interfaces that a renderer without OpenGL follows: none yet, whatever is asked for."""
+    return None

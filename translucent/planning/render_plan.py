@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
+from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
-
-#: Interfaces at which rays refract: where they enter and where they leave a body, or only where they enter.
-Interfaces: TypeAlias = Literal["both", "front"]
 
 
 @dataclass(frozen=True)
@@ -49,8 +46,8 @@ class RenderPlan:
         Where thickness, transmittance or emission are not exact, and why; empty for an exact plan.
     unmodelled : tuple of Note
         What the scene asks for and no pass renders.
-    interfaces : {"both", "front"}
-        Where rays bend, if anything in the scene bends them.
+    interfaces : Interfaces, optional
+        How interfaces are found; None where none changes light, or none is rendered.
     traced : bool
         Rays are traced on the processors, which finds all surfaces on each. Of the `method` only one thing counts
         then: whether bodies are sheets.
@@ -61,7 +58,7 @@ class RenderPlan:
     spectral: bool = False
     limits: tuple[Note, ...] = ()
     unmodelled: tuple[Note, ...] = ()
-    interfaces: Interfaces = "both"
+    interfaces: Interfaces | None = None
     traced: bool = False
 
     @property
@@ -106,7 +103,7 @@ class RenderPlan:
         return {
             "method": self.runs,
             "exact": self.exact,
-            "interfaces": self.interfaces,
+            "interfaces": None if self.interfaces is None else str(self.interfaces),
             "cost": round(self.cost, 2),
             "passes": [
                 {

@@ -100,7 +100,7 @@ class Method:
         return self
 
 
-def check_count(what: str, value: object, most: int) -> None:
-    """Raise `InputError` unless a value is a whole number from 1 to `most`."""
-    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= most:
-        raise InputError(f"{what} {value!r}", f"not a whole number in 1 to {most}", "give for example 8")
+def check_count(what: str, value: object, most: int, *, least: int = 1, example: int = 8) -> None:
+    """Raise `InputError` unless a value is a whole number from `least` to `most`."""
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise InputError(f"{what} {value!r}", f"not a whole number in {least} to {most}", f"give for example {example}")

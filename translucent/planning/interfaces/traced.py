@@ -1,0 +1,91 @@
+"""Traced interfaces: the first on each ray drawn, all others found by rays through the meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from translucent.planning.interfaces.base import DRAW_COST, ONE_DRAWN, Interfaces
+from translucent.planning.interfaces.places import picture_cuts, with_interfaces
+from translucent.planning.interfaces.words import effects_of, owners
+from translucent.planning.methods.base import check_count
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene, object_names
+
+#: Largest number of interfaces that a ray may meet: each takes a walk through the meshes.
+MAX_DEPTH = 64
+
+#: Largest number of forks: each doubles the rays.
+MAX_FORKS = 4
+
+#: Time of tracing, in depth-only draws of the same geometry; a guess, not measured.
+TRACE_COST = 6.0
+
+
+@dataclass(frozen=True)
+class TracedInterfaces(Interfaces):
+    """All interfaces that a ray meets, found by rays through the meshes: a tree of reflected and refracted ones.
+
+    The tree of Whitted 1980: at an interface the reflected ray takes Fresnel's share, the refracted one the rest (Born
+    & Wolf 1999, section 1.5). Bodies see themselves, each other and opaque objects, and may touch or hold the eye.
+
+    Parameters
+    ----------
+    depth : int
+        Interfaces that a ray may meet, from 1; behind the last one it sees the environment, as if nothing was ahead.
+    forks : int
+        Interfaces on a ray at which both the reflected and the refracted ray are followed, from 0. At all others the
+        stronger one is, and the weaker one sees the environment.
+    """
+
+    name: ClassVar[str] = "traced"
+    traced: ClassVar[bool] = True
+
+    depth: int = 8
+    forks: int = 2
+
+    def __post_init__(self) -> None:
+        check_count("TracedInterfaces depth", self.depth, MAX_DEPTH)
+        check_count("TracedInterfaces forks", self.forks, MAX_FORKS, least=0, example=2)
+
+    def refusal(self, scene: Scene) -> tuple[str, str] | None:
+        """Reason: rays of one picture start in different media, or media vary along a ray."""
+        solids = [body for body in scene.bodies if body.sheet_thickness is None]
+        if cut := [body for body in solids if picture_cuts(scene, body)]:
+            return (
+                f"the orthographic picture's plane, where rays start, cuts {object_names(cut)}",
+                "use ScreenInterfaces(), or move the camera outside",
+            )
+        if varying := [body for body in solids if body.density is not None]:
+            return (
+                f"{object_names(varying)}: the density varies, and rays cross media in one step",
+                "use ScreenInterfaces()",
+            )
+        return None
+
+    def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
+        """Passes: one draw of all bodies with interfaces, and one over pixels that traces."""
+        found = f"{owners(scene)}: normal and place of the first interface on each ray"
+        effects = effects_of(scene, bends=not straight, mirrored="what is around them")
+        traced = f"{effects}; rays are traced from there on, through at most {self._count}"
+        if self.forks:
+            forks = "the first" if self.forks == 1 else f"the first {self.forks}"
+            traced += f", and both ways at {forks}"
+        return (
+            PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
+            PassSpec(PassName.TRACED, traced, cost=TRACE_COST),
+        )
+
+    def unmodelled(self) -> list[Note]:
+        """Notes: what the tree leaves out."""
+        after = {0: "", 1: " after 1 fork"}.get(self.forks, f" after {self.forks} forks")
+        text = (
+            f"light that meets more than {self._count}, and the weaker of reflected and refracted light{after}: looked "
+            "up in the environment, as if nothing was ahead"
+        )
+        return [Note(NoteKind.CUT_OFF_PATHS, text)]
+
+    @property
+    def _count(self) -> str:
+        return "1 interface" if self.depth == 1 else f"{self.depth} interfaces"
