@@ -3,7 +3,7 @@
 // After Wyman 2005, "An approximate image-space approach for interactive refraction", whose guess of the path's length a
 // search along the refracted ray replaces.
 
-uniform sampler2D entered;      // interface towards the eye: normal, place
+uniform sampler2D entered;      // interface towards the eye: normal, axial depth
 #if !ONE_INTERFACE
 uniform sampler2D left;         // first interface away from it beyond
 #endif
@@ -13,15 +13,16 @@ const int EXIT_HALVINGS = 6;
 const int OPAQUE_STEPS = 16;
 const int OPAQUE_HALVINGS = 5;
 
-// Point at a place on the ray through a pixel.
-vec3 point_at(vec2 pixel, float place) {
+// Point at an axial depth on the ray through a pixel.
+vec3 point_at(vec2 pixel, float axial_depth) {
     vec2 ndc = 2.0 * pixel / frame_size.xy - 1.0;
-    float ahead = surface_ahead.x + place * surface_ahead.y;
+    float ahead = surface_ahead.x + axial_depth * surface_ahead.y;
     float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
     return ahead * ray_forward.xyz + spread * (ndc.x * surface_right.xyz - ndc.y * surface_up.xyz) - surface_off_axis.xyz;
 }
 
-// Where a point is in the picture: pixels right and down from the top left corner, and place. Behind the eye: no place.
+// Where a point is in the picture: pixels right and down from the top left corner, and axial depth. Behind the eye: outside
+// of it, and nearer than all.
 vec3 seen_at(vec3 point) {
     float ahead = dot(point, ray_forward.xyz);
     float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
@@ -47,11 +48,11 @@ ivec2 stored(ivec2 texel) {
 }
 
 #if !ONE_INTERFACE
-// Place where the first interval of a pixel ends: on the far interface, or on an opaque surface inside.
+// Axial depth where the first interval of a pixel ends: on the far interface, or on an opaque surface inside.
 float end_of_interval(ivec2 texel) {
     float last = texelFetch(left, texel, 0).w;
 #if OPAQUE
-    return min(last, texelFetch(opaque_place, texel, 0).r);
+    return min(last, texelFetch(opaque_axial_depth, texel, 0).r);
 #else
     return last;
 #endif
@@ -151,8 +152,8 @@ vec4 blurred_opaque(vec2 pixel, float width) {
 }
 
 bool is_behind_opaque(vec3 seen) {
-    float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
-    return place < NOTHING && seen.z >= place;
+    float axial_depth = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
+    return axial_depth < NOTHING && seen.z >= axial_depth;
 }
 #endif
 
@@ -166,8 +167,8 @@ vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
         float path = surface_reach * share * share;
         vec3 seen = seen_at(point + path * direction);
         if (!in_picture(seen.xy)) { break; }
-        float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
-        if (place < NOTHING && seen.z >= place && (seen.z - place) * surface_ahead.y <= 2.0 * (path - before)) {
+        float opaque = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
+        if (opaque < NOTHING && seen.z >= opaque && (seen.z - opaque) * surface_ahead.y <= 2.0 * (path - before)) {
             for (int half_way = 0; half_way < OPAQUE_HALVINGS; ++half_way) {
                 float middle = 0.5 * (before + path);
                 if (is_behind_opaque(seen_at(point + middle * direction))) { path = middle; } else { before = middle; }

@@ -60,8 +60,8 @@ float interface_reflectance(float cosine, float ior, float roughness) {
     float polished = fresnel_dielectric(cosine, ior);
     if (roughness == 0.0 || polished >= 1.0) { return polished; }
     float facing = fresnel_dielectric(1.0, ior);
-    vec2 rough = texture(reflectance_table, reflectance_place(cosine, roughness)).rg;
-    vec2 smooth_one = texture(reflectance_table, reflectance_place(cosine, 0.0)).rg;
+    vec2 rough = texture(reflectance_table, reflectance_coordinate(cosine, roughness)).rg;
+    vec2 smooth_one = texture(reflectance_table, reflectance_coordinate(cosine, 0.0)).rg;
     return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
 }
 
@@ -72,11 +72,11 @@ float refraction_roughness(float roughness, float ior) {
 }
 
 vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
-    vec4 place = light_place[light];
+    vec4 position = light_position[light];
     vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    vec3 towards = place.xyz - place.w * from_eye;
+    vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
-    irradiance = light_power[light].rgb / (place.w == 0.0 ? 1.0 : distance_m * distance_m);
+    irradiance = light_power[light].rgb / (position.w == 0.0 ? 1.0 : distance_m * distance_m);
     return towards / distance_m;
 }
 
@@ -235,8 +235,8 @@ void main() {
     }
 
     vec3 normal = front.xyz;
-    float place = starts_inside ? surface_eye_place : front.w;
-    vec3 point = point_at(pixel, place);
+    float axial_depth = starts_inside ? surface_eye_axial_depth : front.w;
+    vec3 point = point_at(pixel, axial_depth);
     float cosine = clamp(-dot(normal, ray), 0.0, 1.0);
     float reflectance = starts_inside ? 0.0 : interface_reflectance(cosine, finish.ior, finish.roughness);
     vec3 mirrored_share = vec3(reflectance);
@@ -259,7 +259,7 @@ void main() {
 #if ONE_INTERFACE
         const float first_interval = 0.0; // nothing asks how long it is
 #else
-        float first_interval = back.w < NOTHING ? (end_of_interval(texel) - place) * surface_ahead.y * advance : -1.0;
+        float first_interval = back.w < NOTHING ? (end_of_interval(texel) - axial_depth) * surface_ahead.y * advance : -1.0;
 #endif
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;
