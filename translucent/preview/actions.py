@@ -57,8 +57,8 @@ class Replace:
 
 
 @dataclass(frozen=True)
-class View:
-    """Place the camera."""
+class SetOrbit:
+    """Set the camera's orbit; None: no camera yet."""
 
     orbit: Orbit | None
 
@@ -88,10 +88,10 @@ class Zoom:
     down: float = 0.0
 
 
-Action = Change | Open | ChoosePreset | Adopt | Replace | View | Turn | Pan | Zoom
+Action = Change | Open | ChoosePreset | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
 
 #: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
-CAMERA_ACTIONS = (View, Turn, Pan, Zoom)
+CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
 
 #: Fields that define the medium by a color at a distance, or by coefficients.
 _BY_COLOR = ("color", "distance")
@@ -118,7 +118,7 @@ def apply(document: Document, action: Action) -> Document:
             return dataclasses.replace(document, material=action.material)
         case Replace():
             return action.document
-        case View():
+        case SetOrbit():
             return dataclasses.replace(document, orbit=action.orbit)
         case _:
             if document.orbit is None:  # nothing is loaded yet, so that there is nothing to move
