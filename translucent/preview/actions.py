@@ -81,7 +81,7 @@ class Pan:
 
 @dataclass(frozen=True)
 class Zoom:
-    """Get closer by a factor, to what is at a place in the picture: heights right of and below its center."""
+    """Get closer by a factor, to what is at a position in the picture: heights right of and below its center."""
 
     factor: float
     right: float = 0.0
