@@ -14,17 +14,17 @@ import translucent as tl
 from translucent.assets import mesh_path
 
 colors = ((0.75, 0.03, 0.05), (0.9, 0.55, 0.02), (0.1, 0.62, 0.08))
-places = ((-0.0135, 0.0, 0.001), (0.0, 0.0, 0.004), (0.0135, 0.0, 0.0))
+positions = ((-0.0135, 0.0, 0.001), (0.0, 0.0, 0.004), (0.0135, 0.0, 0.0))
 angles = (-18.0, 0.0, 18.0)
 
 bear = tl.load_mesh(mesh_path("bear"))
 gummy = tl.Surface(roughness=0.22)
 bears = []
-for color, place, angle in zip(colors, places, np.radians(angles), strict=True):
+for color, position, angle in zip(colors, positions, np.radians(angles), strict=True):
     cos, sin = np.cos(angle), np.sin(angle)
     transform = np.eye(4)
     transform[:3, :3] = [[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]
-    transform[:3, 3] = place
+    transform[:3, 3] = position
     medium = tl.Medium.from_color(color, distance=0.006, ior=1.4)
     bears.append(tl.Object(bear, medium, transform, surface=gummy))
 

@@ -135,9 +135,9 @@ def damaged_bytes(data: bytes, chance: random.Random) -> bytes:
 
 
 def _exchange_number(made: bytearray, chance: random.Random) -> None:
-    places = [i for i in range(min(len(made), 4096)) if 48 <= made[i] <= 57]
-    if places:
-        start = end = chance.choice(places)
+    digits = [i for i in range(min(len(made), 4096)) if 48 <= made[i] <= 57]
+    if digits:
+        start = end = chance.choice(digits)
         while end < len(made) and made[end] in b"0123456789.":
             end += 1
         made[start:end] = chance.choice(_NUMBERS).encode()

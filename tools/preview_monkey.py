@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.media.presets import presets
-from translucent.preview.actions import Change, ChoosePreset, Pan, Turn, View, Zoom
+from translucent.preview.actions import Change, ChoosePreset, Pan, SetOrbit, Turn, Zoom
 from translucent.preview.document import RANGES, Document, Model, Orbit
 from translucent.preview.scenes import method_of
 from translucent.preview.stage import Stage
@@ -141,7 +141,7 @@ class Monkey:
                     Turn(r.uniform(-300, 300), r.uniform(-100, 100)),
                     Pan(r.uniform(-2, 2), r.uniform(-2, 2)),
                     Zoom(10 ** r.uniform(-2, 2), r.uniform(-1, 1), r.uniform(-0.5, 0.5)),
-                    View(Orbit((0.0, 0.05, 0.0), r.uniform(-180, 180), r.uniform(-89, 89), 10 ** r.uniform(-2, 1))),
+                    SetOrbit(Orbit((0.0, 0.05, 0.0), r.uniform(-180, 180), r.uniform(-89, 89), 10 ** r.uniform(-2, 1))),
                 )
             )
         )

@@ -1,4 +1,4 @@
-// Vertices of a body, given as offsets from its center so that float32 resolves them whatever their place in the world.
+// Vertices of a body, given as offsets from its center so that float32 resolves them wherever in the world they are.
 
 #include <Body>
 

@@ -1,4 +1,4 @@
-// Where a ray crosses a surface, in one word of 30 bits. Words sort by place, then slot, then side, so that the order of
+// Where a ray crosses a surface, in one word of 30 bits. Words sort by axial depth, then slot, then side, so that the order of
 // crossings is an order of numbers: for atomic operations as it is, and for blending as a float.
 
 #include <constants>
@@ -6,17 +6,17 @@
 
 const uint NO_CROSSING = 0xffffffffu;
 
-uint place_steps() {
-    return 1u << uint(PLACE_BITS - slot_bits);
+uint axial_steps() {
+    return 1u << uint(AXIAL_BITS - slot_bits);
 }
 
-uint step_of_place(float place) {
-    uint steps = place_steps();
-    return min(uint(clamp(place, 0.0, 1.0) * float(steps)), steps - 1u);
+uint step_of_axial_depth(float axial_depth) {
+    uint steps = axial_steps();
+    return min(uint(clamp(axial_depth, 0.0, 1.0) * float(steps)), steps - 1u);
 }
 
-uint pack_crossing(float place, int slot, bool leaves) {
-    return (((step_of_place(place) << uint(slot_bits)) | uint(slot)) << 1) | (leaves ? 1u : 0u);
+uint pack_crossing(float axial_depth, int slot, bool leaves) {
+    return (((step_of_axial_depth(axial_depth) << uint(slot_bits)) | uint(slot)) << 1) | (leaves ? 1u : 0u);
 }
 
 uint crossing_step(uint word) {

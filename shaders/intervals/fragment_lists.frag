@@ -2,7 +2,7 @@
 // counted, so that the host can draw again with a larger one.
 
 #include <View>
-#include "intervals/place.glsl"
+#include "intervals/fragment_crossing.glsl"
 #include "intervals/lists.glsl"
 
 uniform int cell_offset;  // of the first pixel's head
@@ -12,17 +12,17 @@ layout(location = 0) out float misplaced;  // maximum blending keeps that of the
 #endif
 
 void main() {
-    float place = fragment_place();
+    float axial_depth = fragment_axial_depth();
 #if GRADIENT
-    vec2 slope = vec2(dFdx(place), dFdy(place));
+    vec2 slope = vec2(dFdx(axial_depth), dFdy(axial_depth));
 #else
-    misplaced = misplaced_places();
+    misplaced = misplaced_axial_depth();
 #endif
-    if (place > last_place()) { discard; }
+    if (axial_depth > last_axial_depth()) { discard; }
     uint node = atomicAdd(node_count, 1u);
     if (node < uint(nodes.length())) {
         uint pixel = uint(cell_offset) + pixel_index(gl_FragCoord.xy, frame_size.x);
-        uvec2 entry = uvec2(fragment_word(place), atomicExchange(heads[pixel], node + 1u));
+        uvec2 entry = uvec2(fragment_word(axial_depth), atomicExchange(heads[pixel], node + 1u));
 #if GRADIENT
         nodes[node] = uvec4(entry, floatBitsToUint(slope));
 #else

@@ -10,7 +10,7 @@ layout(std430, binding = HEADS_BINDING) buffer Heads { uint heads[]; };  // link
 #else
 #define NODE uvec2
 #endif
-layout(std430, binding = NODES_BINDING) buffer Nodes { NODE nodes[]; };  // word, link to the next; how the place changes across pixels
+layout(std430, binding = NODES_BINDING) buffer Nodes { NODE nodes[]; };  // word, link to the next; how the axial depth changes across pixels
 
 const uint END_OF_LIST = 0u;
 

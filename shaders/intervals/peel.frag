@@ -4,7 +4,7 @@
 // one; its alpha counts all crossings, and the excess of exits over entries for a body whose surface the eye is on; its
 // blue keeps how far the rasterizer may have misplaced the steepest face, negative since the minimum is kept.
 
-#include "intervals/place.glsl"
+#include "intervals/fragment_crossing.glsl"
 
 #if !FIRST
 uniform sampler2D previous;
@@ -14,12 +14,12 @@ layout(location = 0) out vec4 found;
 
 void main() {
     // What an opaque surface hides is moved onto it: all walks pass all crossings, and there they pass them in no time.
-    uint word = fragment_word(min(fragment_place(), last_place()));
+    uint word = fragment_word(min(fragment_axial_depth(), last_axial_depth()));
     float near = sortable(word);
     float far = sortable(reversed_word(word));
 #if FIRST
     float excess = starts_unknown == 0 ? 0.0 : gl_FrontFacing ? -1.0 : 1.0;
-    found = vec4(near, far, -misplaced_places(), 1.0 + PEEL_UNIT * excess);
+    found = vec4(near, far, -misplaced_axial_depth(), 1.0 + PEEL_UNIT * excess);
 #else
     vec2 peeled = texelFetch(previous, ivec2(gl_FragCoord.xy), 0).rg;
     bool between = true;

@@ -38,7 +38,7 @@ Peel begin_peel(float steepest, float alpha, float advance) {
     peel.far = peel.near;
     peel.far.inside_out = 0.0;
     peel.far.winding = none;
-    peel.far.place = place_steps() - 1u;
+    peel.far.axial_step = axial_steps() - 1u;
     peel.counted = alpha - PEEL_UNIT * excess;
     peel.kept = 0.0;
     return peel;
@@ -54,8 +54,8 @@ bool same_windings(Peel peel) {
 // One walk from start to end; the segment between the two is left out where they do not agree what fills it.
 Walk join_peel(Peel peel, float metres_per_step) {
     Walk walk = peel.near;
-    if (same_windings(peel) && peel.far.place > walk.place) {
-        add_segment(walk, float(peel.far.place - walk.place) * metres_per_step, false);
+    if (same_windings(peel) && peel.far.axial_step > walk.axial_step) {
+        add_segment(walk, float(peel.far.axial_step - walk.axial_step) * metres_per_step, false);
     }
     walk.emitted += transmittance(walk.optical_depth) * peel.far.emitted;
     walk.optical_depth += peel.far.optical_depth;
@@ -75,10 +75,10 @@ uvec4 pack_windings(int winding[SLOTS]) {
 }
 
 void write_peel(Peel peel) {
-    out_optical_depth = vec4(peel.near.optical_depth, sortable(peel.near.place));
+    out_optical_depth = vec4(peel.near.optical_depth, sortable(peel.near.axial_step));
     out_emitted = vec4(peel.near.emitted, peel.near.thickness);
     out_layers = vec4(peel.counted, peel.kept, peel.near.inside_out, peel.far.inside_out);
-    out_far_depth = vec4(peel.far.optical_depth, sortable(peel.far.place));
+    out_far_depth = vec4(peel.far.optical_depth, sortable(peel.far.axial_step));
     out_far_emitted = vec4(peel.far.emitted, peel.far.thickness);
     out_near_winding = pack_windings(peel.near.winding);
     out_far_winding = pack_windings(peel.far.winding);
@@ -88,7 +88,7 @@ void write_peel(Peel peel) {
 #if !BEGIN
 Walk read_walk(vec4 depth, vec4 emitted, uvec4 bits, float inside_out) {
     Walk walk;
-    walk.place = word_of_sortable(depth.a);
+    walk.axial_step = word_of_sortable(depth.a);
     for (int slot = 0; slot < SLOTS; ++slot) {
         walk.winding[slot] = int((bits[slot / 4] >> uint(8 * (slot % 4))) & 255u) - 128;
     }

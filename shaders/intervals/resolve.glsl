@@ -4,7 +4,7 @@
 #include "intervals/walk.glsl"
 
 #if OPAQUE
-uniform sampler2D opaque_place;
+uniform sampler2D opaque_axial_depth;
 #endif
 
 layout(location = 0) out vec4 out_optical_depth;  // alpha: 1 where the walk ends outside
@@ -17,13 +17,13 @@ float first_exit = NOTHING;
 float maybe_exit = NOTHING;
 
 void note_exit(Walk walk) {
-    float place = float(walk.place) / float(place_steps());
+    float axial_depth = float(walk.axial_step) / float(axial_steps());
     if (first_exit < NOTHING) { return; }
-    if (maybe_exit < NOTHING && place - maybe_exit > TOUCHING) {
+    if (maybe_exit < NOTHING && axial_depth - maybe_exit > TOUCHING) {
         first_exit = maybe_exit;
         return;
     }
-    maybe_exit = is_outside(walk) ? place : NOTHING;
+    maybe_exit = is_outside(walk) ? axial_depth : NOTHING;
 }
 #endif
 
@@ -47,13 +47,13 @@ void write_walk(Walk walk, bool sound, float counted, float kept) {
 void end_walk(Walk walk, float metres_per_step, float counted, float kept) {
     bool sound = counted == kept;
 #if OPAQUE
-    float last = texelFetch(opaque_place, ivec2(gl_FragCoord.xy), 0).r;
+    float last = texelFetch(opaque_axial_depth, ivec2(gl_FragCoord.xy), 0).r;
     if (last <= 1.0) {
         // Nothing is known of what lies behind: what has been entered may stay so.
         sound = sound && !is_negative(walk);
-        uint place = step_of_place(last);
-        if (sound && place > walk.place) {
-            add_segment(walk, float(place - walk.place) * metres_per_step, false);
+        uint axial_step = step_of_axial_depth(last);
+        if (sound && axial_step > walk.axial_step) {
+            add_segment(walk, float(axial_step - walk.axial_step) * metres_per_step, false);
         }
         write_walk(walk, sound, counted, kept);
         return;

@@ -1,5 +1,5 @@
-// How often the medium of a slot fills a place with the given winding numbers. Left before it is entered, as next to a
-// silhouette, where rounding has the two change places, it does not.
+// How often the medium of a slot fills a point with the given winding numbers. Left before it is entered, as next to a
+// silhouette, where rounding has the two change their order, it does not.
 
 #include <Media>
 #if VARIES

@@ -17,8 +17,8 @@
 #endif
 
 struct Walk {
-    uint place;              // in steps
-    int winding[SLOTS];      // how often the bodies of each slot are wound around this place
+    uint axial_step;         // of `axial_steps` to the end of the media
+    int winding[SLOTS];      // how often the bodies of each slot are wound around this point
     vec3 optical_depth;
     vec3 emitted;            // radiance: towards the start for a walk that goes on, from the end for one that comes back
     float thickness;
@@ -28,7 +28,7 @@ struct Walk {
 struct Contents {
     vec3 extinction;
     vec3 emission;
-    float count;             // how often thickness counts this place
+    float count;             // how often thickness counts this point
     bool inside_out;
 };
 
@@ -55,7 +55,7 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
     vec3 added = emitted_radiance(mix.emission, mix.extinction, metres);
 #if SCATTER
     if (mix.count > 0.0) {
-        ViewRay ray = ray_from(float(walk.place) / float(place_steps()));
+        ViewRay ray = ray_from(float(walk.axial_step) / float(axial_steps()));
         float turns[SLOTS] = all_turns(walk.winding);
 #if MARCH
         Marched march = marched(turns, ray, metres, mix.extinction, mix.emission, transmittance(walk.optical_depth));
@@ -79,12 +79,12 @@ void add_segment(inout Walk walk, float metres, bool backwards) {
 
 // Goes to a crossing, and over it as many times as there are faces alike.
 void cross_surface(inout Walk walk, uint word, int times, bool backwards, float metres_per_step) {
-    uint place = crossing_step(word);
-    uint steps = backwards ? walk.place - place : place - walk.place;
+    uint axial_step = crossing_step(word);
+    uint steps = backwards ? walk.axial_step - axial_step : axial_step - walk.axial_step;
     if (steps > 0u) {
         add_segment(walk, float(steps) * metres_per_step, backwards);
     }
-    walk.place = place;
+    walk.axial_step = axial_step;
     int turns = crossing_leaves(word) == backwards ? times : -times;
     int crossed = crossing_slot(word);
     for (int slot = 0; slot < SLOTS; ++slot) {
@@ -94,10 +94,10 @@ void cross_surface(inout Walk walk, uint word, int times, bool backwards, float 
 
 // A walk that starts with the given excess of exits over entries ahead, from which an unknown start is found. As many
 // metres as the rasterizer may have misplaced a surface are no surface inside out: next to a silhouette, the two faces that
-// meet there change places.
+// meet there change their order.
 Walk walk_from_start(int excess[SLOTS], float misplaced) {
     Walk walk;
-    walk.place = 0u;
+    walk.axial_step = 0u;
     walk.optical_depth = vec3(0.0);
     walk.emitted = vec3(0.0);
     walk.thickness = 0.0;
@@ -109,12 +109,12 @@ Walk walk_from_start(int excess[SLOTS], float misplaced) {
 }
 
 float metres_of_a_step(float advance) {
-    return place_metres * advance / float(place_steps());
+    return media_length * advance / float(axial_steps());
 }
 
-// How far two faces may have changed places, by how many places the steepest of the ray may be misplaced.
-float misplaced_metres(float places, float advance) {
-    return 2.0 * places * place_metres * advance;
+// How far two faces may have changed their order, by how much axial depth the steepest of the ray may be misplaced.
+float misplaced_metres(float axial_depth, float advance) {
+    return 2.0 * axial_depth * media_length * advance;
 }
 
 bool is_outside(Walk walk) {

@@ -1,4 +1,4 @@
-// Relative density from place to place. Inputs: places along an axis of a body's unit box, 0 to 1; densities without unit.
+// Relative density that varies in space. Inputs: positions along an axis of a body's unit box, 0 to 1; densities without unit.
 // Pure: needs only lib/optics.glsl. Each function is the float32 twin of the same name in translucent/media/density.py.
 
 #include "lib/optics.glsl"
@@ -15,7 +15,7 @@ float exponential_density(float along, float densest, float log_ratio) {
     return densest * transmittance(vec3(abs(log_ratio) * (log_ratio > 0.0 ? 1.0 - u : u))).x;
 }
 
-// Mean of exponential_density on a straight line whose ends are at these places of the axis, in closed form.
+// Mean of exponential_density on a straight line whose ends are at these positions on the axis, in closed form.
 float exponential_density_mean(float from, float to, float densest, float log_ratio) {
     float a = clamp(from, 0.0, 1.0);
     float b = clamp(to, 0.0, 1.0);
@@ -24,7 +24,7 @@ float exponential_density_mean(float from, float to, float densest, float log_ra
 }
 
 // Between the corners of a cell. low, high: those at its lower and upper end along x, in the order of (y, z) = (low, low),
-// (low, high), (high, low), (high, high). share: place in the cell, 0 to 1 along each axis.
+// (low, high), (high, low), (high, high). share: position in the cell, 0 to 1 along each axis.
 float trilinear(vec4 low, vec4 high, vec3 share) {
     vec4 face = mix(low, high, share.x);
     vec2 edge = mix(face.xy, face.zw, share.y);

@@ -1,4 +1,4 @@
-// The procedural environments, as shares between two radiances, and places in pictures of all directions. Pure.
+// The procedural environments, as shares between two radiances, and texture coordinates in pictures of all directions. Pure.
 // Each function is the float32 twin of the same name in translucent/scene/environment.py.
 
 #include <constants>
@@ -21,7 +21,7 @@ float checkerboard_share(vec2 backdrop, float tiles) {
     return mod(cell.x + cell.y, 2.0);
 }
 
-// Place of a direction in an equirectangular picture, right and down, 0 to 1; u wraps around. Straight up (+Y) is v = 0,
+// Texture coordinates of a direction in an equirectangular picture, right and down, 0 to 1; u wraps around. Straight up (+Y) is v = 0,
 // -Z is u = 1/2. turn: of the picture about +Y, as a share of a full turn, counterclockwise as seen from above.
 vec2 equirectangular_uv(vec3 direction, float turn) {
     float away = length(direction.xz);

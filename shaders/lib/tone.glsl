@@ -23,9 +23,9 @@ vec3 tone_neutral(vec3 linear) {
 }
 
 // From 0 at 0 to 1 at 1: middle gray becomes 1/2, and the slope there is AGX_SLOPE.
-float agx_sigmoid(float place) {
+float agx_sigmoid(float share) {
     float pivot = -AGX_LOW / (AGX_HIGH - AGX_LOW);
-    float x = place - pivot;
+    float x = share - pivot;
     float power = x < 0.0 ? AGX_TOE : AGX_SHOULDER;
     float reach = x < 0.0 ? pivot : 1.0 - pivot;
     float bend = (pow(2.0 * AGX_SLOPE * reach, power) - 1.0) * pow(abs(x) / reach, power);
@@ -38,8 +38,8 @@ vec3 tone_agx(vec3 linear) {
     float own = 1.0 - dot(AGX_MIX, vec3(1.0));
     vec3 narrowed = own * color + dot(AGX_MIX, color);
     vec3 stops = log2(clamp(narrowed / AGX_MIDDLE_GRAY, exp2(AGX_LOW), exp2(AGX_HIGH)));
-    vec3 places = (stops - AGX_LOW) / (AGX_HIGH - AGX_LOW);
-    vec3 encoded = vec3(agx_sigmoid(places.r), agx_sigmoid(places.g), agx_sigmoid(places.b));
+    vec3 shares = (stops - AGX_LOW) / (AGX_HIGH - AGX_LOW);
+    vec3 encoded = vec3(agx_sigmoid(shares.r), agx_sigmoid(shares.g), agx_sigmoid(shares.b));
     vec3 widened = (encoded - dot(AGX_MIX, encoded)) / own;
     return pow(clamp(widened, 0.0, 1.0), vec3(AGX_DISPLAY));
 }

@@ -32,7 +32,7 @@ bool has(vec4 trust, float flag) {
     return mod(floor(trust.r / flag), 2.0) == 1.0;
 }
 
-vec3 shown(ivec2 place, sampler2D light, vec4 depths, vec4 trust) {
+vec3 shown(ivec2 texel, sampler2D light, vec4 depths, vec4 trust) {
     bool covered = has(trust, FLAG_COVERED), valid = has(trust, FLAG_VALID);
 #if MODE == 1
     float share = clamp(depths.a / thickest, 0.0, 1.0) * 255.0;
@@ -41,7 +41,7 @@ vec3 shown(ivec2 place, sampler2D light, vec4 depths, vec4 trust) {
 #elif MODE == 2
     return linear_to_srgb(exp(-min(depths.rgb, 80.0)));
 #else
-    vec4 summed = texelFetch(light, place, 0);
+    vec4 summed = texelFetch(light, texel, 0);
     vec3 picture = develop(summed.rgb / max(summed.a, 1.0), stops);
 #if MODE == 3
     vec3 dimmed = vec3(0.35 * luminance(picture));
@@ -70,8 +70,8 @@ ivec2 kept(ivec2 pixel, ivec2 size, int shift, int known) {
 }
 
 int within(ivec2 pixel, int shift) {
-    ivec2 place = pixel & ((1 << shift) - 1);
-    return place.x + (place.y << shift);
+    ivec2 phase = pixel & ((1 << shift) - 1);
+    return phase.x + (phase.y << shift);
 }
 
 void main() {

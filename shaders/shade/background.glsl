@@ -3,14 +3,14 @@
 #include "lib/environment.glsl"
 
 #if OPAQUE
-uniform sampler2D opaque_place;
+uniform sampler2D opaque_axial_depth;
 uniform sampler2D opaque_radiance;
 #endif
 #if SEEN_MAP
 uniform sampler2D seen_map;
 #endif
 
-// The environment as it is seen. at: place in the picture, right and down, in its heights; ray: unit vector.
+// The environment as it is seen. at: position in the picture, right and down, in its heights; ray: unit vector.
 vec3 seen_environment(vec2 at, vec3 ray) {
 #if SEEN_MAP
     return seen_scale * textureLod(seen_map, equirectangular_uv(ray, seen_turn), 0.0).rgb;
@@ -28,7 +28,7 @@ vec3 seen_environment(vec2 at, vec3 ray) {
 // What a straight ray meets.
 vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
 #if OPAQUE
-    if (texelFetch(opaque_place, texel, 0).r < NOTHING) {
+    if (texelFetch(opaque_axial_depth, texel, 0).r < NOTHING) {
         return texelFetch(opaque_radiance, texel, 0).rgb;
     }
 #endif

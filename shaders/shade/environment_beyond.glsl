@@ -1,15 +1,16 @@
 // Points of the scene in the picture, and the environment along rays that have left a body. Positions count from the center
 // of the media. Needs <View>, <Surfaces>, background.glsl and environment_light.glsl.
 
-// Point at a place on the ray through a pixel.
-vec3 point_at(vec2 pixel, float place) {
+// Point at an axial depth on the ray through a pixel.
+vec3 point_at(vec2 pixel, float axial_depth) {
     vec2 ndc = 2.0 * pixel / frame_size.xy - 1.0;
-    float ahead = surface_ahead.x + place * surface_ahead.y;
+    float ahead = surface_ahead.x + axial_depth * surface_ahead.y;
     float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
     return ahead * ray_forward.xyz + spread * (ndc.x * surface_right.xyz - ndc.y * surface_up.xyz) - surface_off_axis.xyz;
 }
 
-// Where a point is in the picture: pixels right and down from the top left corner, and place. Behind the eye: no place.
+// Where a point is in the picture: pixels right and down from the top left corner, and axial depth. Behind the eye: outside
+// of it, and nearer than all.
 vec3 seen_at(vec3 point) {
     float ahead = dot(point, ray_forward.xyz);
     float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;

@@ -22,6 +22,6 @@ vec3 environment_irradiance(vec3 normal) {
 }
 
 // Where the table of reflectance has its entry: both ends of cosine and roughness are centers of texels.
-vec2 reflectance_place(float cosine, float roughness) {
+vec2 reflectance_coordinate(float cosine, float roughness) {
     return (vec2(cosine, roughness) * (REFLECTANCE_TABLE_SIZE - 1.0) + 0.5) / REFLECTANCE_TABLE_SIZE;
 }

@@ -1,4 +1,4 @@
-// The interface of a body where a ray first enters it, or first leaves one: its normal, place and material.
+// The interface of a body where a ray first enters it, or first leaves one: its normal, axial depth and material.
 // BACK: where it leaves; BEYOND: farther than what has been entered, or else ahead of the eye; EXITS: where the intervals
 // say that it leaves all bodies. HOLES: of a sheet whose alpha makes some.
 
@@ -10,13 +10,13 @@
 #include "shade/surface_textures.glsl"
 
 #if OPAQUE
-uniform sampler2D opaque_place;
+uniform sampler2D opaque_axial_depth;
 #endif
 #if BEYOND
 uniform sampler2D entered;
 #endif
 #if EXITS
-uniform sampler2D ordered_layers;  // alpha: place where the ray first leaves all bodies
+uniform sampler2D ordered_layers;  // alpha: axial depth where the ray first leaves all bodies
 #endif
 uniform vec4 surface_color;  // w: transmission
 uniform float surface_roughness;
@@ -34,7 +34,7 @@ const vec4 vertex_color = vec4(1.0);
 uniform float hole_below;
 #endif
 
-layout(location = 0) out vec4 out_normal;  // unit; w: place
+layout(location = 0) out vec4 out_normal;  // unit; w: axial depth
 layout(location = 1) out vec4 out_surface;  // object, roughness, transmission, variance of normals
 #if !BACK
 layout(location = 2) out vec4 out_color;  // w: share of the light of the environment that reaches it
@@ -44,34 +44,34 @@ void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
     vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
     float variance = normal_variance(normal);
-    float roughness = surface_roughness * texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, surface_uv)).g;
-    float transmission = surface_color.w * texture(transmission_texture, picture_place(TRANSMISSION_TEXTURE, surface_uv)).r;
+    float roughness = surface_roughness * texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, surface_uv)).g;
+    float transmission = surface_color.w * texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, surface_uv)).r;
 #if !BACK
-    vec4 painted = vertex_color * texture(color_texture, picture_place(COLOR_TEXTURE, surface_uv));
+    vec4 painted = vertex_color * texture(color_texture, texture_coordinate(COLOR_TEXTURE, surface_uv));
     vec4 tint = vec4(surface_color.rgb * painted.rgb, unoccluded(surface_uv));
 #if HOLES
     if (painted.a < hole_below) { discard; }
 #endif
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
-    float place = axial * place_scale + place_start;
+    float axial_depth = axial * axial_depth_scale + axial_depth_start;
     ivec2 texel = ivec2(gl_FragCoord.xy);
 #if OPAQUE && !BACK
-    if (place > texelFetch(opaque_place, texel, 0).r) { discard; }
+    if (axial_depth > texelFetch(opaque_axial_depth, texel, 0).r) { discard; }
 #endif
 #if EXITS
-    if (place < texelFetch(ordered_layers, texel, 0).a - TOUCHING) { discard; }
+    if (axial_depth < texelFetch(ordered_layers, texel, 0).a - TOUCHING) { discard; }
 #elif BEYOND
-    if (place < texelFetch(entered, texel, 0).w) { discard; }
+    if (axial_depth < texelFetch(entered, texel, 0).w) { discard; }
 #endif
-    gl_FragDepth = clamp(place, 0.0, 1.0);
+    gl_FragDepth = clamp(axial_depth, 0.0, 1.0);
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
     // Interpolated normals may look away from the eye where the faces do not: then the interface is seen edge-on.
     normal = (gl_FrontFacing ? normal : -normal);
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
-    out_normal = vec4(normal, place);
+    out_normal = vec4(normal, axial_depth);
     out_surface = vec4(float(object), clamp(roughness, 0.0, 1.0), transmission, variance);
 #if !BACK
     out_color = tint;

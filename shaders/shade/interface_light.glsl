@@ -38,8 +38,8 @@ float interface_reflectance(float cosine, float ior, float roughness) {
     float polished = fresnel_dielectric(cosine, ior);
     if (roughness == 0.0 || polished >= 1.0) { return polished; }
     float facing = fresnel_dielectric(1.0, ior);
-    vec2 rough = texture(reflectance_table, reflectance_place(cosine, roughness)).rg;
-    vec2 smooth_one = texture(reflectance_table, reflectance_place(cosine, 0.0)).rg;
+    vec2 rough = texture(reflectance_table, reflectance_coordinate(cosine, roughness)).rg;
+    vec2 smooth_one = texture(reflectance_table, reflectance_coordinate(cosine, 0.0)).rg;
     return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
 }
 
@@ -50,11 +50,11 @@ float refraction_roughness(float roughness, float ior) {
 }
 
 vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
-    vec4 place = light_place[light];
+    vec4 position = light_position[light];
     vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    vec3 towards = place.xyz - place.w * from_eye;
+    vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
-    irradiance = light_power[light].rgb / (place.w == 0.0 ? 1.0 : distance_m * distance_m);
+    irradiance = light_power[light].rgb / (position.w == 0.0 ? 1.0 : distance_m * distance_m);
     return towards / distance_m;
 }
 

@@ -13,9 +13,9 @@
 #include "intervals/last_axial.glsl"
 #endif
 #if GLOW
-uniform sampler2D entered;  // w: place of the interface where a ray first enters a body
+uniform sampler2D entered;  // w: axial depth of the interface where a ray first enters a body
 #elif BODIES
-uniform sampler2D fronts;   // place where a ray first meets one
+uniform sampler2D fronts;   // axial depth where a ray first meets one
 #endif
 #if !GLOW
 uniform float layer_opacity;
@@ -42,12 +42,12 @@ void main() {
     // What lies on an opaque surface is seen, also where rounding puts it behind.
     if (axial > last_axial() + sheet_tolerance) { discard; }
 #endif
-    float place = axial * place_scale + place_start;
-    // A scene that is flat has no depth to count places in.
-    float touching = TOUCHING + sheet_tolerance * place_scale;
+    float axial_depth = axial * axial_depth_scale + axial_depth_start;
+    // A scene that is flat has no length to count axial depths by.
+    float touching = TOUCHING + sheet_tolerance * axial_depth_scale;
     in_front = behind = vec4(0.0);
 #if GLOW
-    if (abs(place - texelFetch(entered, ivec2(gl_FragCoord.xy), 0).w) > touching) { discard; }
+    if (abs(axial_depth - texelFetch(entered, ivec2(gl_FragCoord.xy), 0).w) > touching) { discard; }
     in_front.rgb = min(finish.emitted, vec3(NOTHING));
 #else
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
@@ -59,7 +59,7 @@ void main() {
     float share = layer_opacity * finish.opacity;
     vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_eye), vec3(NOTHING)), share);
 #if BODIES
-    if (place > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
+    if (axial_depth > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
         behind = shown;
         return;
     }

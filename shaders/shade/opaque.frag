@@ -26,7 +26,7 @@ const vec4 vertex_color = vec4(1.0);
 #endif
 #endif
 
-layout(location = 0) out float opaque_place;
+layout(location = 0) out float opaque_axial_depth;
 layout(location = 1) out vec4 radiance;
 
 #if !SURFACE
@@ -41,11 +41,11 @@ vec3 environment_irradiance(vec3 normal) {
 }
 
 vec3 irradiance_from(int light, vec3 normal) {
-    vec4 place = light_place[light];
-    vec3 towards = place.xyz - place.w * from_eye;
+    vec4 position = light_position[light];
+    vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
     float facing = max(dot(towards / distance_m, normal), 0.0);
-    return light_power[light].rgb * (place.w == 0.0 ? facing : facing / distance_m / distance_m);
+    return light_power[light].rgb * (position.w == 0.0 ? facing : facing / distance_m / distance_m);
 }
 
 vec3 diffuse_radiance(vec3 normal) {
@@ -63,8 +63,8 @@ void main() {
     if (finish.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
-    opaque_place = axial * place_scale + place_start;
-    gl_FragDepth = clamp((opaque_place - opaque_range.x) * opaque_range.y, 0.0, 1.0);
+    opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;
+    gl_FragDepth = clamp((opaque_axial_depth - opaque_range.x) * opaque_range.y, 0.0, 1.0);
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
 #if SURFACE

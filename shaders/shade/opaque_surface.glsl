@@ -26,11 +26,11 @@ struct OpaqueFinish {
 };
 
 // Of a fragment; takes derivatives. vertex: color and opacity of the mesh there.
-OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 place, vec2 uv, vec4 vertex) {
-    vec4 painted = vertex * texture(color_texture, picture_place(COLOR_TEXTURE, uv));
-    vec4 rough = texture(roughness_texture, picture_place(ROUGHNESS_TEXTURE, uv));
-    vec3 emitted = opaque_emissive * texture(emissive_texture, picture_place(EMISSIVE_TEXTURE, uv)).rgb;
-    vec3 mapped = mapped_normal(normal, place, uv);
+OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 position, vec2 uv, vec4 vertex) {
+    vec4 painted = vertex * texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv));
+    vec4 rough = texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv));
+    vec3 emitted = opaque_emissive * texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb;
+    vec3 mapped = mapped_normal(normal, position, uv);
     return OpaqueFinish(base * painted.rgb, opaque_finish.x * rough.b, clamp(opaque_finish.y * rough.g, 0.0, 1.0), emitted,
                         mapped, normal_variance(mapped), painted.a, unoccluded(uv), painted.a < opaque_finish.w);
 }
@@ -54,11 +54,11 @@ vec3 fresnel_of(Layer layer, float away) {
     return (layer.facing + (layer.grazing - layer.facing) * away) * layer.regained;
 }
 
-// ray: unit, from the eye; normal: to the eye's side; place: from the eye.
-vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) {
+// ray: unit, from the eye; normal: to the eye's side; position: from the eye.
+vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 position) {
     float ior = opaque_finish.z;
     float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
-    vec2 table = textureLod(reflectance_table, reflectance_place(cos_view, finish.roughness), 0.0).rg;
+    vec2 table = textureLod(reflectance_table, reflectance_coordinate(cos_view, finish.roughness), 0.0).rg;
     Layer coat = layer_of(vec3((ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0))), table);
     Layer metal = layer_of(finish.base, table);
     float painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored.r);
@@ -69,8 +69,8 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 place) 
         + painted * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI);
     float alpha = highlight_alpha(finish.roughness, finish.variance);
     for (int light = 0; light < light_count; ++light) {
-        vec4 at = light_place[light];
-        vec3 way = at.xyz - at.w * place;
+        vec4 at = light_position[light];
+        vec3 way = at.xyz - at.w * position;
         float distance_m = max(length(way), 1e-18);
         vec3 towards = way / distance_m;
         vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;

@@ -5,7 +5,7 @@
 
 #include "shade/environment_beyond.glsl"
 
-uniform sampler2D entered;      // interface towards the eye: normal, place
+uniform sampler2D entered;      // interface towards the eye: normal, axial depth
 #if !ONE_INTERFACE
 uniform sampler2D left;         // first interface away from it beyond
 #endif
@@ -30,11 +30,11 @@ ivec2 stored(ivec2 texel) {
 }
 
 #if !ONE_INTERFACE
-// Place where the first interval of a pixel ends: on the far interface, or on an opaque surface inside.
+// Axial depth where the first interval of a pixel ends: on the far interface, or on an opaque surface inside.
 float end_of_interval(ivec2 texel) {
     float last = texelFetch(left, texel, 0).w;
 #if OPAQUE
-    return min(last, texelFetch(opaque_place, texel, 0).r);
+    return min(last, texelFetch(opaque_axial_depth, texel, 0).r);
 #else
     return last;
 #endif
@@ -109,8 +109,8 @@ vec4 blurred_opaque(vec2 pixel, float width) {
 }
 
 bool is_behind_opaque(vec3 seen) {
-    float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
-    return place < NOTHING && seen.z >= place;
+    float axial_depth = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
+    return axial_depth < NOTHING && seen.z >= axial_depth;
 }
 #endif
 
@@ -124,8 +124,8 @@ vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
         float path = surface_reach * share * share;
         vec3 seen = seen_at(point + path * direction);
         if (!in_picture(seen.xy)) { break; }
-        float place = texelFetch(opaque_place, stored(texel_of(seen.xy)), 0).r;
-        if (place < NOTHING && seen.z >= place && (seen.z - place) * surface_ahead.y <= 2.0 * (path - before)) {
+        float opaque = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
+        if (opaque < NOTHING && seen.z >= opaque && (seen.z - opaque) * surface_ahead.y <= 2.0 * (path - before)) {
             for (int half_way = 0; half_way < OPAQUE_HALVINGS; ++half_way) {
                 float middle = 0.5 * (before + path);
                 if (is_behind_opaque(seen_at(point + middle * direction))) { path = middle; } else { before = middle; }

@@ -22,26 +22,26 @@ vec2 turned_uv(int number, vec2 uv) {
 }
 
 // Image row 0 is the top, where v = 1.
-vec2 picture_place(int number, vec2 uv) {
+vec2 texture_coordinate(int number, vec2 uv) {
     vec2 turned = turned_uv(number, uv);
     return vec2(turned.x, 1.0 - turned.y);
 }
 
-// Share of the light of the environment that reaches a place.
+// Share of the light of the environment that reaches a point.
 float unoccluded(vec2 uv) {
 #if OCCLUSION
-    return texture(occlusion_texture, picture_place(OCCLUSION_TEXTURE, uv)).r;
+    return texture(occlusion_texture, texture_coordinate(OCCLUSION_TEXTURE, uv)).r;
 #else
     return 1.0;
 #endif
 }
 
 // A normal map's normal, by the directions in which the picture's coordinates grow on the surface (Schueler 2013).
-// normal: unit, to either side; place: of the point, from the eye.
-vec3 mapped_normal(vec3 normal, vec3 place, vec2 uv) {
-    vec3 mapped = texture(normal_texture, picture_place(NORMAL_TEXTURE, uv)).rgb * 2.0 - 1.0;
+// normal: unit, to either side; position: of the point, from the eye.
+vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
+    vec3 mapped = texture(normal_texture, texture_coordinate(NORMAL_TEXTURE, uv)).rgb * 2.0 - 1.0;
     vec2 turned = turned_uv(NORMAL_TEXTURE, uv);
-    vec3 along_x = dFdx(place), along_y = dFdy(place);
+    vec3 along_x = dFdx(position), along_y = dFdy(position);
     vec2 uv_x = dFdx(turned), uv_y = dFdy(turned);
     vec3 across_x = cross(normal, along_x), across_y = cross(along_y, normal);
     vec3 tangent = across_y * uv_x.x + across_x * uv_y.x;

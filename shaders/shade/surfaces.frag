@@ -131,8 +131,8 @@ void main() {
     }
 
     vec3 normal = front.xyz;
-    float place = starts_inside ? surface_eye_place : front.w;
-    vec3 point = point_at(pixel, place);
+    float axial_depth = starts_inside ? surface_eye_axial_depth : front.w;
+    vec3 point = point_at(pixel, axial_depth);
     float cosine = clamp(-dot(normal, ray), 0.0, 1.0);
     float reflectance = starts_inside ? 0.0 : interface_reflectance(cosine, finish.ior, finish.roughness);
     vec3 mirrored_share = vec3(reflectance);
@@ -155,7 +155,7 @@ void main() {
 #if ONE_INTERFACE
         const float first_interval = 0.0; // nothing asks how long it is
 #else
-        float first_interval = back.w < NOTHING ? (end_of_interval(texel) - place) * surface_ahead.y * advance : -1.0;
+        float first_interval = back.w < NOTHING ? (end_of_interval(texel) - axial_depth) * surface_ahead.y * advance : -1.0;
 #endif
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;

@@ -1,11 +1,11 @@
 // How far along its ray a rasterizer may misplace a surface, and how that goes along with a count. It moves vertices onto a
 // grid of sub-pixels, by half a step at most, so a pixel shows a point of the face that is up to half a step off, along
-// each axis of the picture. Next to a silhouette two faces then change places, by a step of the grid times the slopes of
+// each axis of the picture. Next to a silhouette two faces then change their order, by a step of the grid times the slopes of
 // both: negative paths up to that are no flipped faces.
 
 #include <constants>
 
-// Metres or places, whichever the argument counts; before any branch, since it asks the neighboring pixels.
+// Metres or axial depth, whichever the argument counts; before any branch, since it asks the neighboring pixels.
 float snapping(float along, float step_of_grid) {
     return fwidth(along) * step_of_grid;
 }

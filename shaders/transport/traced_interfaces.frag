@@ -22,7 +22,7 @@
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
-uniform sampler2D entered;           // interface towards the eye: normal, place
+uniform sampler2D entered;           // interface towards the eye: normal, axial depth
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 uniform int most_interfaces;
@@ -270,7 +270,7 @@ void main() {
     float path = margin;
     float reach = 2.0 * margin;
     if (starts_inside) {
-        origin = point_at(pixel, surface_eye_place);
+        origin = point_at(pixel, surface_eye_axial_depth);
         path = front.w < NOTHING ? length(point - origin) : NOTHING;
         reach = NOTHING;
     }

@@ -1,5 +1,5 @@
-// How dense the medium of each slot is in a place, where that varies, and on the mean along a line. Points count from the
-// center of the media, places are those of the unit box of the slot's body.
+// How dense the medium of each slot is at a point, where that varies, and on the mean along a line. Points count from the
+// center of the media, positions are those in the unit box of the slot's body.
 
 #include <Density>
 #include <constants>
@@ -11,7 +11,7 @@ bool slot_varies(int slot) {
     return density_profile[slot].x != 0.0;
 }
 
-vec3 place_in_box(int slot, vec3 point) {
+vec3 position_in_box(int slot, vec3 point) {
     vec4 here = vec4(point, 1.0);
     return vec3(
         dot(density_rows[3 * slot], here), dot(density_rows[3 * slot + 1], here), dot(density_rows[3 * slot + 2], here)
@@ -34,18 +34,18 @@ void grid_corners(int slot, ivec3 voxel, out vec4 low, out vec4 high) {
     );
 }
 
-float density_at(int slot, vec3 place) {
+float density_at(int slot, vec3 position) {
     vec4 profile = density_profile[slot];
-    if (profile.x == DENSITY_LINEAR) { return linear_density(place[int(profile.y)], profile.z, profile.w); }
-    if (profile.x == DENSITY_EXPONENTIAL) { return exponential_density(place[int(profile.y)], profile.z, profile.w); }
+    if (profile.x == DENSITY_LINEAR) { return linear_density(position[int(profile.y)], profile.z, profile.w); }
+    if (profile.x == DENSITY_EXPONENTIAL) { return exponential_density(position[int(profile.y)], profile.z, profile.w); }
     vec3 size = density_grid[slot].xyz;
-    vec3 voxels = clamp(place * size - 0.5, vec3(0.0), size - 1.0);
+    vec3 voxels = clamp(position * size - 0.5, vec3(0.0), size - 1.0);
     vec4 low, high;
     grid_corners(slot, ivec3(voxels), low, high);
     return trilinear(low, high, voxels - floor(voxels));
 }
 
-// Mean density of a grid on a straight line. Between the planes through the centers of voxels it is a cubic of the place
+// Mean density of a grid on a straight line. Between the planes through the centers of voxels it is a cubic of the position
 // on the line, which two Gauss points integrate exactly.
 float grid_mean(int slot, vec3 start, vec3 end) {
     vec3 size = density_grid[slot].xyz;
@@ -76,7 +76,7 @@ float grid_mean(int slot, vec3 start, vec3 end) {
     return sum;
 }
 
-// Mean density on a straight line between two places; exact for each kind of density.
+// Mean density on a straight line between two positions; exact for each kind of density.
 float mean_density(int slot, vec3 start, vec3 end) {
     vec4 profile = density_profile[slot];
     int axis = int(profile.y);

@@ -19,17 +19,17 @@ vec2 pixel_in_picture() {
     return 2.0 * (vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw) / frame_size.xy - 1.0;
 }
 
-// The view ray from a place of the walk on. Nothing here is larger than the scene, however far away the eye is.
-ViewRay ray_from(float place) {
-    float axial = scatter_near.x + place * place_metres;
+// The view ray from an axial depth of the walk on. Nothing here is larger than the scene, however far away the eye is.
+ViewRay ray_from(float axial_depth) {
+    float axial = scatter_near.x + axial_depth * media_length;
     float spread = scatter_near.z == 1.0 ? axial : 1.0;
     vec2 pixel = pixel_in_picture();
     vec3 across = pixel.x * scatter_right.xyz - pixel.y * scatter_up.xyz;
-    vec3 along = ray_forward.xyz * (place * place_metres + scatter_near.y);
+    vec3 along = ray_forward.xyz * (axial_depth * media_length + scatter_near.y);
     return ViewRay(across * spread - scatter_off_axis.xyz + along, normalize(ray_forward.xyz + across * scatter_near.z));
 }
 
-// Scattering times phase function of what fills a place, for a cosine between the directions of travel.
+// Scattering times phase function of what fills a point, for a cosine between the directions of travel.
 vec3 scattering_phase(float turns[SLOTS], float cos_scatter) {
     vec3 sum = vec3(0.0);
     for (int slot = 0; slot < SLOTS; ++slot) {
@@ -45,11 +45,11 @@ vec4 scattered_here(float turns[SLOTS], int light, ViewRay ray, float s, out vec
     vec3 point = ray.start + s * ray.direction;
     vec4 depth = light_depth(light, point);
     tau = depth.rgb;
-    vec4 place = scatter_light_place[light];
-    vec3 towards = place.w == 0.0 ? place.xyz : place.xyz - point;
+    vec4 position = scatter_light_position[light];
+    vec3 towards = position.w == 0.0 ? position.xyz : position.xyz - point;
     float r2 = max(dot(towards, towards), 1e-30);
     float cos_scatter = dot(towards * inversesqrt(r2), ray.direction);
-    vec3 power = scatter_light_power[light].rgb * (place.w == 0.0 ? 1.0 : 1.0 / r2);
+    vec3 power = scatter_light_power[light].rgb * (position.w == 0.0 ? 1.0 : 1.0 / r2);
     return vec4(power * scattering_phase(turns, cos_scatter), depth.a);
 }
 
@@ -75,10 +75,10 @@ vec3 scatter_from_light(float turns[SLOTS], int light, ViewRay ray, float metres
     vec3 rise = sigma * metres + tau_end - tau_start;
 
     // Where the light is nearest: at distance closest along the ray, height metres off it.
-    vec4 place = scatter_light_place[light];
-    float closest = dot(place.xyz - ray.start, ray.direction);
-    float height = max(length(place.xyz - ray.start - closest * ray.direction), 1e-4 * metres);
-    bool angular = place.w == 1.0 && height < NEAR_LIGHT * metres && closest > -metres && closest < 2.0 * metres;
+    vec4 position = scatter_light_position[light];
+    float closest = dot(position.xyz - ray.start, ray.direction);
+    float height = max(length(position.xyz - ray.start - closest * ray.direction), 1e-4 * metres);
+    bool angular = position.w == 1.0 && height < NEAR_LIGHT * metres && closest > -metres && closest < 2.0 * metres;
     if (scatter_light_power[light].a == 1.0) {
         angular = true;
         rise = vec3(0.0);

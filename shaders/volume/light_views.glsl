@@ -1,4 +1,4 @@
-// What lights see: for each texel of each view from a light, the crossings of its ray in order, how their places change
+// What lights see: for each texel of each view from a light, the crossings of its ray in order, how their axial depths change
 // across the texel, and what is behind each. So the optical depth from the light to any point is a sum over the crossings
 // before it, moved along their faces to the very ray of the point.
 
@@ -7,13 +7,13 @@
 #include "intervals/crossing.glsl"
 
 layout(std430, binding = LIGHT_HEADS_BINDING) buffer LightHeads { uint light_heads[]; };    // links, view after view
-layout(std430, binding = LIGHT_NODES_BINDING) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the place
+layout(std430, binding = LIGHT_NODES_BINDING) buffer LightNodes { uvec4 light_nodes[]; };   // word, link to the next, slope of the axial depth
 #if VARIES
-layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { uvec4 light_media[]; };   // turns of the slots, metres for each place
+layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { uvec4 light_media[]; };   // turns of the slots, metres from axial depth 0 to 1
 #else
-layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres for each place
+layout(std430, binding = LIGHT_MEDIA_BINDING) buffer LightMedia { vec4 light_media[]; };    // extinction behind, metres from axial depth 0 to 1
 #endif
-layout(std430, binding = LIGHT_ENDS_BINDING) buffer LightEnds { float light_ends[]; };     // place where an opaque surface ends each ray
+layout(std430, binding = LIGHT_ENDS_BINDING) buffer LightEnds { float light_ends[]; };     // axial depth where an opaque surface ends each ray
 
 // Where the views of a light are: their texels begin at first, and each has size x size of them.
 struct LightCells {
@@ -26,16 +26,16 @@ uint light_cell(LightCells cells, ivec2 texel) {
     return cells.first + uint(held.y * cells.size + held.x);
 }
 
-// A light's ray through a point, by places.
+// A light's ray through a point, by axial depth.
 struct LightRay {
     vec3 point;
-    float place;   // of the point
-    vec3 advance;  // in metres, for each place
-    float metres;  // its length
+    float axial_depth;  // of the point
+    vec3 advance;       // in metres, from axial depth 0 to 1
+    float metres;       // its length
 };
 
-vec3 point_at(LightRay ray, float place) {
-    return ray.point + (place - ray.place) * ray.advance;
+vec3 point_at(LightRay ray, float axial_depth) {
+    return ray.point + (axial_depth - ray.axial_depth) * ray.advance;
 }
 
 // Optical depth of a part of a light's ray behind a node.
@@ -47,8 +47,8 @@ vec3 part_depth(uint link, LightRay ray, float from, float to) {
         uint turns = words[slot / TURNS_PER_WORD] >> uint(TURNS_BITS * (slot % TURNS_PER_WORD));
         float share = float(turns & ((1u << TURNS_BITS) - 1u));
         if (share > 0.0 && slot_varies(slot)) {
-            vec3 start = place_in_box(slot, point_at(ray, from));
-            share *= mean_density(slot, start, place_in_box(slot, point_at(ray, to)));
+            vec3 start = position_in_box(slot, point_at(ray, from));
+            share *= mean_density(slot, start, position_in_box(slot, point_at(ray, to)));
         }
         extinction += share * slot_extinction[slot].rgb;
     }
@@ -59,7 +59,7 @@ vec3 part_depth(uint link, LightRay ray, float from, float to) {
 }
 
 // Optical depth to the point of a ray, by the crossings of a texel, moved along their faces to this very ray; w: the
-// steepest of these, in places per texel. offset: of the point from the texel's center.
+// steepest of these, in axial depth per texel. offset: of the point from the texel's center.
 vec4 texel_light_depth(uint cell, vec2 offset, LightRay ray) {
     vec3 depth = vec3(0.0);
     float last = 0.0;
@@ -68,18 +68,18 @@ vec4 texel_light_depth(uint cell, vec2 offset, LightRay ray) {
     uint link = light_heads[cell];
     bool before = true;
     while (before) {
-        float moved = ray.place;
+        float moved = ray.axial_depth;
         uint next = 0u;
         before = link != 0u;
         if (before) {
             uvec4 node = light_nodes[link - 1u];
             vec2 slope = uintBitsToFloat(node.zw);
-            moved = float(crossing_step(node.x)) / float(place_steps()) + dot(slope, offset);
+            moved = float(crossing_step(node.x)) / float(axial_steps()) + dot(slope, offset);
             steepest = max(steepest, max(abs(slope.x), abs(slope.y)));
-            before = moved <= ray.place;
+            before = moved <= ray.axial_depth;
             next = node.y;
         }
-        moved = max(min(moved, ray.place), last);
+        moved = max(min(moved, ray.axial_depth), last);
         if (behind != 0u && moved > last) { depth += part_depth(behind, ray, last, moved); }
         last = moved;
         behind = link;
@@ -99,25 +99,25 @@ int cube_face(vec3 from_light) {
 // is in between. The texel around the point tells it. Only next to a silhouette, where faces curve away within a texel,
 // the four texels around the point do, the more so the less steep their faces are.
 vec4 light_depth(int light, vec3 point) {
-    vec4 place_of_light = scatter_light_place[light];
+    vec4 source = scatter_light_position[light];
     vec4 views = scatter_light_views[light];  // number of the first, how many, texels along a side, first texel
-    int face = int(views.y) == 1 ? 0 : cube_face(point - place_of_light.xyz);
+    int face = int(views.y) == 1 ? 0 : cube_face(point - source.xyz);
     int view = int(views.x) + face;
     LightCells cells = LightCells(uint(views.w) + uint(face * int(views.z) * int(views.z)), int(views.z));
     vec4 here = vec4(point, 1.0);
     float w = dot(scatter_views[4 * view + 2], here);
     vec2 ndc = vec2(dot(scatter_views[4 * view], here), dot(scatter_views[4 * view + 1], here)) / w;
-    float place = dot(scatter_views[4 * view + 3], here);
+    float axial_depth = dot(scatter_views[4 * view + 3], here);
     vec2 position = (0.5 * ndc + 0.5) * views.z;
     ivec2 texel = ivec2(floor(position));
     vec2 offset = position - floor(position) - 0.5;
     uint cell = light_cell(cells, texel);
 #if SHADOWS
-    if (place > light_ends[cell] + 1.5 / views.z) { return vec4(0.0); }
+    if (axial_depth > light_ends[cell] + 1.5 / views.z) { return vec4(0.0); }
 #endif
-    vec3 travel = place_of_light.w == 0.0 ? -place_of_light.xyz : point - place_of_light.xyz;
+    vec3 travel = source.w == 0.0 ? -source.xyz : point - source.xyz;
     vec3 advance = travel / max(dot(scatter_views[4 * view + 3].xyz, travel), 1e-30);
-    LightRay ray = LightRay(point, place, advance, length(advance));
+    LightRay ray = LightRay(point, axial_depth, advance, length(advance));
     vec4 depth = texel_light_depth(cell, offset, ray);
     if (light_heads[cell] != 0u && depth.w < STEEP_IN_LIGHT_VIEW) { return vec4(depth.rgb, 1.0); }
     vec3 sum = vec3(0.0);

@@ -378,7 +378,7 @@ def test_our_maps_agree_with_what_its_authors_wrote(assets: Path, attenuation: P
     ours = {one.index: one for one in read_materials(attenuation)}
     textures = 0
     for target in find_targets(GlbBuilder(source)):
-        mesh, primitive = target.place
+        mesh, primitive = target.key
         index = source.items("meshes")[mesh]["primitives"][primitive]["material"]
         assert ours[index].thickness == pytest.approx(theirs[index].thickness, rel=1e-6)
         if theirs[index].has_thickness_texture:

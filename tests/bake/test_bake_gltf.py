@@ -258,9 +258,9 @@ def test_those_that_let_light_in_are_chosen(scene: MapMaker, tmp_path: Path) -> 
     before = scene(tmp_path / "in.glb", 3, extensions=GLASS)
     before.tree["materials"].append({"name": "Opaque"})
     before.tree["meshes"][1]["primitives"][0]["material"] = 1
-    assert [target.place for target in find_targets(GlbBuilder(before))] == [(0, 0), (2, 0)]
+    assert [target.key for target in find_targets(GlbBuilder(before))] == [(0, 0), (2, 0)]
     del before.tree["materials"][0]["extensions"]
-    assert [target.place for target in find_targets(GlbBuilder(before))] == [(0, 0), (1, 0), (2, 0)]
+    assert [target.key for target in find_targets(GlbBuilder(before))] == [(0, 0), (1, 0), (2, 0)]
     del before.tree["nodes"][:]
     before.tree["scenes"] = [{"nodes": []}]
     with pytest.raises(tl.InputError, match="no node has triangles"):
@@ -281,7 +281,7 @@ def test_thin_walls_without_an_inside_are_left_alone(scene: MapMaker, tmp_path: 
     primitive = builder.primitive(0, 0)
     corners = Accessors(before).indices(primitive["indices"])[3:]  # one face is missing
     primitive["indices"] = builder.add_accessor(corners.astype(np.uint32), INDICES)
-    assert [target.place for target in find_targets(builder)] == [(1, 0)]
+    assert [target.key for target in find_targets(builder)] == [(1, 0)]
     builder.primitive(1, 0)["indices"] = primitive["indices"]
     with pytest.raises(tl.InputError, match="thin walls without an inside: Ball 0, Ball 1"):
         find_targets(builder)
@@ -430,7 +430,7 @@ def test_the_validator_accepts_changed_files(
     builder.primitive(0, 0)["attributes"]["COLOR_0"] = builder.add_accessor(colors, normalized=True)
     targets = find_targets(builder, new_uv=unwrap)
     builder.tree["extensionsUsed"].remove("KHR_xmp")
-    maps = {target.place: make_map(ramp, target.mesh) for target in targets}
-    write_maps(builder, tmp_path / "out.glb", maps, targets={target.place: target for target in targets})
+    maps = {target.key: make_map(ramp, target.mesh) for target in targets}
+    write_maps(builder, tmp_path / "out.glb", maps, targets={target.key: target for target in targets})
     clean(validate(tmp_path / "out.glb"))
     assert {material.kind for material in read_materials(tmp_path / "out.glb")} == {"volume"}

@@ -124,19 +124,19 @@ def test_labels_do_not_touch(crowd: str, rng: np.random.Generator) -> None:
     assert not over[~np.eye(len(points), dtype=bool)].any()
     assert (centers - sizes / 2 >= bounds[:2]).all()
     assert (centers + sizes / 2 <= bounds[2:]).all()
-    # The farthest ring of places is 95 from the symbol; labels reach half their size beyond.
+    # The farthest ring of candidates is 95 from the symbol; labels reach half their size beyond.
     assert (np.hypot(*(centers - points).T) < 5 + 95 + 20).all()
 
 
 def test_places_on_a_line_keep_order_gap_and_bounds() -> None:
     wanted = np.array([50.0, 10.0, 11.0, 12.0, 99.0, 99.0])
-    places = spread(wanted, 10.0, 0.0, 100.0)
+    found = spread(wanted, 10.0, 0.0, 100.0)
     order = np.argsort(wanted, kind="stable")
-    assert (np.diff(places[order]) >= 10.0 - 1e-9).all()
-    assert places.min() >= 0.0
-    assert places.max() <= 100.0
-    assert places[0] == 50.0
-    assert places[[1, 2, 3]].mean() == pytest.approx(11.0)
+    assert (np.diff(found[order]) >= 10.0 - 1e-9).all()
+    assert found.min() >= 0.0
+    assert found.max() <= 100.0
+    assert found[0] == 50.0
+    assert found[[1, 2, 3]].mean() == pytest.approx(11.0)
     assert spread(np.array([]), 10.0, 0.0, 100.0).size == 0
 
 

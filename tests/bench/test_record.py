@@ -81,13 +81,13 @@ def test_another_version_is_told() -> None:
 def broken(path: list[Any], value: Any) -> str:
     """The report with one value replaced, or left out where it is None."""
     found = json.loads(full_report().to_json())
-    place = found
+    holder = found
     for key in path[:-1]:
-        place = place[key]
+        holder = holder[key]
     if value is None:
-        del place[path[-1]]
+        del holder[path[-1]]
     else:
-        place[path[-1]] = value
+        holder[path[-1]] = value
     return json.dumps(found)
 
 

@@ -96,8 +96,8 @@ def test_block_layout_is_what_the_driver_uses(renderer: tl.Renderer, block: Unif
         for index in np.ndindex(*shape):
             weight = round(weight * 1.25 % 7 + 0.5, 6)
             # GLSL indexes a matrix by column first, an array by element.
-            place = "".join(f"[{i}]" for i in (index[::-1] if shape == (4, 4) else index))
-            terms.append(f"{weight!r} * float({name}{place})")
+            element = "".join(f"[{i}]" for i in (index[::-1] if shape == (4, 4) else index))
+            terms.append(f"{weight!r} * float({name}{element})")
             expected += weight * float(np.asarray(values[name])[index])
     code = f"#version 330 core\n{block.glsl}out float total;\nvoid main() {{ total = {' + '.join(terms)}; }}\n"
     with renderer.gpu.context.current() as gl:
@@ -122,21 +122,21 @@ def test_a_record_of_a_table_reads_as_it_was_packed(renderer: tl.Renderer, table
     rng = np.random.default_rng(2)
     records = [{name: rng.random(shape) for name, _, shape in table.fields} for _ in range(3)]
     sizes = [int(np.prod(shape)) for _, _, shape in table.fields]
-    places = [
+    elements = [
         f"row.{name}" + (f"[{i}]" if shape else "")
         for (name, _, shape), size in zip(table.fields, sizes, strict=True)
         for i in range(size)
     ]
-    choices = "".join(f"if (gl_VertexID == {i}) {{ value = {place}; }}\n" for i, place in enumerate(places))
+    choices = "".join(f"if (gl_VertexID == {i}) {{ value = {element}; }}\n" for i, element in enumerate(elements))
     read = f"{table.name} row = {table.sampler}_row(1);\nvalue = 0.0;\n{choices}"
     code = f"#version 330 core\n{table.glsl}out float value;\nvoid main() {{\n{read}}}\n"
     packed = table.pack(records)
     with renderer.gpu.context.current() as gl:
         program = gl.program(vertex_shader=code, varyings=["value"])
-        texture, output = gl.texture(packed.shape[1::-1], 4, packed, dtype="f4"), gl.buffer(reserve=4 * len(places))
+        texture, output = gl.texture(packed.shape[1::-1], 4, packed, dtype="f4"), gl.buffer(reserve=4 * len(elements))
         texture.use(0)
         gl.framebuffer([gl.texture((1, 1), 1)]).use()
-        gl.vertex_array(program, []).transform(output, vertices=len(places))
+        gl.vertex_array(program, []).transform(output, vertices=len(elements))
         found = np.frombuffer(output.read(), np.float32)
     assert (found == np.concatenate([np.ravel(value) for value in records[1].values()]).astype(np.float32)).all()
 

@@ -246,7 +246,7 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     if name == "emitted_radiance":
         allowed = allowed + 1e-37
     if name.startswith("exponential_density"):
-        # An exponential multiplies the rounding of its exponent, and of the place in it, by up to the exponent.
+        # An exponential multiplies the rounding of its exponent, and of the position in it, by up to the exponent.
         allowed = allowed + 4 * eps * np.abs(arguments[-1]) * np.abs(exact)
     if name == "linear_density":
         allowed = allowed + 4 * eps * np.maximum(arguments[1], arguments[2])  # mix may cancel

@@ -51,8 +51,8 @@ def test_the_attenuation_test_has_one_shade_in_every_column(
     for x in (-3.5, -2.0, 0.0, 2.5, 6.0):
         column = []
         for y in (6.0, 3.0, 0.0, -3.0, -6.0):
-            place = (x + 0.06, y + 0.06)  # off the lines of the grid behind
-            camera = tl.Camera.orthographic((*place, 9.0), (*place, 0.0), height=0.02)
+            position = (x + 0.06, y + 0.06)  # off the lines of the grid behind
+            camera = tl.Camera.orthographic((*position, 9.0), (*position, 0.0), height=0.02)
             column.append(seen(renderer, scene, camera, (4, 4)).to_srgb8()[1, 1].astype(int))
         assert np.ptp(column, axis=0).max() <= 2, (x, column)
         reds.append(column[0][0])

@@ -44,13 +44,13 @@ def method(request: pytest.FixtureRequest) -> Any:
     return METHODS[request.param]
 
 
-def opaque(mesh: tl.Mesh, place: Any = (0, 0, 0), scale: float = 1.0) -> tl.Object:
+def opaque(mesh: tl.Mesh, position: Any = (0, 0, 0), scale: float = 1.0) -> tl.Object:
     matrix = np.diag([scale, scale, scale, 1.0])
-    matrix[:3, 3] = place
+    matrix[:3, 3] = position
     return tl.Object(mesh, None, matrix, color=RED)
 
 
-PLACES = {
+POSITIONS = {
     "in front": opaque(BALL, (0.2, 0.1, 2.0), 0.6),
     "inside": opaque(BALL, (0.2, 0.1, -0.1), 0.5),
     "half inside": opaque(BALL, (0.9, 0.1, 0.2), 0.6),
@@ -83,10 +83,10 @@ def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edg
 
 
 @pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("position", POSITIONS)
 @pytest.mark.filterwarnings("ignore::translucent.errors.TranslucentWarning")
-def test_where_the_opaque_object_is(renderer: tl.Renderer, method: Any, place: str, camera: tl.Camera) -> None:
-    scene = tl.Scene([tl.Object(BODY, WINE), PLACES[place]], camera, lights=LIGHTS, environment=SKY)
+def test_where_the_opaque_object_is(renderer: tl.Renderer, method: Any, position: str, camera: tl.Camera) -> None:
+    scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS[position]], camera, lights=LIGHTS, environment=SKY)
     assert_equal(renderer, scene, method)
 
 
@@ -110,11 +110,11 @@ def test_coincident_with_the_body(renderer: tl.Renderer, method: Any) -> None:
 
 
 @pytest.mark.parametrize("method", [None, tl.DepthPeeling(), tl.KBuffer()], ids=["lists", "peeling", "k-buffer"])
-@pytest.mark.parametrize("place", PLACES)
-def test_emission_in_front_of_an_opaque_object(renderer: tl.Renderer, method: Any, place: str) -> None:
+@pytest.mark.parametrize("position", POSITIONS)
+def test_emission_in_front_of_an_opaque_object(renderer: tl.Renderer, method: Any, position: str) -> None:
     inner = tl.Object(BALL, tl.Medium(absorption=2.0, emission=(0, 0.5, 1)), np.diag([0.7, 0.7, 0.7, 1]))
     scene = tl.Scene(
-        [tl.Object(BODY, EMBER), inner, PLACES[place]], CAMERAS["perspective"], lights=LIGHTS, environment=SKY
+        [tl.Object(BODY, EMBER), inner, POSITIONS[position]], CAMERAS["perspective"], lights=LIGHTS, environment=SKY
     )
     assert_equal(renderer, scene, method)
 
@@ -140,7 +140,7 @@ def _faces_back(i: int) -> bool:
 def test_the_nearest_of_many_opaque_objects_is_seen(renderer: tl.Renderer) -> None:
     """Also with a floor a thousand times as large as the body, and with the eye close to a wall."""
     floor = tl.Object(Box.slab((2000.0, 2000.0), 1.0).tessellate(), None, _lying((0, -1.5, 0)), color=(0.3, 0.6, 0.3))
-    objects = [tl.Object(BODY, WINE), floor, *PLACES.values()]
+    objects = [tl.Object(BODY, WINE), floor, *POSITIONS.values()]
     scene = tl.Scene(objects[:-1], CAMERAS["perspective"], lights=LIGHTS, environment=SKY)
     frame, truth = renderer.render(scene, SIZE), references.render(scene, SIZE)
     off = np.abs(frame.radiance - truth.radiance).max(axis=-1)
@@ -149,10 +149,10 @@ def test_the_nearest_of_many_opaque_objects_is_seen(renderer: tl.Renderer) -> No
     assert frame.valid.all()
 
 
-def _lying(place: Any) -> np.ndarray:
+def _lying(position: Any) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
-    matrix[:3, 3] = place
+    matrix[:3, 3] = position
     return matrix
 
 
@@ -163,12 +163,12 @@ def _lying(place: Any) -> np.ndarray:
     ids=["gradient", "constant", "checkerboard"],
 )
 def test_opaque_objects_are_lit(renderer: tl.Renderer, lights: list[Any], environment: tl.Environment) -> None:
-    scene = tl.Scene([tl.Object(BODY, WINE), PLACES["in front"]], CAMERAS["perspective"], lights, environment)
+    scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS["in front"]], CAMERAS["perspective"], lights, environment)
     assert_equal(renderer, scene, None)
 
 
 def test_too_many_lights_are_refused(renderer: tl.Renderer) -> None:
-    scene = tl.Scene([tl.Object(BODY, WINE), PLACES["in front"]], CAMERAS["perspective"], LIGHTS * 17)
+    scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS["in front"]], CAMERAS["perspective"], LIGHTS * 17)
     with pytest.raises(tl.InputError, match="34 lights; use at most 32"):
         renderer.render(scene, SIZE)
 
@@ -179,7 +179,7 @@ def test_a_scene_of_opaque_objects_only_is_refused(renderer: tl.Renderer) -> Non
 
 
 def test_several_samples_smooth_the_edges_of_opaque_objects(renderer: tl.Renderer) -> None:
-    scene = tl.Scene([tl.Object(BODY, WINE), PLACES["in front"]], CAMERAS["perspective"], LIGHTS, SKY)
+    scene = tl.Scene([tl.Object(BODY, WINE), POSITIONS["in front"]], CAMERAS["perspective"], LIGHTS, SKY)
     one, many = (renderer.render(scene, SIZE, samples=n) for n in (1, 16))
     np.testing.assert_array_equal(one.thickness, many.thickness)
     assert len(np.unique(many.radiance)) > len(np.unique(one.radiance))

@@ -25,9 +25,9 @@ PLATE = tl.Mesh(CORNERS, [[0, 1, 2], [0, 2, 3]], (CORNERS[:, :2] + 1) / 2)
 FRONT = tl.Camera.orthographic((0, 0, 5), (0, 0, 0), height=1.0)
 
 
-def at(place: tuple[float, float, float]) -> Array:
+def at(position: tuple[float, float, float]) -> Array:
     matrix = np.eye(4)
-    matrix[:3, 3] = place
+    matrix[:3, 3] = position
     return matrix
 
 

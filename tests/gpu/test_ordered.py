@@ -41,9 +41,11 @@ def method(request: pytest.FixtureRequest) -> Any:
     return METHODS[request.param]
 
 
-def moved(mesh: tl.Mesh, medium: tl.Medium | None, place: Any = (0, 0, 0), scale: float = 1.0, **kw: Any) -> tl.Object:
+def moved(
+    mesh: tl.Mesh, medium: tl.Medium | None, position: Any = (0, 0, 0), scale: float = 1.0, **kw: Any
+) -> tl.Object:
     matrix = np.diag([scale, scale, scale, 1.0])
-    matrix[:3, 3] = place
+    matrix[:3, 3] = position
     return tl.Object(mesh, medium, matrix, **kw)
 
 

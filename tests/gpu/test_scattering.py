@@ -138,9 +138,9 @@ def test_a_light_inside_the_body(renderer: tl.Renderer) -> None:
     assert np.isfinite(frame.radiance).all()
 
 
-@pytest.mark.parametrize("place", [(0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)], ids=str)
-def test_a_light_on_the_surface_or_in_the_center_gives_finite_light(renderer: tl.Renderer, place: Any) -> None:
-    frame = renderer.render(ball_scene(tl.PointLight(place, (1, 1, 1)), 4.0), SIZE)
+@pytest.mark.parametrize("position", [(0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)], ids=str)
+def test_a_light_on_the_surface_or_in_the_center_gives_finite_light(renderer: tl.Renderer, position: Any) -> None:
+    frame = renderer.render(ball_scene(tl.PointLight(position, (1, 1, 1)), 4.0), SIZE)
     assert np.isfinite(frame.radiance).all()
     assert frame.radiance.max() > 0
 
@@ -192,9 +192,9 @@ def test_overlapping_bodies_and_shadows_equal_the_reference(renderer: tl.Rendere
     assert error <= 0.04
 
 
-def _moved(place: Any) -> np.ndarray:
+def _moved(position: Any) -> np.ndarray:
     matrix = np.eye(4)
-    matrix[:3, 3] = place
+    matrix[:3, 3] = position
     return matrix
 
 
@@ -294,8 +294,8 @@ def test_union_scatters_a_medium_once(renderer: tl.Renderer) -> None:
 def test_numbers_at_the_limits_stay_finite(renderer: tl.Renderer) -> None:
     camera = tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))
     for medium in (tl.Medium(scattering=1e300), tl.Medium(absorption=1e-300, scattering=1e-12)):
-        for place in ((1e18, 0, 0), (0, 0, 1e-9)):
-            lights = [tl.PointLight(place, (1, 1, 1))]
+        for position in ((1e18, 0, 0), (0, 0, 1e-9)):
+            lights = [tl.PointLight(position, (1, 1, 1))]
             scene = tl.Scene([tl.Object(Box().tessellate(), medium)], camera, lights, BLACK)
             assert np.isfinite(renderer.render(scene, (16, 16)).radiance).all()
     with pytest.raises(tl.InputError, match="light position; 1e\\+39 m away; stay within 1e\\+18 m"):

@@ -284,12 +284,12 @@ def test_normals_are_those_of_the_interfaces(renderer: tl.Renderer) -> None:
     np.testing.assert_allclose(np.linalg.norm(frame.normals[hit], axis=-1), 1.0, atol=1e-5)
     ray = rays(scene.camera)
     assert (np.sum(frame.normals * ray, axis=-1)[hit] < 0).all()
-    # A ball around the origin: the normal is the place, up to the angle of a facet.
+    # A ball around the origin: the normal is the position, up to the angle of a facet.
     eye = scene.camera.eye
     along = -ray @ eye - np.sqrt(np.maximum((ray @ eye) ** 2 - eye @ eye + 1, 0.0))
-    place = eye + along[..., None] * ray
+    position = eye + along[..., None] * ray
     inner = hit & (np.linalg.norm(np.cross(ray, eye), axis=-1) < 0.9)
-    np.testing.assert_allclose(frame.normals[inner], place[inner], atol=5e-3)
+    np.testing.assert_allclose(frame.normals[inner], position[inner], atol=5e-3)
     assert renderer.render(shown(BALL, tl.Medium(absorption=1.0), SKY), SIZE).normals is None
 
 

@@ -54,16 +54,16 @@ def opaque_picture(renderer: tl.Renderer, scene: tl.Scene) -> tuple[Array, Array
         job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene))
         renderer.gpu.run(job)
         target = job.targets.opaque()
-        place, radiance = (
+        axial_depth, radiance = (
             np.frombuffer(target.read(components=count, attachment=i, dtype="f4"), np.float32)
             .reshape(*SIZE[::-1], count)[::-1]
             .astype(np.float64)
             for i, count in enumerate((1, 4))
         )
         job.release()
-    seen = place[..., 0] < float(CONSTANTS["NOTHING"])
+    seen = axial_depth[..., 0] < float(CONSTANTS["NOTHING"])
     metres = np.full(SIZE[::-1], np.inf)
-    metres[seen] = place[seen, 0] * job.placed.media.length + job.placed.media.near
+    metres[seen] = axial_depth[seen, 0] * job.placed.media.length + job.placed.media.near
     return np.where(seen[..., None], radiance[..., :3], 0.0), metres
 
 
@@ -76,7 +76,7 @@ def test_a_backdrop_is_as_good_as_the_objects_on_it(renderer: tl.Renderer, metho
     backdrop = tl.Backdrop(radiance, depth, coverage=np.isfinite(depth))
     frame = renderer.render(bodies_of(scene), SIZE, method, backdrop=backdrop)
     expected = renderer.render(scene, SIZE, method)
-    # In float64 a place becomes metres and the same place again.
+    # In float64 an axial depth becomes metres and the same axial depth again.
     for name in ("thickness", "optical_depth", "transmittance", "radiance", "valid"):
         np.testing.assert_array_equal(getattr(frame, name), getattr(expected, name), err_msg=name)
 
@@ -113,7 +113,7 @@ def test_a_body_far_away_is_cut_where_the_picture_says(renderer: tl.Renderer) ->
     frame = renderer.render(scene, SIZE, backdrop=tl.Backdrop(np.zeros((*SIZE[::-1], 3)), depth))
     inside = tl.interior(tl.reference.hit_counts(scene, SIZE)) & frame.coverage
     assert inside.sum() > 100
-    # A place is counted from the near side of the box, in float32.
+    # Axial depth is counted from the near side of the box, in float32.
     np.testing.assert_allclose(frame.thickness[inside], 0.3 - 0.1234567, atol=4 * EPS)
 
 
@@ -139,7 +139,7 @@ def test_depth_of_textures_becomes_metres(renderer: tl.Renderer, far: float, ort
         job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene, over_backdrop=True), backdrop)
         renderer.gpu.run(job)
         target = job.targets.opaque()
-        place = np.frombuffer(target.read(components=1, attachment=0, dtype="f4"), np.float32).reshape(SIZE[::-1])
+        axial_depth = np.frombuffer(target.read(components=1, attachment=0, dtype="f4"), np.float32).reshape(SIZE[::-1])
         radiance = np.frombuffer(target.read(components=4, attachment=1, dtype="f4"), np.float32)
         job.release()
         color.release()
@@ -153,10 +153,10 @@ def test_depth_of_textures_becomes_metres(renderer: tl.Renderer, far: float, ort
         metres = near * far / (far - share * (far - near))
         slope = metres**2 * (far - near) / (near * far)
     media = AxialRange.of(scene.bodies, scene.camera)
-    found = place[depth < 1.0] * media.length + media.near
+    found = axial_depth[depth < 1.0] * media.length + media.near
     # A depth buffer of 24 bits, and four roundings to float32.
     assert (np.abs(found - metres) <= slope * 2.0**-24 + 4 * EPS * (metres + media.near)).all()
-    behind = place[depth == 1.0]
+    behind = axial_depth[depth == 1.0]
     assert behind.size
     assert ((behind > 1e20) & (behind < float(CONSTANTS["NOTHING"]))).all()
     # The power of GLSL is exact to a few units of the last place of its exponent, which is at most 2.2 * 8 bits.

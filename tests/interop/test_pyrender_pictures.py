@@ -100,10 +100,12 @@ def _ahead(renderer: tl.Renderer, scene: tl.Scene) -> Array:
         job = renderer.gpu.prepare(scene, SIZE, renderer.plan(scene))
         renderer.gpu.run(job)
         texels = job.targets.opaque().read(components=1, attachment=0, dtype="f4")
-        place = np.frombuffer(texels, np.float32).reshape(SIZE[::-1])[::-1].astype(np.float64)
+        axial_depth = np.frombuffer(texels, np.float32).reshape(SIZE[::-1])[::-1].astype(np.float64)
         job.release()
-    nothing = place >= float(CONSTANTS["NOTHING"])
-    return np.where(nothing, np.inf, np.where(nothing, 0.0, place) * job.placed.media.length + job.placed.media.near)
+    nothing = axial_depth >= float(CONSTANTS["NOTHING"])
+    return np.where(
+        nothing, np.inf, np.where(nothing, 0.0, axial_depth) * job.placed.media.length + job.placed.media.near
+    )
 
 
 def _slopes(scene: tl.Scene) -> Array:

@@ -12,7 +12,7 @@ import pytest
 import translucent as tl
 from translucent.cli import main
 from translucent.preview import numbers, orbiting
-from translucent.preview.actions import Change, ChoosePreset, Open, Pan, Turn, View, Zoom, apply
+from translucent.preview.actions import Change, ChoosePreset, Open, Pan, SetOrbit, Turn, Zoom, apply
 from translucent.preview.document import RANGES, Document, Material, Orbit
 from translucent.preview.history import MAX_STEPS, History
 from translucent.preview.scenes import material_of, medium_of
@@ -225,4 +225,4 @@ def test_a_camera_comes_back_from_its_orbit() -> None:
 
 def test_nothing_moves_before_there_is_a_model() -> None:
     assert apply(Document(), Turn(5.0, 5.0)) == Document()
-    assert apply(Document(), View(ORBIT)).orbit == ORBIT
+    assert apply(Document(), SetOrbit(ORBIT)).orbit == ORBIT

@@ -44,8 +44,8 @@ def middle_ray(camera: Camera = CAMERA) -> tuple[Array, Array]:
 
 def integral(function: Callable[[float], float], start: float, end: float, *kinks: float) -> float:
     """To nearly all digits, on parts between kinks."""
-    places = [start, *sorted(t for t in kinks if start < t < end), end]
-    return sum(quad(function, a, b, epsabs=0, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(places))
+    ends = [start, *sorted(t for t in kinks if start < t < end), end]
+    return sum(quad(function, a, b, epsabs=0, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(ends))
 
 
 def single_scatter(
@@ -60,14 +60,14 @@ def single_scatter(
     for start, end in spans:
         width = (end - start) / 8192
         t = (start + width * (np.arange(8192)[:, None] + 0.5 + 0.5 * points)).ravel()
-        place = origin + t[:, None] * direction
-        source = np.asarray(light.position) if isinstance(light, PointLight) else place - 1e3 * light.direction
-        way = place - source
+        point = origin + t[:, None] * direction
+        source = np.asarray(light.position) if isinstance(light, PointLight) else point - 1e3 * light.direction
+        way = point - source
         distance = np.linalg.norm(way, axis=1)
         travel = way / distance[:, None]
         strength = light.intensity / distance[:, None] ** 2 if isinstance(light, PointLight) else light.irradiance
-        chord = solid.chord(source, travel) - solid.chord(place, travel)
-        chord = chord + solid.chord(origin, direction) - solid.chord(place, direction)
+        chord = solid.chord(source, travel) - solid.chord(point, travel)
+        chord = chord + solid.chord(origin, direction) - solid.chord(point, direction)
         phase = optics.henyey_greenstein(-travel @ direction, medium.anisotropy)
         values = medium.scattering * phase[:, None] * strength * np.exp(-chord[:, None] * medium.extinction)
         total += np.tile(weights * 0.5 * width, 8192) @ values

@@ -42,9 +42,9 @@ class PlainRay:
 
     def pieces(self) -> list[tuple[float, Array, Array, int]]:
         """Length, extinction, emission and how often thickness counts them, from front to back."""
-        places = sorted({t for a, b, _, _ in self.solids for t in (a, b)} | {t for t, _, _ in self.sheets})
+        distances = sorted({t for a, b, _, _ in self.solids for t in (a, b)} | {t for t, _, _ in self.sheets})
         found = []
-        for begin, end in itertools.pairwise([*places, np.inf]):
+        for begin, end in itertools.pairwise([*distances, np.inf]):
             for at, path, body in self.sheets:
                 if at == begin:
                     found.append((path, *coefficients([body]), 1))
@@ -89,11 +89,11 @@ def assert_equal_to_plain_rays(
     found: dict[str, npt.NDArray[Any]], rays: dict[tuple[int, int], PlainRay], tolerance: float = 1e-13
 ) -> None:
     assert found["valid"].all()
-    for place, ray in rays.items():
+    for pixel, ray in rays.items():
         expected = ray.back_to_front(np.array([0.5, 0.75, 1.0]))
         for name, value in expected.items():
-            np.testing.assert_allclose(found[name][place], value, atol=tolerance, err_msg=name)
-        assert found["coverage"][place] == (expected["thickness"] > 0)
+            np.testing.assert_allclose(found[name][pixel], value, atol=tolerance, err_msg=name)
+        assert found["coverage"][pixel] == (expected["thickness"] > 0)
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -114,10 +114,10 @@ def test_two_boxes(
     scene = Scene(bodies, camera, environment=BACKDROP, overlap=policy)
     origins, directions = camera.rays(SIZE)
     rays = {}
-    for place in np.ndindex(SIZE[::-1]):
-        ends = [box_span(box, origins[place], directions[place]) for box in (A, B)]
+    for pixel in np.ndindex(SIZE[::-1]):
+        ends = [box_span(box, origins[pixel], directions[pixel]) for box in (A, B)]
         spans = [(*end, 1, body) for end, body in zip(ends, bodies, strict=True)]
-        rays[place] = PlainRay(scene, [span for span in spans if span[0] < span[1]])
+        rays[pixel] = PlainRay(scene, [span for span in spans if span[0] < span[1]])
     found = shade(scene, SIZE)
     assert (found["optical_depth"] > 0).any()
     assert_equal_to_plain_rays(found, rays)
@@ -160,13 +160,13 @@ def test_two_balls(shade: Shade, policy: Overlap) -> None:
         bodies.append(Object(Sphere((x, 0.0, z), radius).tessellate(segments), medium, priority=priority))
     scene = Scene(bodies, camera, environment=BACKDROP, overlap=policy)
     rays = {}
-    for place in np.ndindex(8, 8):
-        x, y, _ = camera.rays((8, 8))[0][place]
+    for pixel in np.ndindex(8, 8):
+        x, y, _ = camera.rays((8, 8))[0][pixel]
         solids = []
         for center, z, body in ((0.1, 0.5, bodies[0]), (-0.1, -0.5, bodies[1])):
             half = np.sqrt(radius**2 - (x - center) ** 2 - y**2)
             solids.append((4.0 - z - half, 4.0 - z + half, 1, body))
-        rays[place] = PlainRay(scene, solids)
+        rays[pixel] = PlainRay(scene, solids)
     off = (reach * np.sqrt(2) + 0.1) ** 2
     moved = np.sqrt(radius**2 - off) - np.sqrt((radius - Sphere().sagitta(segments)) ** 2 - off)
     # Four ends; a metre changes depth by up to 2, radiance by up to emission 1 plus depth times radiance 1.

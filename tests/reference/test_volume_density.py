@@ -45,16 +45,16 @@ def test_a_slab_of_varying_density(name: str) -> None:
     travel = np.asarray(SUN.direction)
     start, end = 3 / -direction[2], 4 / -direction[2]
 
-    def place(point: Array) -> Array:
+    def in_box(point: Array) -> Array:
         return (point - SLAB.low) / (np.asarray(SLAB.high) - SLAB.low)
 
     def mass(a: Array, b: Array) -> float:
-        return float(np.linalg.norm(b - a)) * integral(lambda s: float(density.at(place(a + s * (b - a)))), 0, 1)
+        return float(np.linalg.norm(b - a)) * integral(lambda s: float(density.at(in_box(a + s * (b - a)))), 0, 1)
 
     def integrand(t: float, channel: int) -> float:
         point = origin + t * direction
         depth = mass(origin + start * direction, point) + mass(point + travel * point[2] / -travel[2], point)
-        return float(density.at(place(point))) * np.exp(-MEDIUM.extinction[channel] * depth)
+        return float(density.at(in_box(point))) * np.exp(-MEDIUM.extinction[channel] * depth)
 
     phase = optics.henyey_greenstein(-travel @ direction, MEDIUM.anisotropy)
     integrals = [integral(lambda t, c=c: integrand(t, c), start, end) for c in range(3)]

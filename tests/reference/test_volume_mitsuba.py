@@ -66,8 +66,8 @@ def described(scene: Scene, mesh_file: Path, max_depth: int) -> dict[str, Any]:
     }
     for i, light in enumerate(scene.lights):
         if isinstance(light, PointLight):
-            place = [float(x) for x in np.asarray(light.position)]
-            found[f"light{i}"] = {"type": "point", "position": place, "intensity": rgb(light.intensity)}
+            position = [float(x) for x in np.asarray(light.position)]
+            found[f"light{i}"] = {"type": "point", "position": position, "intensity": rgb(light.intensity)}
         else:
             travel = [float(x) for x in np.asarray(light.direction)]
             found[f"light{i}"] = {"type": "directional", "direction": travel, "irradiance": rgb(light.irradiance)}

@@ -206,10 +206,10 @@ def test_a_hollow_box_with_kinks_in_the_light_path() -> None:
 def test_a_lamp_on_a_surface_is_one_a_little_off_it() -> None:
     """From both sides, at a corner of faces as well as within one."""
     box = Object(Box((-2, -2, -1), (2, 2, 0)).tessellate(), MEDIUM)
-    for place in ((0.1, 0.5, 0.0), (2.0, 2.0, 0.0), (-2.0, 0.3, -0.4)):
-        here = middle(scene(box, lights=[PointLight(place, 2.0)]))
+    for position in ((0.1, 0.5, 0.0), (2.0, 2.0, 0.0), (-2.0, 0.3, -0.4)):
+        here = middle(scene(box, lights=[PointLight(position, 2.0)]))
         for off in (1e-9, -1e-9):
-            near = middle(scene(box, lights=[PointLight(np.asarray(place) + off, 2.0)]))
+            near = middle(scene(box, lights=[PointLight(np.asarray(position) + off, 2.0)]))
             np.testing.assert_allclose(near, here, rtol=1e-6)
 
 

@@ -118,9 +118,9 @@ CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], 
 @pytest.mark.parametrize("shift", [0.0, 1e6])
 def test_framing_shows_all_points_and_touches_the_margin(size: tuple[int, int], fov_y: float, shift: float) -> None:
     seen = CUBE * (3, 1, 2) + shift
-    places = np.abs(_in_picture(Camera.framing(seen, size, fov_y=fov_y), seen, size))
+    positions = np.abs(_in_picture(Camera.framing(seen, size, fov_y=fov_y), seen, size))
     # The points are at 1e6 with EPS of it, seen from some meters: 1e6 EPS, and a few more in the eye's position.
-    assert places.max() == pytest.approx(1 / FRAMING_MARGIN, abs=1e-8 if shift else 1e-12)
+    assert positions.max() == pytest.approx(1 / FRAMING_MARGIN, abs=1e-8 if shift else 1e-12)
 
 
 def test_framing_with_a_wide_angle_stays_before_the_nearest_point() -> None:

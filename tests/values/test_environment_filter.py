@@ -99,17 +99,17 @@ def test_uniform_light_stays_uniform() -> None:
         np.testing.assert_allclose(found.irradiance, np.broadcast_to(np.pi * mean, found.irradiance.shape), rtol=1e-6)
 
 
-@pytest.mark.parametrize("place", [(0, 17), (3, 100), (64, 255), (127, 0)])
-def test_the_light_of_one_pixel_is_spread_and_not_lost(place: tuple[int, int]) -> None:
+@pytest.mark.parametrize("texel", [(0, 17), (3, 100), (64, 255), (127, 0)])
+def test_the_light_of_one_pixel_is_spread_and_not_lost(texel: tuple[int, int]) -> None:
     pixels = np.zeros((*LEVEL_SIZE, 3))
-    pixels[place] = (1.0, 10.0, 1e4)
+    pixels[texel] = (1.0, 10.0, 1e4)
     found = filtered(tl.Environment.image(pixels))
     angles = row_solid_angles(*LEVEL_SIZE)
     sums = np.einsum("y,nyxc->nc", angles, found.levels, dtype=np.float64)
-    np.testing.assert_allclose(sums, np.broadcast_to(pixels[place] * angles[place[0]], (LEVELS, 3)), rtol=1e-6)
+    np.testing.assert_allclose(sums, np.broadcast_to(pixels[texel] * angles[texel[0]], (LEVELS, 3)), rtol=1e-6)
     # It is brightest where it was, and the rougher the less so.
-    assert all(level[place][2] == level[..., 2].max() for level in found.levels)
-    assert (np.diff(found.levels[:, place[0], place[1], 2]) < 0).all()
+    assert all(level[texel][2] == level[..., 2].max() for level in found.levels)
+    assert (np.diff(found.levels[:, texel[0], texel[1], 2]) < 0).all()
 
 
 def test_levels_get_rougher_up_to_1(smooth: FilteredEnvironment) -> None:

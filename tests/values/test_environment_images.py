@@ -98,8 +98,8 @@ def test_all_kinds_are_pictures_to_light_with() -> None:
 def test_a_background_is_seen_and_does_not_light() -> None:
     sky, board = tl.Environment.gradient(0.1, 1.0), tl.Environment.checkerboard(1.0, 0.0, tiles=2)
     both = sky.with_background(board)
-    ahead, place = np.array([[0.0, 1.0, 0.0]]), np.array([[0.6, 0.1]])
-    assert both.radiance(ahead, place).tolist() == [[0.0, 0.0, 0.0]]
+    ahead, position = np.array([[0.0, 1.0, 0.0]]), np.array([[0.6, 0.1]])
+    assert both.radiance(ahead, position).tolist() == [[0.0, 0.0, 0.0]]
     assert both.lighting(ahead) == pytest.approx(np.ones((1, 3)))
     assert both.irradiance_on(ahead) == pytest.approx(sky.irradiance_on(ahead))
     assert both.mean == pytest.approx(sky.mean)

@@ -225,8 +225,8 @@ def test_a_texture_is_where_its_transform_and_its_sampler_put_it(
     at = rng.uniform(-0.2, 1.2, (200, 2))
     if "clamp" in (*found.wrap,) and {wrap_s, wrap_t} == {33071, 33648}:
         at = rng.uniform(0.0, 0.4, (200, 2))
-    place = TextureTransform((0.3, -0.2), rotation, (1.5, -0.7)).apply(at)
-    expected = sample_gltf(srgb_to_linear(PICTURE[..., 1] / 255), place, sampler)
+    transformed = TextureTransform((0.3, -0.2), rotation, (1.5, -0.7)).apply(at)
+    expected = sample_gltf(srgb_to_linear(PICTURE[..., 1] / 255), transformed, sampler)
     upwards = np.column_stack([at[:, 0], 1.0 - at[:, 1]])
     np.testing.assert_allclose(found.sample(upwards)[:, 1], expected, atol=1e-6)
 

@@ -15,11 +15,17 @@ import pytest
 
 import translucent as tl
 from translucent.files.images import write_png
-from translucent.files.paths import require_file, require_folder, require_place, write_atomically, write_text_atomically
+from translucent.files.paths import (
+    require_file,
+    require_folder,
+    require_output,
+    write_atomically,
+    write_text_atomically,
+)
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Path:
+def directory(tmp_path: Path) -> Path:
     (tmp_path / "file").write_text("")
     (tmp_path / "folder").mkdir()
     (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
@@ -34,20 +40,20 @@ def place(tmp_path: Path) -> Path:
         (require_file, "dangling", "no such file; check the path"),
         (require_file, "a\0b", "no such file; check the path"),
         (require_file, "long" * 100, "no such file; check the path"),
-        (require_place, "folder", "a folder of that name is there; choose another name"),
-        (require_place, "absent/x", "absent'; make the folder first"),
-        (require_place, "file/x", "file' is no folder; choose another one"),
-        (require_place, "a\0b/x", "make the folder first"),
-        (require_place, "long" * 100 + "/x", "make the folder first"),
+        (require_output, "folder", "a folder of that name is there; choose another name"),
+        (require_output, "absent/x", "absent'; make the folder first"),
+        (require_output, "file/x", "file' is no folder; choose another one"),
+        (require_output, "a\0b/x", "make the folder first"),
+        (require_output, "long" * 100 + "/x", "make the folder first"),
         (require_folder, "file", "file' is no folder; choose another one"),
         (require_folder, "file/x/y", "file' is no folder; choose another one"),
     ],
 )
 def test_a_name_that_cannot_be_used_is_refused(
-    place: Path, check: Callable[[Path, str], None], name: str, message: str
+    directory: Path, check: Callable[[Path, str], None], name: str, message: str
 ) -> None:
     with pytest.raises(tl.InputError) as error:
-        check(place / name, "what was asked")
+        check(directory / name, "what was asked")
     assert str(error.value).startswith("what was asked; ")
     assert str(error.value).endswith(message)
 
@@ -56,16 +62,16 @@ def test_a_name_that_cannot_be_used_is_refused(
     ("check", "name"),
     [
         (require_file, "file"),
-        (require_place, "file"),
-        (require_place, "absent"),
-        (require_place, "dangling"),
-        (require_place, "folder/x"),
+        (require_output, "file"),
+        (require_output, "absent"),
+        (require_output, "dangling"),
+        (require_output, "folder/x"),
         (require_folder, "folder"),
         (require_folder, "absent/x/y"),
     ],
 )
-def test_a_name_that_can_be_used_is_let_through(place: Path, check: Callable[[Path, str], None], name: str) -> None:
-    check(place / name, "what was asked")
+def test_a_name_that_can_be_used_is_let_through(directory: Path, check: Callable[[Path, str], None], name: str) -> None:
+    check(directory / name, "what was asked")
 
 
 # Writing

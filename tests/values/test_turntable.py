@@ -42,9 +42,9 @@ def test_environment_and_background_go_with_it() -> None:
     assert (turned.environment.rotation, turned.environment.seen.rotation) == (250.0, 240.0)
     _, before = start.camera.rays((5, 4))
     _, after = turned.camera.rays((5, 4))
-    place = np.zeros((4, 5, 2))
+    position = np.zeros((4, 5, 2))
     np.testing.assert_allclose(
-        turned.environment.radiance(after, place), start.environment.radiance(before, place), rtol=1e-9
+        turned.environment.radiance(after, position), start.environment.radiance(before, position), rtol=1e-9
     )
     np.testing.assert_allclose(turned.environment.lighting(after), start.environment.lighting(before), rtol=1e-9)
 

@@ -32,7 +32,7 @@ from translucent.scene.camera import Camera
 from translucent.scene.showcase import showcase
 
 #: Distance within which surfaces coincide, as a share of the diagonal.
-SAME_PLACE = 1e-4
+SAME_POINT = 1e-4
 
 
 class NotSeenError(InputError):
@@ -171,7 +171,7 @@ def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | Non
     hit = face >= 0
     if body is not None:
         with np.errstate(invalid="ignore"):
-            hit &= distance <= _first_hits(body, camera, size)[1] + SAME_PLACE * body.diagonal
+            hit &= distance <= _first_hits(body, camera, size)[1] + SAME_POINT * body.diagonal
     origins, directions = (part.reshape(-1, 3)[hit] for part in camera.rays(size))
     corners = mesh.faces[face[hit]]
     weights = _barycentric(mesh.vertices[corners], origins + distance[hit, None] * directions)

@@ -66,13 +66,13 @@ def _check_glb(job: Job, record: Record, results: Results, medium: Medium | None
     file = read_gltf(path)
     bodies, found = Bodies(file, metres), Checks()
     for part in record["maps"]:
-        place = part["place"][0], part["place"][1]
-        mesh, material = results[place].mesh, _material_at(file, part)
+        key = part["place"][0], part["place"][1]
+        mesh, material = results[key].mesh, _material_at(file, part)
         if "material" not in part or material is None or (values := thickness_map(file, material)) is None:
             continue
         require_uv_of(own_corners(file, part, metres, material), mesh, path)
-        name = mesh.name if mesh.name not in found else f"{mesh.name} ({place[0]})"
-        found[name] = _check(mesh, metres * values, medium or _medium(material, metres), bodies.around(place))
+        name = mesh.name if mesh.name not in found else f"{mesh.name} ({key[0]})"
+        found[name] = _check(mesh, metres * values, medium or _medium(material, metres), bodies.around(key))
     return found
 
 

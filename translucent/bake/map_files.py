@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from translucent.bake.baked import BakedMap
-from translucent.bake.gltf.bodies import Place, primitive_name
+from translucent.bake.gltf.bodies import PrimitiveKey, primitive_name
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.gltf.targets import Target
 from translucent.bake.record import Record, shared, write_common_record
@@ -28,8 +28,8 @@ _LONGEST, _SAFE = 60, "._-"
 def save_maps(
     builder: GlbBuilder,
     output: Path,
-    results: Mapping[Place, BakedMap],
-    targets: Mapping[Place, Target],
+    results: Mapping[PrimitiveKey, BakedMap],
+    targets: Mapping[PrimitiveKey, Target],
     *,
     normalize: bool = False,
     invert: bool = False,
@@ -60,39 +60,39 @@ def save_maps(
         As `save_map`.
     """
     file = builder.file()
-    made = {place: target.tex_coord for place, target in targets.items() if target.made_uv}
+    made = {key: target.tex_coord for key, target in targets.items() if target.made_uv}
     if made:
         about = {**about, "uv_file": write_uv_file(file, output)}
     told: list[Record] = []
     paths = _paths(file, output, list(results)) if len(results) > 1 else dict.fromkeys(results, output)
-    for place, result in results.items():
-        remove_partial(paths[place])
-        one: Record = {**about, "place": list(place), "tex_coord": targets[place].tex_coord}
-        told.append(save_map(result, paths[place], normalize=normalize, invert=invert, about=one))
+    for key, result in results.items():
+        remove_partial(paths[key])
+        one: Record = {**about, "place": list(key), "tex_coord": targets[key].tex_coord}
+        told.append(save_map(result, paths[key], normalize=normalize, invert=invert, about=one))
     if len(told) == 1:
         return told[0]
     return write_common_record(output, {**about, **shared(told), "maps": told})
 
 
-def _paths(file: GltfFile, output: Path, places: list[Place]) -> dict[Place, Path]:
+def _paths(file: GltfFile, output: Path, keys: list[PrimitiveKey]) -> dict[PrimitiveKey, Path]:
     """Path of each of several maps; names differ by more than case."""
-    materials = {place: _material_name(file, place) for place in places}
+    materials = {key: _material_name(file, key) for key in keys}
     count = Counter(materials.values())
     taken: set[str] = set()
     paths = {}
-    for place, material in materials.items():
+    for key, material in materials.items():
         unique = bool(material) and count[material] == 1
-        name = _safe(material if unique else f"{material} {primitive_name(file, place)}")
+        name = _safe(material if unique else f"{material} {primitive_name(file, key)}")
         number = 2
         while (free := name if name.casefold() not in taken else f"{name}_{number}").casefold() in taken:
             number += 1
         taken.add(free.casefold())
-        paths[place] = output.with_name(f"{output.stem}-{free}{output.suffix}")
+        paths[key] = output.with_name(f"{output.stem}-{free}{output.suffix}")
     return paths
 
 
-def _material_name(file: GltfFile, place: Place) -> str:
-    index = file.item("meshes", place[0])["primitives"][place[1]].get("material")
+def _material_name(file: GltfFile, key: PrimitiveKey) -> str:
+    index = file.item("meshes", key[0])["primitives"][key[1]].get("material")
     return "" if index is None else str(file.item("materials", index).get("name") or f"material {index}")
 
 

@@ -38,7 +38,7 @@ from translucent.bake.record import DEFINITIONS, Record, describe, fingerprint, 
 from translucent.errors import InputError, RenderError
 from translucent.extras import require_package
 from translucent.files.images import write_exr, write_npy, write_npz, write_png
-from translucent.files.paths import remove_partial, require_place, write_atomically
+from translucent.files.paths import remove_partial, require_output, write_atomically
 from translucent.gltf.file import GltfFile
 from translucent.gltf.write_file import write_gltf
 
@@ -110,10 +110,10 @@ def save_map(
 
 def write_uv_file(model: GltfFile, path: Path) -> Record:
     """Write a model with new UVs beside their map at `path`; returns its name and hash."""
-    place = path.with_name(f"{path.name}{UV_SUFFIX}")
-    remove_partial(place)
-    write_gltf(model, place)
-    return fingerprint(place)
+    uv_path = path.with_name(f"{path.name}{UV_SUFFIX}")
+    remove_partial(uv_path)
+    write_gltf(model, uv_path)
+    return fingerprint(uv_path)
 
 
 def check_map_output(
@@ -123,7 +123,7 @@ def check_map_output(
     asked, suffix = f"output {str(path)!r}", path.suffix.lower()
     if suffix not in suffixes:
         raise InputError(asked, f"suffix {path.suffix!r}", f"use {', '.join(suffixes[:-1])} or {suffixes[-1]}")
-    require_place(path, asked)
+    require_output(path, asked)
     if not os.access(path.parent, os.W_OK):
         raise RenderError(asked, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
     if suffix == ".glb" and (normalize or invert):

@@ -33,10 +33,10 @@ def error_of(row: Row, quantity: Quantity) -> float | None:
 
 def mark_frontier(rows: Sequence[Row], quantity: Quantity) -> tuple[Row, ...]:
     """Mark the rows on the frontier by `Row.pareto`."""
-    placed = [row for row in rows if _place(row, quantity) is not None]
+    shown = [row for row in rows if _coordinates(row, quantity) is not None]
     return tuple(
         dataclasses.replace(
-            row, pareto=_place(row, quantity) is not None and not any(beats(o, row, quantity) for o in placed)
+            row, pareto=_coordinates(row, quantity) is not None and not any(beats(o, row, quantity) for o in shown)
         )
         for row in rows
     )
@@ -47,7 +47,7 @@ def beats(one: Row, other: Row, quantity: Quantity) -> bool:
 
     A row that marks pixels as not to be trusted leaves a part of the picture out: it beats none that marks fewer.
     """
-    a, b = _place(one, quantity), _place(other, quantity)
+    a, b = _coordinates(one, quantity), _coordinates(other, quantity)
     if a is None or b is None or (one.invalid or 0.0) > (other.invalid or 0.0) + 1e-3:
         return False
     (time_a, noise_a, error_a), (time_b, noise_b, error_b) = a, b
@@ -58,7 +58,7 @@ def beats(one: Row, other: Row, quantity: Quantity) -> bool:
     return (faster and not worse) or (better and not slower)
 
 
-def _place(row: Row, quantity: Quantity) -> tuple[float, float, float] | None:
+def _coordinates(row: Row, quantity: Quantity) -> tuple[float, float, float] | None:
     """Time, its noise, and error."""
     error = error_of(row, quantity)
     if row.ratio is None or error is None or row.kind == "floor":

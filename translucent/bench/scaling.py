@@ -196,9 +196,9 @@ def _media(count: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
         media = [Medium(absorption=np.roll((0.2, 0.5, 1.0), i) * (1 + i / count)) for i in range(count)]
         objects = []
         for i in range(MAX_SLOTS):
-            place = np.eye(4)
-            place[:3, 3] = (i % 4, i // 4, 0.3 * (i % 3))
-            objects.append(Object(ball, media[i % count], place))
+            matrix = np.eye(4)
+            matrix[:3, 3] = (i % 4, i // 4, 0.3 * (i % 3))
+            objects.append(Object(ball, media[i % count], matrix))
         return Scene(objects, framing(objects, size)), size
 
     return make

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from translucent.scene.environment import Environment
     from translucent.scene.scene import Object, Scene
 
-#: Default field of view in degrees, and up vector, of a camera that options place.
+#: Default field of view in degrees, and up vector, of a camera that options define.
 DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
 
 
-class View(NamedTuple):
+class CameraOptions(NamedTuple):
     """The options that choose a camera, as they were given."""
 
     camera: int | None = None
@@ -32,8 +32,8 @@ class View(NamedTuple):
     fov: float | None = None
 
     @property
-    def placed(self) -> list[str]:
-        """The options among these that place a camera."""
+    def defining(self) -> list[str]:
+        """The options among these that define a camera, rather than choose one of the file."""
         options = {"--eye": self.eye, "--target": self.target, "--up": self.up, "--fov": self.fov}
         return [option for option, value in options.items() if value is not None]
 
@@ -49,7 +49,7 @@ def read_scene(
     model: str,
     unit: str,
     medium: Medium | None,
-    view: View | None = None,
+    options: CameraOptions | None = None,
     size: tuple[int, int] = (1280, 720),
     environment: Environment | None = None,
     roughness: float | None = None,
@@ -60,21 +60,25 @@ def read_scene(
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled, finished, showcase
 
-    view = view or View()
-    if view.camera is not None and view.placed:
-        raise InputError(f"--camera {view.camera}", f"{', '.join(view.placed)} given, too", "give one or the other")
+    options = options or CameraOptions()
+    if options.camera is not None and options.defining:
+        raise InputError(
+            f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
+        )
     if not is_scene_file(model):
-        if view.camera is not None:
-            raise InputError(f"--camera {view.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
+        if options.camera is not None:
+            raise InputError(f"--camera {options.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
         scene = showcase(read_mesh(model, unit, allow_outside), medium, size, environment=environment)
     else:
-        scene = load_scene(model, unit, None if view.placed else view.camera or 0, size, allow_outside=allow_outside)
+        scene = load_scene(
+            model, unit, None if options.defining else options.camera or 0, size, allow_outside=allow_outside
+        )
         if medium is not None:
             scene = filled(scene, medium)
         if environment is not None:
             scene = dataclasses.replace(scene, environment=environment)
     scene = finished(scene, roughness)
-    return dataclasses.replace(scene, camera=_placed_camera(scene, view, size)) if view.placed else scene
+    return dataclasses.replace(scene, camera=_defined_camera(scene, options, size)) if options.defining else scene
 
 
 def require_translucent(model: str, scene: Scene) -> None:
@@ -121,18 +125,18 @@ def mesh_file(model: str, unit: str) -> str:
     return model
 
 
-def _placed_camera(scene: Scene, view: View, size: tuple[int, int]) -> Camera:
-    """Camera that the options place, or that frames all objects as they say."""
+def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int]) -> Camera:
+    """Camera that the options define, or that frames all objects as they say."""
     from translucent.scene.camera import Camera
     from translucent.scene.showcase import framing
 
-    up, fov = read_vector("--up", view.up or DEFAULT_UP), DEFAULT_FOV if view.fov is None else view.fov
-    if view.eye is None:
-        if view.target is not None:
+    up, fov = read_vector("--up", options.up or DEFAULT_UP), DEFAULT_FOV if options.fov is None else options.fov
+    if options.eye is None:
+        if options.target is not None:
             raise InputError("--target", "--eye is missing", "give both, or neither")
         return framing(scene.objects, size, fov_y=fov, up=up)
-    target = scene.bounds.mean(axis=0) if view.target is None else read_vector("--target", view.target)
-    return Camera.look_at(read_vector("--eye", view.eye), target, up, fov_y=fov)
+    target = scene.bounds.mean(axis=0) if options.target is None else read_vector("--target", options.target)
+    return Camera.look_at(read_vector("--eye", options.eye), target, up, fov_y=fov)
 
 
 def read_vector(option: str, text: str) -> list[float]:

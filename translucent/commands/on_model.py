@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from translucent.commands.common import triple_text
-from translucent.commands.model import View, read_scene
+from translucent.commands.model import CameraOptions, read_scene
 
 if TYPE_CHECKING:
     from translucent.frames.frame import Frame
@@ -23,7 +23,9 @@ def thickness_on(model: str, unit: str, eye: str | None, allow_outside: bool = F
     import translucent as tl
 
     # Any medium will do: only the thickness is looked at.
-    scene = read_scene(model, unit, tl.Medium(absorption=1.0), View(eye=eye), SIZE, allow_outside=allow_outside)
+    scene = read_scene(
+        model, unit, tl.Medium(absorption=1.0), CameraOptions(eye=eye), SIZE, allow_outside=allow_outside
+    )
     with tl.Renderer() as renderer:
         return renderer.render(scene, SIZE)
 

@@ -29,7 +29,7 @@ from translucent.commands.darkness import warn_if_black
 from translucent.commands.model import (
     DEFAULT_FOV,
     DEFAULT_UP,
-    View,
+    CameraOptions,
     is_own,
     medium_lines,
     read_scene,
@@ -125,9 +125,9 @@ def render(
     pixels = read_size(size)
     medium = read_medium(color, distance, preset_name, clamp)
     method = read_method(method_name, thickness)
-    view = View(camera, eye, target, up, fov)
+    options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
-    scene = read_scene(model, unit, medium, view, pixels, lit, roughness, allow_outside=allow_outside)
+    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, allow_outside=allow_outside)
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)

@@ -16,7 +16,7 @@ from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.outline import Edges, Outline
 from translucent.cpu.picture import Band, Picture
-from translucent.cpu.view import PAIRS, View
+from translucent.cpu.projection import PAIRS, ProjectedObject
 from translucent.geometry.mesh import Mesh
 from translucent.reference.hits import Hits, from_eye
 from translucent.scene.camera import Camera
@@ -49,8 +49,8 @@ class Tracer:
 
     def __init__(self, traced: TracedMesh, body: Object, picture: Picture) -> None:
         self.embree = traced.embree
-        self._view = View(body, picture)
-        self._outline = Outline.of(self._view, traced.edges)
+        self._seen = ProjectedObject(body, picture)
+        self._outline = Outline.of(self._seen, traced.edges)
         self._eye, self._axes = _camera_in_ball(traced.embree, body, picture.camera)
 
     def hits(self, band: Band) -> Hits:
@@ -59,7 +59,7 @@ class Tracer:
         if not incomplete.any():
             return found
         # Where the proof fails, every face that may cover the pixel is tried.
-        rest = self._view.meet(band, self._view.boxed_pairs(band, incomplete))
+        rest = self._seen.meet(band, self._seen.boxed_pairs(band, incomplete))
         both = _joined([found.where(~incomplete[found.pixel]), rest])
         return both.where(np.argsort(both.pixel, kind="stable"))
 
@@ -67,23 +67,23 @@ class Tracer:
         """Hits that Embree finds, decided in float64, and (pixels,): rays whose hits are not proved complete."""
         expected, incomplete = self._outline.counts(band)
         pixel = np.flatnonzero((expected > 0) & ~incomplete)
-        passing = self._view.passing
+        passing = self._seen.passing
         ray, face = self.embree.candidates(*self.rays(band, pixel), expected[pixel], ~passing)
         pairs = _sliced(pixel[ray], face)
-        if self._view.any_passing:
+        if self._seen.any_passing:
             # These are not expected, for they have no outline; there are few of them, and all are tried.
             proper = ~passing[face]
             everywhere = np.ones(band.pixels, dtype=bool)
-            pairs = chain(_sliced(pixel[ray[proper]], face[proper]), self._view.boxed_pairs(band, everywhere, passing))
-        hits = self._view.meet(band, pairs)
+            pairs = chain(_sliced(pixel[ray[proper]], face[proper]), self._seen.boxed_pairs(band, everywhere, passing))
+        hits = self._seen.meet(band, pairs)
         found = np.bincount(hits.pixel[~passing[hits.face]], minlength=band.pixels)
         return hits, incomplete | (found != expected)
 
     def rays(self, band: Band, pixel: Integers) -> tuple[Array, Array]:
         """Origins and unit directions (k, 3) of the rays of pixels (k,), in the ball of `EmbreeMesh`."""
-        points = self._view.picture.points(band, pixel)
+        points = self._seen.picture.points(band, pixel)
         across = points[:, :1] * self._axes[0] + points[:, 1:] * self._axes[1]
-        if self._view.picture.perspective:
+        if self._seen.picture.perspective:
             origins, directions = np.broadcast_to(self._eye, across.shape), across + self._axes[2]
         else:
             origins, directions = self._eye + across, np.broadcast_to(self._axes[2], across.shape)

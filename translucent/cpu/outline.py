@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.picture import Band
-from translucent.cpu.view import View, expand, slices
+from translucent.cpu.projection import ProjectedObject, expand, slices
 from translucent.geometry.mesh import Mesh
 
 #: Generous bound of the relative rounding of positions in the picture: doubt costs time, and errors lose surfaces.
@@ -71,15 +71,15 @@ class Outline:
     change: Array
 
     @classmethod
-    def of(cls, view: View, edges: Edges) -> Outline:
-        """Outline of the object in `view`, without the faces that pass the eye."""
-        a, b, c = view.projected[view.body.mesh.faces].transpose(1, 2, 0)
+    def of(cls, seen: ProjectedObject, edges: Edges) -> Outline:
+        """Outline of the object in the picture, without the faces that pass the eye."""
+        a, b, c = seen.projected[seen.body.mesh.faces].transpose(1, 2, 0)
         with np.errstate(under="ignore"):
             clockwise = np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).astype(np.int8)
-        clockwise[view.passing] = 0
+        clockwise[seen.passing] = 0
         net = np.bincount(edges.edge.ravel(), (clockwise[:, None] * edges.turn).ravel(), len(edges.ends))
         chosen = np.flatnonzero(net)
-        first, second = view.projected[edges.ends[chosen]].transpose(1, 0, 2)
+        first, second = seen.projected[edges.ends[chosen]].transpose(1, 0, 2)
         # Rows count downwards: a face that appears clockwise lies to the right of its sides that go up.
         upwards = second[:, 1] < first[:, 1]
         start, end = np.where(upwards[:, None], (second, first), (first, second))

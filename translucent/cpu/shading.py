@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers
-from translucent.cpu.view import slices
+from translucent.cpu.projection import slices
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan

@@ -42,7 +42,7 @@ def require_file(path: Path, asked: str) -> None:
     raise InputError(asked, "no such file", "check the path")
 
 
-def require_place(path: Path, asked: str) -> None:
+def require_output(path: Path, asked: str) -> None:
     """Raise unless a file can be written to the path.
 
     Parameters

@@ -83,13 +83,13 @@ def tone_agx(linear: npt.ArrayLike) -> Array:
         return np.asarray(np.clip(widened, 0.0, 1.0) ** AGX_DISPLAY)
 
 
-def agx_sigmoid(place: npt.ArrayLike) -> Array:
+def agx_sigmoid(share: npt.ArrayLike) -> Array:
     """AgX's curve from 0 at 0 to 1 at 1: middle gray becomes 1/2, and the slope there is 2.
 
     x / (1 + a |x|^p)^(1/p) on either side of middle gray, with the a that makes it end at 0 and at 1.
     """
     pivot = -AGX_STOPS[0] / (AGX_STOPS[1] - AGX_STOPS[0])
-    x = np.asarray(place, dtype=np.float64) - pivot
+    x = np.asarray(share, dtype=np.float64) - pivot
     power, reach = np.where(x < 0, AGX_TOE, AGX_SHOULDER), np.where(x < 0, pivot, 1.0 - pivot)
     with np.errstate(under="ignore"):
         bend = ((2.0 * AGX_SLOPE * reach) ** power - 1.0) * (np.abs(x) / reach) ** power

@@ -13,7 +13,7 @@ import numpy as np
 from translucent.arrays import Pixels
 from translucent.errors import InputError
 from translucent.extras import require_package
-from translucent.files.paths import require_folder, require_place, write_atomically
+from translucent.files.paths import require_folder, require_output, write_atomically
 from translucent.frames.film import write_film
 from translucent.frames.writing import write_pictures
 
@@ -43,7 +43,7 @@ def check_animation(path: Path, fps: float) -> None:
             f"suffix {path.suffix!r}",
             f"use {', '.join(WRITERS)}, or a folder",
         )
-    require_place(path, asked)
+    require_output(path, asked)
     if path.suffix.lower() == ".mp4":
         require_package("imageio_ffmpeg", asked, "use .webp or .gif")
 

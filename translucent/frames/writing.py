@@ -15,7 +15,7 @@ from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.files.folders import make_folder
 from translucent.files.images import write_exr, write_npz, write_png
-from translucent.files.paths import require_place, write_atomically
+from translucent.files.paths import require_output, write_atomically
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 
@@ -27,7 +27,7 @@ def check_output(path: Path) -> None:
     """Raise before any work is done if a frame could not be written to `path`."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .png, .exr or .npz")
-    require_place(path, f"output {str(path)!r}")
+    require_output(path, f"output {str(path)!r}")
     if path.suffix.lower() == ".exr":
         require_package("OpenEXR", f"output {str(path)!r}")
 

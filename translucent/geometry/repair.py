@@ -41,17 +41,17 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    places = equal_rows(vertices)
-    points = vertices[places.first]
+    positions = equal_rows(vertices)
+    points = vertices[positions.first]
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     if len(pairs) == 0:
-        return np.asarray(places.first[places.of])
+        return np.asarray(positions.first[positions.of])
     count = len(points)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     groups, label = connected_components(graph, directed=False)
     representative = np.full(groups, len(vertices), dtype=np.int64)
-    np.minimum.at(representative, label, places.first)
-    return np.asarray(representative[label][places.of])
+    np.minimum.at(representative, label, positions.first)
+    return np.asarray(representative[label][positions.of])
 
 
 def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote
 
 from translucent.errors import InputError, TranslucentWarning
-from translucent.files.paths import require_place, write_atomically
+from translucent.files.paths import require_output, write_atomically
 from translucent.gltf.file import BINARY_CHUNK, CHUNK, GLB_VERSION, HEADER, JSON_CHUNK, MAGIC, GltfFile, Json
 from translucent.gltf.pack import embed_images, gather, is_link
 
@@ -59,7 +59,7 @@ def check_gltf_output(path: Path) -> None:
     """Raise `InputError` unless `path` is a valid name for a glTF file in an existing folder."""
     if path.suffix.lower() not in (".glb", ".gltf"):
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .glb or .gltf")
-    require_place(path, f"output {str(path)!r}")
+    require_output(path, f"output {str(path)!r}")
 
 
 def _relocated(file: GltfFile, path: Path) -> Json:

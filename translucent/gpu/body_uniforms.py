@@ -35,7 +35,7 @@ class BodyRole:
     slot : int
         Whose winding number its crossings change.
     number : int
-        Its place among the objects of the scene.
+        Its index among the objects of the scene.
     """
 
     anchored: bool
@@ -89,8 +89,8 @@ def body_uniforms(placement: Placement, view: SampleView, role: BodyRole, media:
         count_offset=role.count.offset,
         subpixel=role.count.subpixel,
         snapping_share=role.count.snapping_share,
-        place_scale=1.0 / media.length,
-        place_start=(anchor - media.near) / media.length,
+        axial_depth_scale=1.0 / media.length,
+        axial_depth_start=(anchor - media.near) / media.length,
         slot=role.slot,
         starts_unknown=placement.on_surface,
         object=role.number,

@@ -16,7 +16,7 @@ from translucent.gpu.ledger import before_making
 class MeshBuffers:
     """Vertex and index buffers of one mesh; vertices are offsets from the center of the mesh, in float32.
 
-    The offsets are taken in float64, so float32 resolves the body's size, not its place in the world. Nothing here
+    The offsets are taken in float64, so float32 resolves the body's size, not its position in the world. Nothing here
     refers to the mesh: its end must be able to end these buffers.
     """
 

@@ -52,19 +52,19 @@ CONSTANTS: dict[str, str] = {
     "SERIES_LIMIT": "0.5",
     "NOTHING": "1e30",  # beyond every distance: coordinates end at 1e18
     "UNEXPECTED": "1e6",  # a count that no pixel expects
-    "PLACE_BITS": "29",  # of a crossing's 30 bits, those that place and slot share; one is the side's
+    "AXIAL_BITS": "29",  # of a crossing's 30 bits, those that axial depth and slot share; one is the side's
     "LARGEST_WORD": "0x3fffffffu",
     "SORTABLE_OFFSET": "0x00800000u",  # bits of the smallest normal float
     "PEEL_UNIT": "4096.0",  # alpha of a peeling pass holds two numbers: this times one, plus the other
     "PEEL_BATCH": str(PEEL_BATCH),
     "PEEL_TILE": str(PEEL_TILE),
-    "STEEP_IN_LIGHT_VIEW": "5e-3",  # places per texel, from which on a face may well curve within a texel
+    "STEEP_IN_LIGHT_VIEW": "5e-3",  # axial depth per texel, from which on a face may well curve within a texel
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
     "DENSITY_GRID": "1.0",
     "DENSITY_LINEAR": "2.0",
     "DENSITY_EXPONENTIAL": "3.0",
-    "TURNS_BITS": "6",  # of a word, for how often a medium fills a place
+    "TURNS_BITS": "6",  # of a word, for how often a medium fills a point
     "TURNS_PER_WORD": "5",
     "NEAR_LIGHT": "0.25",  # lights nearer to a segment than this share of it are near
     "FLAG_COVERED": "1.0",
@@ -88,7 +88,7 @@ CONSTANTS: dict[str, str] = {
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "RECORD_SIZE": "8",  # bodies that a ray can be in
     "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene
-    "TOUCHING": "1e-6",  # places between surfaces that count as one interface
+    "TOUCHING": "1e-6",  # axial depth between surfaces that count as one interface
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored

@@ -118,7 +118,7 @@ class FrameJob(SceneView):
         self.gl.blend_func = moderngl.ONE, moderngl.ONE
 
     def bind_opaque(self, unit: int) -> None:
-        """Bind the places where rays end for the shader that reads texture `unit`, if there are any."""
+        """Bind the axial depths where rays end for the shader that reads texture `unit`, if there are any."""
         if self.features.has_opaque:
             self.targets.opaque().color_attachments[0].use(unit)
 

@@ -163,7 +163,7 @@ VIEW = UniformBlock(
         ("ray_right", "f4", (4,)),
         ("ray_up", "f4", (4,)),
         ("ray_forward", "f4", (4,)),
-        ("opaque_range", "f4", (2,)),  # place of the nearest opaque point, and 1 / how many places it is to the last
+        ("opaque_range", "f4", (2,)),  # axial depth of the nearest opaque point, and 1 / that from it to the last
     ),
 )
 
@@ -174,7 +174,7 @@ BODY = UniformBlock(
     (
         ("clip_from_offset", "f4", (4, 4)),
         ("world_from_normal", "f4", (4, 4)),
-        ("axis", "f4", (4,)),  # camera's forward axis in object space; w: the anchor's place along it
+        ("axis", "f4", (4,)),  # camera's forward axis in object space; w: the anchor's position along it
         ("extinction", "f4", (4,)),
         ("eye_from_offset", "f4", (4, 4)),  # world axes, from the eye
         ("color", "f4", (4,)),  # what an opaque object reflects
@@ -190,9 +190,9 @@ BODY = UniformBlock(
             "f4",
             (),
         ),  # the same, over the metres that a share of 1 stands for
-        # The place of a point: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
-        ("place_scale", "f4", ()),  # places per metre
-        ("place_start", "f4", ()),  # place of the anchor
+        # Axial depth: 0 where the scene's media begin along the forward axis, or at the eye; 1 where they end.
+        ("axial_depth_scale", "f4", ()),  # axial depth per metre
+        ("axial_depth_start", "f4", ()),  # axial depth of the anchor
         ("slot", "i4", ()),
         ("starts_unknown", "i4", ()),  # whether the eye is on the surface, so that rays start on either side of it
         ("object", "i4", ()),  # its number in the scene
@@ -221,7 +221,7 @@ MEDIA = UniformBlock(
         ("slot_extinction", "f4", (MAX_SLOTS, 4)),  # w: least winding number at the start of a ray
         ("slot_emission", "f4", (MAX_SLOTS, 4)),  # w: greatest
         ("slot_scattering", "f4", (MAX_SLOTS, 4)),  # w: anisotropy
-        ("place_metres", "f4", ()),  # metres along the forward axis from place 0 to place 1
+        ("media_length", "f4", ()),  # metres along the forward axis from axial depth 0 to 1
         ("slot_bits", "i4", ()),  # bits that tell slots apart
     ),
 )
@@ -253,11 +253,11 @@ SURFACES = UniformBlock(
         ("surface_right", "f4", (4,)),  # camera's axes, times half the view's extent (at distance 1); w: perspective
         ("surface_up", "f4", (4,)),
         ("surface_off_axis", "f4", (4,)),  # from the camera's axis to the center
-        # Metres ahead of the center of place 0, from place 0 to place 1, ahead of the eye of the center, and ahead of
-        # the center of the wall that a checkerboard is.
+        # Metres ahead of the center of axial depth 0, from axial depth 0 to 1, ahead of the eye of the center, and
+        # ahead of the center of the wall that a checkerboard is.
         ("surface_ahead", "f4", (4,)),
         ("surface_reach", "f4", ()),  # metres as far as which refracted rays look for opaque surfaces
-        ("surface_eye_place", "f4", ()),
+        ("surface_eye_axial_depth", "f4", ()),
     ),
 )
 
@@ -266,7 +266,7 @@ LIGHTS = UniformBlock(
     "Lights",
     4,
     (
-        ("light_place", "f4", (MAX_LIGHTS, 4)),  # point: position from the eye, w = 1; directional: towards it, w = 0
+        ("light_position", "f4", (MAX_LIGHTS, 4)),  # from the eye, w = 1; or direction to the light, w = 0
         ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance
         ("light_count", "i4", ()),
     ),
@@ -280,15 +280,15 @@ SCATTER = UniformBlock(
         ("scatter_right", "f4", (4,)),  # camera's axes, times half the extent of the view (at distance 1)
         ("scatter_up", "f4", (4,)),
         ("scatter_off_axis", "f4", (4,)),  # from the camera's axis to the center
-        ("scatter_near", "f4", (4,)),  # metres ahead of the eye of place 0; the same from the center; 1 in perspective
-        ("scatter_light_place", "f4", (MAX_SCATTER_LIGHTS, 4)),  # position, w = 1; or direction to the light, w = 0
+        ("scatter_near", "f4", (4,)),  # metres of axial depth 0 ahead of the eye; ahead of the center; 1 in perspective
+        ("scatter_light_position", "f4", (MAX_SCATTER_LIGHTS, 4)),  # position, w = 1; or direction to the light, w = 0
         ("scatter_light_power", "f4", (MAX_SCATTER_LIGHTS, 4)),  # intensity or irradiance; w: 1 if inside a body
         (
             "scatter_light_views",
             "f4",
             (MAX_SCATTER_LIGHTS, 4),
         ),  # first view, how many, texels along a side, first texel
-        ("scatter_views", "f4", (4 * MAX_LIGHT_VIEWS, 4)),  # rows of x, y, w and place, from a position
+        ("scatter_views", "f4", (4 * MAX_LIGHT_VIEWS, 4)),  # rows of x, y, w and axial depth, from a position
         ("gauss", "f4", (MAX_LIGHT_POINTS, 4)),  # points in 0..1 and their weights
         ("gauss_count", "i4", ()),
         ("scatter_light_count", "i4", ()),

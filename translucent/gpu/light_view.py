@@ -50,8 +50,10 @@ class LightView(SceneView):
         seen = np.column_stack([axes, axes @ (center - camera.eye)])
         half_width, half_height = camera.half_extent(self.targets.size)
         one = np.array([0.0, 0.0, 0.0, 1.0])
-        place = (seen[2] - media.near * one) / media.length
-        return np.stack([seen[0] / half_width, seen[1] / half_height, one if camera.fov_y is None else seen[2], place])
+        axial_depth = (seen[2] - media.near * one) / media.length
+        return np.stack(
+            [seen[0] / half_width, seen[1] / half_height, one if camera.fov_y is None else seen[2], axial_depth]
+        )
 
 
 def first_texels(views: Sequence[LightView]) -> list[int]:

@@ -38,11 +38,11 @@ class ShaderSource:
     def locate(self, log: str) -> str:
         """Compiler `log` with ``shaders/<file>:<line>`` in place of source string numbers."""
 
-        def place(match: re.Match[str]) -> str:
+        def located(match: re.Match[str]) -> str:
             number, line = int(match[1]), match[2] or match[3] or match[4]
             return f"shaders/{self.files[number]}:{line}" if number < len(self.files) else match[0]
 
-        return _LOCATION.sub(place, log)
+        return _LOCATION.sub(located, log)
 
 
 def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int = 330) -> ShaderSource:

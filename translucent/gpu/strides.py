@@ -20,15 +20,15 @@ def shifts(samples: int) -> npt.NDArray[np.float64]:
 
 
 @lru_cache(maxsize=4)
-def places(stride: int) -> list[tuple[tuple[int, int], int]]:
-    """Places within stride x stride pixels, in drawing order, and the side of the square that each fills."""
+def phases(stride: int) -> list[tuple[tuple[int, int], int]]:
+    """Phases: pixels within stride x stride pixels, in drawing order, and the side of the square that each fills."""
     order: list[tuple[tuple[int, int], int]] = [((0, 0), stride)]
     block = stride // 2
     while block:
         # Diagonals first: half of the new pixels already make the picture look sharper in both directions.
-        known = {place for place, _ in order}
+        known = {phase for phase, _ in order}
         fresh = [(x, y) for y in range(0, stride, block) for x in range(0, stride, block) if (x, y) not in known]
-        fresh.sort(key=lambda place: (place[0] % (2 * block) == 0) + (place[1] % (2 * block) == 0))
-        order += [(place, block) for place in fresh]
+        fresh.sort(key=lambda phase: (phase[0] % (2 * block) == 0) + (phase[1] % (2 * block) == 0))
+        order += [(phase, block) for phase in fresh]
         block //= 2
     return order

@@ -38,11 +38,11 @@ class Targets:
         return self._get("opaque", (1, 4), with_depth=True)
 
     def entered(self) -> moderngl.Framebuffer:
-        """RGBA32F interface where a ray first enters a body: normal and place, finish, color; with a depth buffer."""
+        """RGBA32F interface where a ray first enters a body: normal, axial depth, finish, color; with depth buffer."""
         return self._get("entered", (4, 4, 4), with_depth=True)
 
     def left(self) -> moderngl.Framebuffer:
-        """RGBA32F interface where a ray first leaves one beyond that: normal and place, finish; with a depth buffer."""
+        """RGBA32F interface where a ray first leaves one beyond it: normal, axial depth, finish; with depth buffer."""
         return self._get("left", (4, 4), with_depth=True)
 
     def surfaced(self) -> moderngl.Framebuffer:
@@ -72,7 +72,7 @@ class Targets:
         return framebuffer
 
     def steepest(self) -> moderngl.Framebuffer:
-        """R32F: how far the rasterizer may misplace the steepest face of a pixel, in places."""
+        """R32F: how far the rasterizer may misplace the steepest face of a pixel, in axial depth."""
         return self._get("steepest", (1,))
 
     def result(self) -> moderngl.Framebuffer:

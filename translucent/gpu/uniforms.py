@@ -71,7 +71,7 @@ def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
         slot_extinction=extinction,
         slot_emission=emission,
         slot_scattering=scattering,
-        place_metres=placed.media.length,
+        media_length=placed.media.length,
         slot_bits=slot_bits(len(slots)),
     )
 
@@ -89,7 +89,7 @@ class LightLookup:
     spans : (lights, 4) float64
         Number of each light's first view, how many it has, texels along a side of each, and number of the first texel.
     rows : (4 views, 4) float64
-        For each view the rows of x, y and w of the picture, and of place, from a point given from the center.
+        For each view the rows of x, y and w of the picture, and of axial depth, from a point given from the center.
     """
 
     center: Array
@@ -112,13 +112,13 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
     """
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
     half_width, half_height = camera.half_extent(size)
-    place, power, spans = (np.zeros((MAX_SCATTER_LIGHTS, 4)) for _ in range(3))
+    position, power, spans = (np.zeros((MAX_SCATTER_LIGHTS, 4)) for _ in range(3))
     seen = scene.lights[: len(lights.spans)]
     for i, light in enumerate(seen):
         if isinstance(light, PointLight):
-            place[i], power[i, :3] = [*(np.asarray(light.position) - lights.center), 1.0], light.intensity
+            position[i], power[i, :3] = [*(np.asarray(light.position) - lights.center), 1.0], light.intensity
         else:
-            place[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
+            position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
         power[i, 3] = lights.inside[i]
         spans[i] = lights.spans[i]
     rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
@@ -134,7 +134,7 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
         scatter_up=[*(camera.up * half_height), 0.0],
         scatter_off_axis=[*off_axis, 0.0],
         scatter_near=[media.near, media.near - float(center @ camera.forward), float(camera.fov_y is not None), 0.0],
-        scatter_light_place=place,
+        scatter_light_position=position,
         scatter_light_power=power,
         scatter_light_views=spans,
         scatter_views=rows,
@@ -160,13 +160,13 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
     lights = scene.lights if shine else ()
     if len(lights) > MAX_LIGHTS:
         raise InputError("lighting opaque objects", f"{len(lights)} lights", f"use at most {MAX_LIGHTS}")
-    place, power = np.zeros((MAX_LIGHTS, 4)), np.zeros((MAX_LIGHTS, 4))
+    position, power = np.zeros((MAX_LIGHTS, 4)), np.zeros((MAX_LIGHTS, 4))
     for i, light in enumerate(lights):
         if isinstance(light, PointLight):
-            place[i], power[i, :3] = [*(np.asarray(light.position) - scene.camera.eye), 1.0], light.intensity
+            position[i], power[i, :3] = [*(np.asarray(light.position) - scene.camera.eye), 1.0], light.intensity
         else:
-            place[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
-    return LIGHTS.pack(light_place=place, light_power=power, light_count=len(lights))
+            position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
+    return LIGHTS.pack(light_position=position, light_power=power, light_count=len(lights))
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:
@@ -215,7 +215,7 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
         surface_off_axis=[*(center - ahead * camera.forward), 0.0],
         surface_ahead=[media.near - ahead, media.length, ahead, float(np.linalg.norm(high - low))],
         surface_reach=scene.diagonal,
-        surface_eye_place=-media.near / media.length,
+        surface_eye_axial_depth=-media.near / media.length,
     )
 
 

@@ -21,7 +21,7 @@ from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
-from translucent.gpu.strides import STRIDES, places, shifts
+from translucent.gpu.strides import STRIDES, phases, shifts
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Scene
 
@@ -94,8 +94,8 @@ class _Side:
         self.step, self.stride = 0, 1
 
     def known(self) -> list[int]:
-        """Drawn place, of the stride x stride ones, that stands in for each place; 0 for the rest."""
-        order = places(self.stride)
+        """Drawn phase, of the stride x stride ones, that stands in for each phase; 0 for the rest."""
+        order = phases(self.stride)
         found = [0] * STRIDES[-1] ** 2
         for (x, y), block in order[: max(self.step, 1)]:
             for i in range(x, x + block):
@@ -135,8 +135,8 @@ class Viewport:
             gl, vertex, "present/gather.frag", radiance=0, optical_depth=1, thickness=2, flags=3
         )
         self._gathering = gl.vertex_array(self._gather, [])
-        self._place = build_program(gl, vertex, "present/place.frag", picture=0)
-        self._placing = gl.vertex_array(self._place, [])
+        self._draw_part = build_program(gl, vertex, "present/window.frag", picture=0)
+        self._drawing_part = gl.vertex_array(self._draw_part, [])
         self._variants: dict[tuple[int, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
         self._colors = gl.texture((256, 1), 3, false_colors().tobytes(), alignment=1)
         # moderngl goes back to the framebuffer in use whenever it makes another one, and fails if that is gone. So
@@ -179,15 +179,15 @@ class Viewport:
             self._release(known)
         self._coarse, self._at_once = made, True
 
-    def place(self, window: moderngl.Framebuffer, part: tuple[int, int, int, int]) -> None:
+    def draw_into(self, window: moderngl.Framebuffer, part: tuple[int, int, int, int]) -> None:
         """Draw the picture into a part of a window: its left and bottom, width and height in pixels."""
         window.use()
         whole = window.viewport
         window.viewport = part
         self._gl.enable_only(moderngl.NOTHING)
         self.texture.use(0)
-        set_uniform(self._place, "part", part)
-        self._placing.render(moderngl.TRIANGLES, vertices=3)
+        set_uniform(self._draw_part, "part", part)
+        self._drawing_part.render(moderngl.TRIANGLES, vertices=3)
         window.viewport = whole
 
     def resize(self, size: Size) -> None:
@@ -216,7 +216,7 @@ class Viewport:
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
         screen.clear()
         if self._screen is not None:
-            self.place(screen, (0, 0, *size))  # until there is another picture
+            self.draw_into(screen, (0, 0, *size))  # until there is another picture
         self._release_pictures()
         self._screen, self.size = screen, size
 
@@ -231,7 +231,7 @@ class Viewport:
         chosen = self._side(side, self.size)
         chosen.stride = stride
         round_, number = divmod(chosen.step, stride * stride)
-        phase, _ = places(stride)[number]
+        phase, _ = phases(stride)[number]
         right, down = shifts(samples)[(round_ - 1) % samples] if round_ else (0.0, 0.0)
         self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)

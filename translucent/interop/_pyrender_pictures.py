@@ -65,7 +65,7 @@ class Picture:
         opacity = self.colors[..., 3:] / 255.0
         # At an edge the mean of the samples has the background in it, which is black.
         encoded = self.colors[..., :3] / 255.0 / np.where(opacity > 0.0, opacity, 1.0)
-        places = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1) / height
-        behind = environment.radiance(camera.rays((width, height))[1], places)
+        positions = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1) / height
+        behind = environment.radiance(camera.rays((width, height))[1], positions)
         radiance = opacity * encoded**GAMMA + (1.0 - opacity) * behind
         return Backdrop(radiance, self.depth, coverage=opacity[..., 0] > 0.0)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from translucent.errors import InputError
-from translucent.files.paths import require_place, write_atomically
+from translucent.files.paths import require_output, write_atomically
 from translucent.media.conversion import CLAMP, clamp_colors, html_strip, summary
 from translucent.media.medium import Medium
 from translucent.media.tables import Row, check_cells, read_table
@@ -32,7 +32,7 @@ class Batch:
     records : list of dict
         Per good row its name, and what `conversion.summary` says.
     errors : list of str
-        Per bad row its place and what is wrong.
+        Per bad row its location and what is wrong.
     clamped : int
         Records whose color was clamped.
     """
@@ -109,7 +109,7 @@ def convert_table(path: str | Path, unit: str = "m", unit_out: str = "m", clamp:
         try:
             record, changed = _record(row, unit, unit_out, clamp)
         except InputError as error:
-            errors.append(f"{row.place}: {error}")
+            errors.append(f"{row.location}: {error}")
         else:
             records.append(record)
             clamped += changed
@@ -120,7 +120,7 @@ def check_batch_output(path: Path) -> None:
     """Raise before any work is done if a table could not be written to `path`."""
     if path.suffix.lower() not in (".json", ".csv"):
         raise InputError(f"output {str(path)!r}", f"suffix {path.suffix!r}", "use .json or .csv")
-    require_place(path, f"output {str(path)!r}")
+    require_output(path, f"output {str(path)!r}")
 
 
 def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> tuple[dict[str, Any], bool]:

@@ -87,9 +87,9 @@ class DensityGrid(Frozen):
         """(...,): density at points (..., 3)."""
         values = np.asarray(self.values)
         count = np.array(values.shape)
-        place = np.clip(np.asarray(points, dtype=np.float64) * count - 0.5, 0.0, count - 1.0)
-        low = np.minimum(place.astype(np.int64), np.maximum(count - 2, 0))
-        share = place - low
+        position = np.clip(np.asarray(points, dtype=np.float64) * count - 0.5, 0.0, count - 1.0)
+        low = np.minimum(position.astype(np.int64), np.maximum(count - 2, 0))
+        share = position - low
         high = np.minimum(low + 1, count - 1)
         x, y, z = np.moveaxis(np.stack([low, high]), -1, 0)
         lower, upper = (np.stack([values[x[i], y[j], z[k]] for j in (0, 1) for k in (0, 1)], axis=-1) for i in (0, 1))
@@ -124,14 +124,14 @@ class DensityGrid(Frozen):
         same = np.flatnonzero(line[1:] == line[:-1])
         length, line = t[same + 1] - t[same], line[same]
         inner = t[same, None] + length[:, None] * _GAUSS
-        place = begin[line, None] + inner[..., None] * (stop - begin)[line, None]
+        position = begin[line, None] + inner[..., None] * (stop - begin)[line, None]
         with np.errstate(under="ignore"):
-            mean = self.at((place + 0.5) / count).mean(axis=1)
+            mean = self.at((position + 0.5) / count).mean(axis=1)
             return np.asarray(np.bincount(line, mean * length, len(begin)), dtype=np.float64)
 
 
 def _cuts(begin: Array, stop: Array, count: int) -> tuple[Integers, Array]:
-    """Cuts of lines at grid planes: line index, and place 0 to 1 at which the coordinate is one of 0 to count - 1."""
+    """Cuts of lines at grid planes: line index, and share 0 to 1 at which the coordinate is one of 0 to count - 1."""
     low, high = np.minimum(begin, stop), np.maximum(begin, stop)
     first = np.clip(np.floor(low) + 1, 0, count).astype(np.int64)
     number = np.maximum(np.clip(np.ceil(high), 0, count).astype(np.int64) - first, 0)
@@ -226,14 +226,14 @@ Density = DensityGrid | LinearDensity | ExponentialDensity
 
 
 def linear_density(along: npt.ArrayLike, start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
-    """(...,): density from `start` to `end` at places along an axis; constant beyond 0 and 1."""
+    """(...,): density from `start` to `end` at positions along an axis; constant beyond 0 and 1."""
     u = np.clip(np.asarray(along, dtype=np.float64), 0.0, 1.0)
     with np.errstate(under="ignore"):
         return np.asarray(np.asarray(start) * (1.0 - u) + np.asarray(end) * u)
 
 
 def exponential_density(along: npt.ArrayLike, densest: npt.ArrayLike, log_ratio: npt.ArrayLike) -> Array:
-    """(...,): exponential density at places along an axis; constant beyond 0 and 1.
+    """(...,): exponential density at positions along an axis; constant beyond 0 and 1.
 
     Parameters
     ----------
@@ -251,8 +251,8 @@ def exponential_density(along: npt.ArrayLike, densest: npt.ArrayLike, log_ratio:
 def exponential_density_mean(
     start: npt.ArrayLike, end: npt.ArrayLike, densest: npt.ArrayLike, log_ratio: npt.ArrayLike
 ) -> Array:
-    """(...,): mean of `exponential_density` on straight lines between places `start` and `end` of the axis."""
-    a, b = (np.clip(np.asarray(place, dtype=np.float64), 0.0, 1.0) for place in (start, end))
+    """(...,): mean of `exponential_density` on straight lines between positions `start` and `end` of the axis."""
+    a, b = (np.clip(np.asarray(position, dtype=np.float64), 0.0, 1.0) for position in (start, end))
     ratio = np.asarray(log_ratio)
     thickest = exponential_density(np.where(ratio > 0, np.maximum(a, b), np.minimum(a, b)), densest, ratio)
     with np.errstate(under="ignore"):
@@ -268,7 +268,7 @@ def trilinear(low: npt.ArrayLike, high: npt.ArrayLike, share: npt.ArrayLike) -> 
         At the corners at the lower and the upper end along x, in the order of (y, z) = (low, low), (low, high),
         (high, low), (high, high).
     share : array_like (..., 3)
-        Place in the cell, 0 to 1 along each axis.
+        Position in the cell, 0 to 1 along each axis.
     """
     u, v, w = np.moveaxis(np.asarray(share, dtype=np.float64), -1, 0)[..., None]
     with np.errstate(under="ignore"):

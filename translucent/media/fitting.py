@@ -109,7 +109,7 @@ def fit_wedge(path: str | Path, unit: str = "m") -> Fit:
             distance, color = row.length("distance", unit), row.color()
             _samples([distance], [color], None)
         except InputError as error:
-            raise InputError(f"{row.place}: {error}") from None
+            raise InputError(f"{row.location}: {error}") from None
         samples.append((distance, color, weight))
     distances, colors, weights = zip(*samples, strict=True)
     return fit_medium(distances, colors, weights)

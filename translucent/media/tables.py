@@ -1,4 +1,4 @@
-"""Tables written by hand: rows of a CSV file or of a JSON list, each with its place for error messages."""
+"""Tables written by hand: rows of a CSV file or of a JSON list, each with its location for error messages."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Row:
 
     Attributes
     ----------
-    place : str
+    location : str
         Where it is: ``FILE line N``, or ``FILE item N`` of a JSON list.
     cells : dict
         Values by column; CSV has text only, without the spaces around it. An empty cell is absent.
     """
 
-    place: str
+    location: str
     cells: dict[str, Any]
 
     def need(self, column: str) -> Any:

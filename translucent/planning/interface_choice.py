@@ -17,7 +17,8 @@ _OLD_NAMES = {"both": ScreenInterfaces(), "front": FrontInterface()}
 
 def default_interfaces(scene: Scene, capabilities: Capabilities) -> Interfaces:
     """The way that the planner takes, if nobody asks for one, in a scene with interfaces."""
-    return ScreenInterfaces()
+    solid = any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
+    return TracedInterfaces() if solid else ScreenInterfaces()
 
 
 def check_interfaces(interfaces: object) -> None:

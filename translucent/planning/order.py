@@ -26,7 +26,7 @@ def why_order_matters(scene: Scene, method: Method | None, interfaces: Interface
         return None
     solids = [body for body in bodies if body.sheet_thickness is None]
     if (found := overlapping_pair(solids)) is not None:
-        earlier, later = (solids[place] for place in found)
+        earlier, later = (solids[index] for index in found)
         return (
             f'overlap="{scene.overlap}": {earlier.mesh.name!r} and {later.mesh.name!r} may overlap, and a sum '
             "would count both"

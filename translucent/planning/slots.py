@@ -38,7 +38,7 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
     """Slots of a scene, sorted by descending priority.
 
     Closed bodies of one medium share a slot: their winding numbers are never negative, so the sum of them says how
-    often, and whether at all, the medium fills a place. An open body keeps a slot of its own, lest its holes cancel
+    often, and whether at all, the medium fills a point. An open body keeps a slot of its own, lest its holes cancel
     those of another, and so does one whose density varies. With ``overlap="priority"`` only bodies of equal priority
     share one.
     """
@@ -68,7 +68,7 @@ def require_clear_priorities(scene: Scene) -> None:
         lambda one, other: (priorities[one] == priorities[other]) & (fillings[one] != fillings[other]),
     )
     if found is not None:
-        i, j = (bodies[place] for place in found)
+        i, j = (bodies[index] for index in found)
         earlier, later = scene.objects[i], scene.objects[j]
         raise InputError(
             'overlap="priority"',
@@ -93,7 +93,7 @@ def overlapping_pair(
 ) -> tuple[int, int] | None:
     """Positions of two bodies whose bounding boxes overlap in more than a face; touching bodies share no volume.
 
-    `matters` gets the places of many pairs, and says which of them count; default: all.
+    `matters` gets the indices of many pairs, and says which of them count; default: all.
     """
     if len(bodies) < 2:
         return None
@@ -105,7 +105,7 @@ def _never_negative(body: Object) -> bool:
 
 
 def _filling(scene: Scene, i: int) -> Hashable:
-    """Key of an object's medium: equal for two objects where it makes no difference which of them fills a place."""
+    """Key of an object's medium: equal for two objects where it makes no difference which of them fills a point."""
     medium, varies = scene.objects[i].medium, scene.objects[i].density is not None
     if medium is None or varies:
         return i

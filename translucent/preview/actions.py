@@ -57,8 +57,8 @@ class Replace:
 
 
 @dataclass(frozen=True)
-class View:
-    """Place the camera."""
+class SetOrbit:
+    """Set the camera's orbit; None: no camera yet."""
 
     orbit: Orbit | None
 
@@ -81,17 +81,17 @@ class Pan:
 
 @dataclass(frozen=True)
 class Zoom:
-    """Get closer by a factor, to what is at a place in the picture: heights right of and below its center."""
+    """Get closer by a factor, to what is at a position in the picture: heights right of and below its center."""
 
     factor: float
     right: float = 0.0
     down: float = 0.0
 
 
-Action = Change | Open | ChoosePreset | Adopt | Replace | View | Turn | Pan | Zoom
+Action = Change | Open | ChoosePreset | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
 
 #: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
-CAMERA_ACTIONS = (View, Turn, Pan, Zoom)
+CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
 
 #: Fields that define the medium by a color at a distance, or by coefficients.
 _BY_COLOR = ("color", "distance")
@@ -118,7 +118,7 @@ def apply(document: Document, action: Action) -> Document:
             return dataclasses.replace(document, material=action.material)
         case Replace():
             return action.document
-        case View():
+        case SetOrbit():
             return dataclasses.replace(document, orbit=action.orbit)
         case _:
             if document.orbit is None:  # nothing is loaded yet, so that there is nothing to move

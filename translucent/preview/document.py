@@ -124,7 +124,7 @@ class Display:
     compare : {"off", "method", "reference", "error"}
         What is right of the split: nothing, `method_b`, the float64 reference, or the signed error against it.
     split : float
-        Place of the split, 0 to 1 from the left.
+        Position of the split, 0 to 1 from the left.
     inset : bool
         Measure against the reference while the view is still, and show that reference in a corner.
     antialias : bool

@@ -131,10 +131,10 @@ class Stage:
         self.drawing = time.perf_counter() - started
         return more
 
-    def place(self, part: tuple[int, int, int, int]) -> None:
+    def show_in(self, part: tuple[int, int, int, int]) -> None:
         """Show the picture in a part of the window: left and bottom, width and height in pixels."""
         assert self._window is not None
-        self.viewport.place(self._window, part)
+        self.viewport.draw_into(self._window, part)
 
     def _draw(self, workspace: Workspace, size: tuple[int, int]) -> bool:
         scene, display = workspace.scene(), workspace.document.display

@@ -15,7 +15,7 @@ from translucent.errors import InputError, RenderError, TranslucentError
 from translucent.files.paths import remove_partial
 from translucent.planning.methods import Method
 from translucent.preview import orbiting
-from translucent.preview.actions import Action, Adopt, Open, Replace, View
+from translucent.preview.actions import Action, Adopt, Open, Replace, SetOrbit
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
 from translucent.preview.document import Document, Model, Orbit
@@ -171,7 +171,7 @@ class Workspace:
         if self.loaded is not None:
             objects = self.loaded.scene.objects
             chosen = [objects[number]] if number is not None and number < len(objects) else objects
-            self.do(View(orbiting.framed(self.document.orbit, chosen, self.size)))
+            self.do(SetOrbit(orbiting.framed(self.document.orbit, chosen, self.size)))
 
     def reframe(self) -> None:
         """Reset the view of the model to that at its opening."""
@@ -362,7 +362,7 @@ class Workspace:
         if present.material.source == "file" and present.material != self.loaded.material:
             self.history = self.history.done(Adopt(self.loaded.material))
         if present.orbit is None:
-            self.history = self.history.done(View(_first_orbit(self.loaded, self.size)))
+            self.history = self.history.done(SetOrbit(_first_orbit(self.loaded, self.size)))
 
 
 def _first_orbit(loaded: Loaded, size: tuple[int, int]) -> Orbit:

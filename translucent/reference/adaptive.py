@@ -9,7 +9,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 
-#: Values (m, p, 3) of the integrand of intervals (m,) at places (m, p) in them.
+#: Values (m, p, 3) of the integrand of intervals (m,) at positions (m, p) in them.
 Integrand = Callable[[Integers, Array], Array]
 
 #: Largest number of halvings of an interval: float64 holds no more.
@@ -51,7 +51,7 @@ def _null_rules() -> Array:
     """(15, 4): weights that give 0 for all polynomials of degree 10 and less (Berntsen & Espelid 1991).
 
     Applied to values they are the four highest coefficients of the polynomial through them. Their norm is a better
-    estimate of the error than the usual difference to the 7 points of Gauss: with a kink at a random place, that is
+    estimate of the error than the usual difference to the 7 points of Gauss: with a kink at a random position, that is
     smaller than the error in 15 of 100 cases, and 10 times smaller in 2; half this norm never is.
     """
     root = np.sqrt(WEIGHTS)
@@ -85,7 +85,7 @@ def integrate(
     Parameters
     ----------
     integrand : callable
-        Called with numbers of intervals (m,) and places in them (m, p); gives values (m, p, 3).
+        Called with numbers of intervals (m,) and positions in them (m, p); gives values (m, p, 3).
     start, end : (k,) float64
         Of each interval.
     group : (k,) int64

@@ -11,7 +11,7 @@ from translucent.formulas import optics
 from translucent.reference.adaptive import integrate
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
-from translucent.reference.volume import Volume, places
+from translucent.reference.volume import Volume, points_on
 
 #: Relative error of the emission of each segment: far below that of anything to compare with.
 TOLERANCE = 1e-12
@@ -39,9 +39,9 @@ def emission_of_mixtures(volume: Volume, rays: Rays, segments: Segments, filling
     def emitted(index: Integers, u: Array) -> Array:
         owner = np.repeat(found[index], u.shape[1])
         ray, enter, t = segments.pixel[owner], segments.t_enter[owner], u.ravel()
-        points = places(rays, ray, t)
+        points = points_on(rays, ray, t)
         own = volume.at(filling[owner], points) @ volume.emission
-        extinction = volume.between(filling[owner], places(rays, ray, enter), points) @ volume.extinction
+        extinction = volume.between(filling[owner], points_on(rays, ray, enter), points) @ volume.extinction
         with np.errstate(under="ignore", over="ignore"):
             return np.asarray((own * optics.transmittance(extinction * (t - enter)[:, None])).reshape(*u.shape, 3))
 

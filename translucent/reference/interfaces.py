@@ -1,8 +1,8 @@
-"""Interfaces on rays: the first place on each ray at which its medium changes.
+"""Interfaces on rays: the first point on each ray at which its medium changes.
 
-Of several bodies at one place, the one of the highest priority decides what light is in; of equal ones, the one that
+Of several bodies at one point, the one of the highest priority decides what light is in; of equal ones, the one that
 the ray entered last (Schmidt & Budge 2002, "Simple nested dielectrics in ray traced images"). A ray carries a record of
-the bodies that it is in, so that the walls of two bodies at one place are one interface.
+the bodies that it is in, so that the walls of two bodies at one point are one interface.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Inside:
     Attributes
     ----------
     windings : (n, objects) int32
-        How often each body contains the place.
+        How often each body contains the point.
     since : (n, objects) int64
         When it was entered last, by a count of each ray's crossings.
     """
@@ -211,17 +211,17 @@ class _Walk:
         count = len(self.time)
         self.here = Inside(self.inside.windings.copy(), self.inside.since.copy())
         self.before = self.optics.dominant(self.inside)
-        self.place = np.full(count, -np.inf)
+        self.reached = np.full(count, -np.inf)
         self.sheet = np.full(count, -1)
         stopped = np.zeros(count, dtype=bool)
         is_wall = np.isin(np.arange(len(self.optics.surfaces)), self.optics.walls)
         for layer in _layers(self.crossings.pixel):
             crossings = self.crossings.where(layer[~stopped[self.crossings.pixel[layer]]])
             ray = crossings.pixel
-            apart = crossings.distance > self.place[ray] + self.optics.tolerance
+            apart = crossings.distance > self.reached[ray] + self.optics.tolerance
             stopped[ray[apart]] = self._changed(ray[apart])
             going = np.flatnonzero(~stopped[ray])
-            self._begin_place(crossings.where(going[apart[going]]))
+            self._begin_point(crossings.where(going[apart[going]]))
             crossings = crossings.where(going)
             sheet = is_wall[crossings.item]
             self._cross(crossings.where(np.flatnonzero(~sheet)))
@@ -238,16 +238,16 @@ class _Walk:
         self.face[ray, item] = crossings.face
         self.barycentric[ray, item] = crossings.barycentric
 
-    def _begin_place(self, crossings: _Crossings) -> None:
+    def _begin_point(self, crossings: _Crossings) -> None:
         ray = crossings.pixel
-        self.place[ray] = crossings.distance
+        self.reached[ray] = crossings.distance
         self.before[ray] = self.optics.dominant(self.inside.where(ray))
         self.here.windings[ray], self.here.since[ray] = self.inside.windings[ray], self.inside.since[ray]
         self.face[ray] = -1
 
     def _meet_sheet(self, crossings: _Crossings) -> None:
         ray = crossings.pixel
-        # With a wall of a body at the same place, the wall goes first.
+        # With a wall of a body at the same point, the wall goes first.
         free = ~self._changed(ray)
         self.sheet[ray[free]] = crossings.item[free]
         self.face[ray[free], crossings.item[free]] = crossings.face[free]
@@ -265,7 +265,7 @@ class _Walk:
         entered = (after != AIR) & (self.face[rays, after] >= 0)
         item = np.where(is_sheet, self.sheet, np.where(entered, after, self.before))
         return Interfaces(
-            np.where(found, self.place, np.inf),
+            np.where(found, self.reached, np.inf),
             item,
             self.face[rays, item],
             self.barycentric[rays, item],

@@ -37,7 +37,7 @@ class Arrival:
     irradiance : (k, 3) float64
         On a surface that faces it, in W/m^2; at most 1e18.
     sound : (k,) bool
-        The place is not at the light itself, and no hole of a body was on the way.
+        The point is not at the light itself, and no hole of a body was on the way.
     """
 
     travel: Array
@@ -51,7 +51,7 @@ class LightPaths:
     Parameters
     ----------
     scene : Scene
-        Places are in metres from the eye of its camera, along the axes of the world.
+        Points are in metres from the eye of its camera, along the axes of the world.
     sheets : sequence of float or None
         As `sheet_thicknesses` gives them.
     """
@@ -59,7 +59,7 @@ class LightPaths:
     def __init__(self, scene: Scene, sheets: tuple[float | None, ...]) -> None:
         self.scene, self.sheets = scene, sheets
         self.tracer, self.volume = Tracer(scene), Volume(scene)
-        self.lights = tuple(_placed(light, scene.camera.eye) for light in scene.lights)
+        self.lights = tuple(_from_eye(light, scene.camera.eye) for light in scene.lights)
 
     def arrival(self, light: Light, points: Array) -> Arrival:
         """Light of one of `lights` that arrives at points (k, 3), unscattered."""
@@ -138,7 +138,7 @@ class LightPaths:
         return shadowed
 
 
-def _placed(light: Light, eye: Array) -> Light:
+def _from_eye(light: Light, eye: Array) -> Light:
     """The light with its position, where it has one, relative to the eye."""
     return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
 

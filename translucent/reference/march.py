@@ -26,7 +26,7 @@ from translucent.reference.quadrature import Steps, even_steps, gauss_steps, has
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind
 from translucent.reference.scattering import light_source, light_variable
-from translucent.reference.volume import places
+from translucent.reference.volume import points_on
 from translucent.scene.camera import check_size
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light, Scene
@@ -242,7 +242,7 @@ class _March:
         return layers if self.scheme.associated else [blending.unassociated(layer) for layer in layers]
 
     def _steps(self, spans: _Spans, terms: _Terms) -> Steps:
-        """Places of the samples."""
+        """Positions of the samples."""
         method = self.scheme.method
         if method.quadrature == "gauss":
             return gauss_steps(spans.start, spans.end, method.steps)
@@ -263,7 +263,7 @@ class _March:
         owner = self._segment_at(spans, at).ravel()
         some = np.flatnonzero(owner >= 0)
         ray = np.repeat(spans.ray, at.shape[1])[some]
-        points = places(self.rays, ray, at.ravel()[some])
+        points = points_on(self.rays, ray, at.ravel()[some])
         weights = volume.at(self.media.filling[owner[some]], points)
         extinction, source = np.zeros((2, at.size, 3))
         extinction[some] = weights @ volume.extinction

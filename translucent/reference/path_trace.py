@@ -24,7 +24,7 @@ from translucent.reference.light_paths import LightPaths
 from translucent.reference.phase import scattered_directions
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind, shade_hits
-from translucent.reference.volume import places
+from translucent.reference.volume import points_on
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
 
@@ -145,7 +145,7 @@ def _estimate(
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """Collisions of paths with media: index of each path, place, and medium there."""
+    """Collisions of paths with media: index of each path, point, and medium there."""
 
     path: Integers
     points: Array
@@ -205,7 +205,7 @@ class _Paths:
                 inside = t < segments.t_exit[layer]
                 layer, t, majorant = layer[inside], t[inside], majorant[inside]
                 path = segments.pixel[layer]
-                points = places(rays, path, t)
+                points = points_on(rays, path, t)
                 weights = self.volume.at(media.filling[layer], points)
                 emission = (weights @ self.volume.emission)[:, self.channels]
                 self._add(owner[path], emission * (throughput[path] / majorant)[:, None])
@@ -252,7 +252,7 @@ class _Paths:
         return np.asarray((weights @ self.scattering) / (weights @ self.extinction))
 
     def _anisotropy(self, weights: Array) -> Array:
-        """(k,): of one of the media at each place, chosen by how much they scatter."""
+        """(k,): of one of the media at each point, chosen by how much they scatter."""
         shares = np.cumsum(weights * self.scattering, axis=1)
         chosen = (shares < self.rng.random((len(weights), 1)) * shares[:, -1:]).sum(axis=1)
         return np.asarray(self.volume.anisotropy[np.minimum(chosen, len(self.scattering) - 1)])

@@ -1,4 +1,4 @@
-"""Quadrature of intervals: places of samples and the parts that they stand for."""
+"""Quadrature of intervals: positions of samples and the parts that they stand for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Words = npt.NDArray[np.uint64]
 
 _MASK = np.uint64(0xFFFFFFFF)
 
-#: Function from places (k, p) in intervals, 0 to 1, to distances (k, p) on the rays, and tells their derivative (k, p).
+#: Function from positions (k, p) in intervals, 0 to 1, to distances (k, p) on the rays, and to their derivative (k, p).
 Variable = Callable[[Array], tuple[Array, Array]]
 
 
@@ -47,7 +47,7 @@ def even_steps(variable: Variable, offset: Array) -> Steps:
     ----------
     variable : callable
     offset : (k, p) float64
-        Place of each sample in its step, 0 to 1.
+        Position of each sample in its step, 0 to 1.
     """
     count = offset.shape[1]
     edges, _ = variable(np.broadcast_to(np.arange(count + 1) / count, (len(offset), count + 1)))

@@ -211,8 +211,8 @@ class _Tree:
     def _environment(self, legs: Legs) -> Array:
         """(k, 3): radiance of unblocked ray segments: the environment's light in reflections, else its background."""
         environment, rays = self.scene.environment, legs.rays
-        place, ahead = self.refracted.on_backdrop(rays)
-        seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], place, rays.backdrop))
+        position, ahead = self.refracted.on_backdrop(rays)
+        seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], position, rays.backdrop))
         if environment.seen.kind == "checkerboard":
             seen[legs.bent & ~ahead] = environment.seen.mean
         return np.where(legs.reflected[:, None], environment.lighting(rays.directions), seen)

@@ -20,7 +20,7 @@ from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.shadow_edges import outline_edges, shadow_edges
-from translucent.reference.volume import places
+from translucent.reference.volume import points_on
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Light
 
@@ -134,7 +134,7 @@ class _InScatter:
         t, stretch = light_variable(light, self.rays, self.segments.pixel[segment], *ends, u)
         owner, distance = np.repeat(segment, u.shape[1]), t.ravel()
         pixel = self.segments.pixel[owner]
-        points = places(self.rays, pixel, distance)
+        points = points_on(self.rays, pixel, distance)
         weights = self.paths.volume.at(self.filling[owner], points)
         source, sound = light_source(self.paths, light, weights, points, self.rays.directions[pixel])
         self.sound[pixel[~sound]] = False
@@ -146,7 +146,7 @@ class _InScatter:
         """(k, 3): from the eye to distances (k,) in segments (k,); exact."""
         pixel, enter = self.segments.pixel[segment], self.segments.t_enter[segment]
         volume = self.paths.volume
-        ends = (places(self.rays, pixel, t) for t in (enter, distance))
+        ends = (points_on(self.rays, pixel, t) for t in (enter, distance))
         with np.errstate(under="ignore", over="ignore"):
             extinction = volume.between(self.filling[segment], *ends) @ volume.extinction
             return optics.transmittance(self.before[segment] + extinction * (distance - enter)[:, None])
@@ -179,7 +179,7 @@ def light_source(
 def light_variable(
     light: Light | None, rays: Rays, ray: Integers, start: Array, end: Array, u: Array
 ) -> tuple[Array, Array]:
-    """Distances t (k, p) on rays (k,) between `start` and `end` (k,), at places u (k, p), 0 to 1, and dt/du.
+    """Distances t (k, p) on rays (k,) between `start` and `end` (k,), at positions u (k, p), 0 to 1, and dt/du.
 
     For a point light equal steps of u are equal angles as seen from it, else equal lengths.
     """

@@ -48,7 +48,7 @@ def scene_segments(scene: Scene, intervals: Intervals, crossings: Crossings) -> 
     Parameters
     ----------
     scene : Scene
-        `Scene.overlap` decides what fills a place in several bodies. A sheet adds to what it stands in.
+        `Scene.overlap` decides what fills a point in several bodies. A sheet adds to what it stands in.
     intervals : Intervals
         Of solids; bodies are indices into `Scene.objects`.
     crossings : Crossings
@@ -60,13 +60,13 @@ def scene_segments(scene: Scene, intervals: Intervals, crossings: Crossings) -> 
     extinction, emission = _coefficients(scene)
     sheet = (crossings.pixel, at, at, crossings.path, extinction[crossings.body], emission[crossings.body], once)
     columns = [np.concatenate(pair) for pair in zip(solid, sheet, strict=True)]
-    # Of two pieces that begin at one place, the sheet goes first: it ends there, too.
+    # Of two pieces that begin at one point, the sheet goes first: it ends there, too.
     order = np.lexsort((columns[2], columns[1], columns[0]))
     return Segments(*(column[order] for column in columns))
 
 
 def mix(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> tuple[Array, Array, Integers]:
-    """Mix of media at places in at least one body, by the overlap policy of the scene.
+    """Mix of media at points in at least one body, by the overlap policy of the scene.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def mix(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> tupl
     bodies : (b,) int64
         Indices into `Scene.objects`, ascending.
     windings : (b, k) int32
-        How often each body winds around each place. Below 0 it fills nothing: such rays are invalid.
+        How often each body winds around each point. Below 0 it fills nothing: such rays are invalid.
 
     Returns
     -------
     extinction, emission : (k, 3) float64
     count : (k,) int64
-        How often thickness counts the place.
+        How often thickness counts the point.
     """
     extinction, emission = (table[bodies] for table in _coefficients(scene))
     inside = windings > 0
@@ -92,7 +92,7 @@ def mix(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> tupl
         media, medium = np.unique(np.hstack([extinction, emission]), axis=0, return_inverse=True)
         present = np.array([inside[medium.ravel() == i].any(axis=0) for i in range(len(media))])
         return _total(present, media[:, :3]), _total(present, media[:, 3:]), once
-    # Bodies of one priority fill their common places alike, so any of them will do.
+    # Bodies of one priority fill their common points alike, so any of them will do.
     order = np.argsort([-scene.objects[i].priority for i in bodies], kind="stable")
     highest = order[inside[order].argmax(axis=0)]
     return extinction[highest] * once[:, None], emission[highest] * once[:, None], once
@@ -107,7 +107,7 @@ def _coefficients(scene: Scene) -> tuple[Array, Array]:
 
 
 def _total(times: npt.NDArray[np.int32] | npt.NDArray[np.bool_], values: Array) -> Array:
-    """(k, 3): at each place, the sum of `values` (b, 3), each as often as `times` (b, k) says."""
+    """(k, 3): at each point, the sum of `values` (b, 3), each as often as `times` (b, k) says."""
     return np.asarray(np.einsum("bk,bc->kc", times.astype(np.float64), values))
 
 
@@ -120,9 +120,9 @@ def _pieces(
     t = np.concatenate([intervals.t_enter, intervals.t_exit, crossings.distance])
     order = np.lexsort((t, pixel))
     pixel, t = pixel[order], t[order]
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    enters, exits = place[: len(row)], place[len(row) : 2 * len(row)]
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    enters, exits = rank[: len(row)], rank[len(row) : 2 * len(row)]
     windings = np.zeros((len(bodies), len(order)), dtype=np.int32)
     windings[row, enters], windings[row, exits] = intervals.winding, -intervals.winding
     # Each interval ends on its ray, so the sums are back to 0 where the next ray begins.

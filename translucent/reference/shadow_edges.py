@@ -1,6 +1,6 @@
 """Shadow edges on view rays: kinks of the incoming light at the outlines of bodies as seen from the light.
 
-There its path through a body begins to exist, or a shadow begins. Rules of quadrature take such a place for smooth
+There its path through a body begins to exist, or a shadow begins. Rules of quadrature take such a point for smooth
 unless an interval ends there, and miss what is between two of them.
 """
 

@@ -68,7 +68,7 @@ class Tracer:
     Parameters
     ----------
     scene : Scene
-        Places are in metres from the eye of its camera, along the axes of the world.
+        Points are in metres from the eye of its camera, along the axes of the world.
     """
 
     def __init__(self, scene: Scene) -> None:

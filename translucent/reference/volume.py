@@ -1,4 +1,4 @@
-"""Media at each place of a scene: their indices, multiplicities and densities."""
+"""Media at each point of a scene: their indices, multiplicities and densities."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from translucent.scene.scene import Scene
 class Volume:
     """The media of a scene as tables, one row for each of `Scene.objects`; 0 for opaque ones.
 
-    Places are in metres from the eye of its camera, along the axes of the world. What fills a place is a row of
+    Points are in metres from the eye of its camera, along the axes of the world. What fills a point is a row of
     weights, one for each object: how much of its medium is there.
 
     Parameters
@@ -60,7 +60,7 @@ class Volume:
         weights = filling.copy() if self._densities else filling
         for i, density in self._densities:
             inside = np.flatnonzero(filling[:, i])
-            weights[inside, i] *= density.at(self._boxes[i].places(points[inside]))
+            weights[inside, i] *= density.at(self._boxes[i].positions(points[inside]))
         return weights
 
     def between(self, filling: Array, start: Array, end: Array) -> Array:
@@ -68,8 +68,8 @@ class Volume:
         weights = filling.copy() if self._densities else filling
         for i, density in self._densities:
             inside = np.flatnonzero(filling[:, i])
-            places = (self._boxes[i].places(points[inside]) for points in (start, end))
-            weights[inside, i] *= density.mean_between(*places)
+            positions = (self._boxes[i].positions(points[inside]) for points in (start, end))
+            weights[inside, i] *= density.mean_between(*positions)
         return weights
 
     def majorant(self, filling: Array, table: Array) -> Array:
@@ -80,7 +80,7 @@ class Volume:
         return np.asarray((filling * largest) @ table)
 
     def source(self, weights: Array, cosine: Array) -> Array:
-        """Sum of sigma_s p of all media in a place, (k, 3) in 1/(m sr); each scatters by its own phase function.
+        """Sum of sigma_s p of all media at a point, (k, 3) in 1/(m sr); each scatters by its own phase function.
 
         Parameters
         ----------
@@ -110,13 +110,13 @@ class _UnitBox:
         self._linear = np.where(extent > 0, 1.0 / np.where(extent > 0, extent, 1.0), 0.0)[:, None] * inverse
         self._center = center_from(body, scene.camera.eye)
 
-    def places(self, points: Array) -> Array:
+    def positions(self, points: Array) -> Array:
         """(k, 3): coordinates of points (k, 3) in the box."""
         return np.asarray(0.5 + (points - self._center) @ self._linear.T)
 
 
-def places(rays: Rays, chosen: Integers, distance: Array) -> Array:
-    """(k, 3): places at distances (k,) on the `chosen` rays (k,), in metres from the eye."""
+def points_on(rays: Rays, chosen: Integers, distance: Array) -> Array:
+    """(k, 3): points at distances (k,) on the `chosen` rays (k,), in metres from the eye."""
     with np.errstate(under="ignore"):
         return np.asarray(rays.origins[chosen] + distance[:, None] * rays.directions[chosen])
 
@@ -146,7 +146,7 @@ def volume_segments(
     """
     segments = scene_segments(scene, intervals, crossings)
     filling = _filling(scene, intervals, crossings)
-    ends = (places(rays, segments.pixel, t) for t in (segments.t_enter, segments.t_exit))
+    ends = (points_on(rays, segments.pixel, t) for t in (segments.t_enter, segments.t_exit))
     weights = volume.between(filling, *ends)
     extinction, emission = weights @ volume.extinction, weights @ volume.emission
     if (crossings.covered > 0).any():
@@ -183,15 +183,15 @@ def _filling(scene: Scene, intervals: Intervals, crossings: Crossings) -> Array:
 
 
 def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) -> Array:
-    """(b, k): multiplicity of each body's medium at each place, by the overlap policy of the scene."""
+    """(b, k): multiplicity of each body's medium at each point, by the overlap policy of the scene."""
     inside = windings > 0
     if scene.overlap == "add" or not len(bodies):
         return np.maximum(windings, 0).astype(np.float64)
     weights = np.zeros(windings.shape)
-    places = np.flatnonzero(inside.any(axis=0))
+    filled = np.flatnonzero(inside.any(axis=0))
     if scene.overlap == "priority":
         order = np.argsort([-scene.objects[i].priority for i in bodies], kind="stable")
-        weights[order[inside[order].argmax(axis=0)][places], places] = 1.0
+        weights[order[inside[order].argmax(axis=0)][filled], filled] = 1.0
         return weights
     keys = [_medium_key(scene, i) for i in bodies]
     for key in dict.fromkeys(keys):
@@ -202,7 +202,7 @@ def _weights(scene: Scene, bodies: Integers, windings: npt.NDArray[np.int32]) ->
 
 
 def _medium_key(scene: Scene, index: int) -> tuple[object, ...]:
-    """Key of a medium, equal for bodies of one medium, which fill common places once; a density makes it unique."""
+    """Key of a medium, equal for bodies of one medium, which fill common points once; a density makes it unique."""
     body = scene.objects[index]
     medium = body.medium
     if medium is None or body.density is not None:

@@ -79,7 +79,7 @@ class EnvironmentMap(Frozen):
         return np.asarray(row_solid_angles(height, width) @ rows * (width / (4.0 * np.pi)))
 
     def at(self, uv: npt.ArrayLike) -> Array:
-        """(..., 3) float64: bilinear lookups at places (..., 2), as `environment.equirectangular_uv` has them."""
+        """(..., 3) float64: bilinear lookups at positions (..., 2), as `environment.equirectangular_uv` has them."""
         height, width = self.pixels.shape[:2]
         u, v = np.moveaxis(np.asarray(uv, dtype=np.float64), -1, 0)
         column, across = _split(u * width - 0.5)
@@ -136,9 +136,9 @@ def _overlaps(fine: Array, coarse: Array) -> Array:
     return np.asarray(np.maximum(high - low, 0.0) / np.diff(coarse)[:, None])
 
 
-def _split(place: Array) -> tuple[npt.NDArray[np.intp], Array]:
-    whole = np.floor(place)
-    return whole.astype(np.intp), (place - whole)[..., None]
+def _split(position: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    whole = np.floor(position)
+    return whole.astype(np.intp), (position - whole)[..., None]
 
 
 def _mix(first: npt.NDArray[Any], second: npt.NDArray[Any], share: Array) -> Array:

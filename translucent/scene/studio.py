@@ -96,9 +96,9 @@ def _panel(towards: Array, panel: Panel) -> tuple[Array, Array]:
     return inside[..., None], brightness[..., None]
 
 
-def _edge(place: Array, softness: float) -> Array:
+def _edge(x: Array, softness: float) -> Array:
     """Smooth window: 1 in the middle, 0 beyond the edges at -1 and 1."""
-    return _smooth((1.0 - np.abs(place)) / softness)
+    return _smooth((1.0 - np.abs(x)) / softness)
 
 
 def _smooth(share: Array) -> Array:

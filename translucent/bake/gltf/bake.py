@@ -41,12 +41,12 @@ def bake_gltf(job: Job, about: Record, progress: Progress | None = None) -> tupl
     results = _bake(job, targets, progress)
     if vertices:
         return write_vertices(builder, output, results, metres=metres, about=about), results
-    places = {target.place: target for target in targets}
+    keys = {target.key: target for target in targets}
     if not inside:
         how = {key: bool(job.get(key)) for key in ("normalize", "invert")}
-        return save_maps(builder, output, results, places, **how, about=about), results
+        return save_maps(builder, output, results, keys, **how, about=about), results
     medium = None if job.get("medium") is None else Medium(absorption=job["medium"])
-    record = write_maps(builder, output, results, targets=places, metres=metres, medium=medium, about=about)
+    record = write_maps(builder, output, results, targets=keys, metres=metres, medium=medium, about=about)
     return record, results
 
 
@@ -55,7 +55,7 @@ def _placed(builder: GlbBuilder, targets: list[Target], metres: float) -> list[T
     matrices = first_transforms(builder.file())
     placed = []
     for target in targets:
-        matrix = matrices.get(target.place[0], np.eye(4))
+        matrix = matrices.get(target.key[0], np.eye(4))
         around = None if target.around is None else transformed(target.around, matrix, metres)
         mesh = transformed(target.mesh, matrix, metres)
         placed.append(dataclasses.replace(target, mesh=mesh, around=around))
@@ -75,5 +75,5 @@ def _bake(job: Job, targets: list[Target], progress: Progress | None) -> Results
         part = f".{number}" if len(targets) > 1 else ""
         result = bake_one(job, target.mesh, target.medium, tell, part, target.around)
         rays_before += result.report.rays
-        results[target.place] = result
+        results[target.key] = result
     return results

@@ -21,7 +21,7 @@ from translucent.gltf.geometry import primitive_mesh
 from translucent.gltf.scene_media import node_transforms, primitives
 
 #: Mesh and primitive of a file.
-Place = tuple[int, int]
+PrimitiveKey = tuple[int, int]
 
 _TRIANGLES = (4, 5, 6)
 
@@ -29,26 +29,26 @@ _TRIANGLES = (4, 5, 6)
 SAME_SIZE = 1e-4
 
 
-def read_primitive(file: GltfFile, place: Place, metres: float, tex_coord: int | None = None) -> Mesh:
+def read_primitive(file: GltfFile, key: PrimitiveKey, metres: float, tex_coord: int | None = None) -> Mesh:
     """Read a primitive in its own space, in metres, with a set of its UVs or none."""
-    primitive = primitives(file, file.item("meshes", place[0]))[place[1]]
+    primitive = primitives(file, file.item("meshes", key[0]))[key[1]]
     attributes = {"POSITION": primitive["attributes"].get("POSITION")}
     if tex_coord is not None:
         attributes["TEXCOORD_0"] = primitive["attributes"][f"TEXCOORD_{tex_coord}"]
-    mesh = primitive_mesh(Accessors(file), {**primitive, "attributes": attributes}, primitive_name(file, place))
+    mesh = primitive_mesh(Accessors(file), {**primitive, "attributes": attributes}, primitive_name(file, key))
     assert mesh is not None  # its mode is one of triangles
     return mesh if metres == 1.0 else dataclasses.replace(mesh, vertices=mesh.vertices * metres)
 
 
-def primitive_name(file: GltfFile, place: Place) -> str:
+def primitive_name(file: GltfFile, key: PrimitiveKey) -> str:
     """The name of a primitive's mesh or node, with its number where there are several."""
-    mesh = file.item("meshes", place[0])
-    users = [node for node in file.items("nodes") if node.get("mesh") == place[0] and node.get("name")]
-    name = str(mesh.get("name") or (users[0]["name"] if users else f"mesh {place[0]}"))
-    return name + (f"[{place[1]}]" if len(mesh["primitives"]) > 1 else "")
+    mesh = file.item("meshes", key[0])
+    users = [node for node in file.items("nodes") if node.get("mesh") == key[0] and node.get("name")]
+    name = str(mesh.get("name") or (users[0]["name"] if users else f"mesh {key[0]}"))
+    return name + (f"[{key[1]}]" if len(mesh["primitives"]) > 1 else "")
 
 
-def triangle_primitives(file: GltfFile) -> dict[Place, Json]:
+def triangle_primitives(file: GltfFile) -> dict[PrimitiveKey, Json]:
     """The primitives of triangles of all meshes that nodes use."""
     used = {node["mesh"] for node in file.items("nodes") if "mesh" in node}
     return {
@@ -72,43 +72,43 @@ class Bodies:
 
     def __init__(self, file: GltfFile, metres: float) -> None:
         self._file, self._metres = file, metres
-        self._outlines: dict[Place, Mesh] = {}
-        self._joined: dict[int, tuple[Mesh, dict[Place, int]] | None] = {}
+        self._outlines: dict[PrimitiveKey, Mesh] = {}
+        self._joined: dict[int, tuple[Mesh, dict[PrimitiveKey, int]] | None] = {}
 
-    def is_closed(self, place: Place) -> bool:
+    def is_closed(self, key: PrimitiveKey) -> bool:
         """Whether a primitive is closed, together with those adjacent to it."""
-        whole = self.around(place) or self._outline(place)
+        whole = self.around(key) or self._outline(key)
         return whole.diagnosis.closed
 
-    def around(self, place: Place) -> Mesh | None:
+    def around(self, key: PrimitiveKey) -> Mesh | None:
         """Body of an open primitive: joined with the other open ones of its mesh, if that closes edges."""
-        if self._outline(place).diagnosis.closed:
+        if self._outline(key).diagnosis.closed:
             return None
-        joined = self._join(place[0])
+        joined = self._join(key[0])
         return None if joined is None else joined[0]
 
-    def wound(self, place: Place, mesh: Mesh) -> Mesh:
+    def wound(self, key: PrimitiveKey, mesh: Mesh) -> Mesh:
         """Mesh of a primitive, with the winding of its faces in the body `around` it."""
-        joined = self._join(place[0])
+        joined = self._join(key[0])
         assert joined is not None
         whole, starts = joined
-        normals = whole.face_normals[starts[place] : starts[place] + len(mesh.faces)]
+        normals = whole.face_normals[starts[key] : starts[key] + len(mesh.faces)]
         turned = np.einsum("fi,fi->f", mesh.face_normals, normals) < 0
         return dataclasses.replace(mesh, faces=np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
 
-    def _outline(self, place: Place) -> Mesh:
-        if place not in self._outlines:
+    def _outline(self, key: PrimitiveKey) -> Mesh:
+        if key not in self._outlines:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", TranslucentWarning)  # of faces that are turned: what is baked tells
-                self._outlines[place] = read_primitive(self._file, place, self._metres)
-        return self._outlines[place]
+                self._outlines[key] = read_primitive(self._file, key, self._metres)
+        return self._outlines[key]
 
-    def _join(self, index: int) -> tuple[Mesh, dict[Place, int]] | None:
+    def _join(self, index: int) -> tuple[Mesh, dict[PrimitiveKey, int]] | None:
         """All open primitives of a mesh as one, and where the faces of each begin; None if that closes no edge."""
         if index not in self._joined:
-            places = [place for place in triangle_primitives(self._file) if place[0] == index]
-            parts = {place: self._outline(place) for place in places}
-            parts = {place: part for place, part in parts.items() if not part.diagnosis.closed}
+            keys = [key for key in triangle_primitives(self._file) if key[0] == index]
+            parts = {key: self._outline(key) for key in keys}
+            parts = {key: part for key, part in parts.items() if not part.diagnosis.closed}
             self._joined[index] = None
             if len(parts) > 1:
                 whole, starts = _joined(parts)
@@ -118,7 +118,7 @@ class Bodies:
         return self._joined[index]
 
 
-def _joined(parts: dict[Place, Mesh]) -> tuple[Mesh, dict[Place, int]]:
+def _joined(parts: dict[PrimitiveKey, Mesh]) -> tuple[Mesh, dict[PrimitiveKey, int]]:
     meshes = list(parts.values())
     first_vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     first_face = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])

@@ -57,10 +57,10 @@ def mesh_file(mesh: Mesh) -> GltfFile:
 
 def _split_at_edges(mesh: Mesh) -> tuple[Indices, Indices, npt.NDArray[np.float32]]:
     """Vertices of the mesh to repeat where it has edges, faces of them, and a unit normal for each."""
-    places = equal_rows(mesh.vertices)
+    points = equal_rows(mesh.vertices)
     # Across a seam of the UVs the surface is as smooth as elsewhere.
-    welded = Mesh(mesh.vertices[places.first], places.of[mesh.faces].astype(np.int32))
-    smooth = welded.vertex_normals[places.of]
+    welded = Mesh(mesh.vertices[points.first], points.of[mesh.faces].astype(np.int32))
+    smooth = welded.vertex_normals[points.of]
     own, corner = mesh.face_normals[:, None], smooth[mesh.faces]
     sharp = np.einsum("fck,fck->fc", np.broadcast_to(own, corner.shape), corner) < np.cos(np.radians(CREASE))
     sharp &= own.any(axis=2)  # a face without area has no normal

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from translucent.bake.baked import BakedMap
 from translucent.bake.encoding import Encoding
-from translucent.bake.gltf.bodies import Place
+from translucent.bake.gltf.bodies import PrimitiveKey
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.gltf.targets import Target
 from translucent.bake.record import Record, describe, shared, unit_of, write_record
@@ -47,9 +47,9 @@ _LINEAR, _MIPMAPS, _REPEAT, _CLAMP = 9729, 9987, 10497, 33071
 def write_maps(
     model: GltfFile | GlbBuilder,
     path: Path,
-    results: Mapping[Place, BakedMap],
+    results: Mapping[PrimitiveKey, BakedMap],
     *,
-    targets: Mapping[Place, Target] | None = None,
+    targets: Mapping[PrimitiveKey, Target] | None = None,
     metres: float = 1.0,
     medium: Medium | None = None,
     about: Record | None = None,
@@ -80,13 +80,13 @@ def write_maps(
     """
     builder = model if isinstance(model, GlbBuilder) else GlbBuilder(model)
     told: list[Record] = []
-    for place, result in results.items():
+    for key, result in results.items():
         if unit_of(result.settings.mode) != "m":
             raise InputError(f"output {str(path)!r}", f"mode {result.settings.mode!r} has no unit", "bake lengths")
         encoding = Encoding.of(result.values, LEVELS)
-        one = {"place": list(place), **describe(result, encoding)}
+        one = {"place": list(key), **describe(result, encoding)}
         if result.values.max() > 0:
-            target = (targets or {}).get(place) or Target(place, result.mesh)
+            target = (targets or {}).get(key) or Target(key, result.mesh)
             one |= _give(builder, target, result, encoding, metres, medium)
         else:
             one["warnings"] = ["no thickness: its material is left as it is"]
@@ -106,7 +106,7 @@ def _give(
     medium: Medium | None,
 ) -> Record:
     """Write a map into the material of one primitive; returns its entry in the record."""
-    index = builder.own_material(*target.place)
+    index = builder.own_material(*target.key)
     material = builder.tree["materials"][index]
     extensions = material.setdefault("extensions", {})
     if excluded := [name for name in EXCLUDED if name in extensions]:

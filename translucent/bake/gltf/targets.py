@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.bake.gltf.bodies import Bodies, Place, primitive_name, read_primitive, triangle_primitives
+from translucent.bake.gltf.bodies import Bodies, PrimitiveKey, primitive_name, read_primitive, triangle_primitives
 from translucent.bake.gltf.builder import INDICES, GlbBuilder
 from translucent.bake.unwrap import unwrap
 from translucent.errors import InputError
@@ -39,7 +39,7 @@ class Target:
 
     Parameters
     ----------
-    place : (int, int)
+    key : (int, int)
         Indices of its mesh, and of it in the mesh.
     mesh : Mesh
         In its own space, in metres, with the UVs of the texture to come, v upwards; without UVs if not `needs_uv`.
@@ -55,7 +55,7 @@ class Target:
         The body that it and others bound, where it is open by itself.
     """
 
-    place: Place
+    key: PrimitiveKey
     mesh: Mesh
     tex_coord: int = 0
     keeps_transform: bool = False
@@ -99,24 +99,24 @@ def find_targets(
     if packed := [name for name in _COMPRESSIONS if name in required]:
         raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
     materials, bodies = materials_of(file), Bodies(file, metres)
-    lit = {place: _material(materials, builder.primitive(*place)) for place in _places(file, materials)}
+    lit = {key: _material(materials, builder.primitive(*key)) for key in _keys(file, materials)}
     # All that is read of the file as it is, before anything is added to it.
-    chosen = {place: bodies.around(place) for place, material in lit.items() if not _is_sheet(material, place, bodies)}
+    chosen = {key: bodies.around(key) for key, material in lit.items() if not _is_sheet(material, key, bodies)}
     found: list[Target] = []
-    for place, around in chosen.items():
-        material, medium = lit[place], _medium(lit[place], metres)
+    for key, around in chosen.items():
+        material, medium = lit[key], _medium(lit[key], metres)
         if not needs_uv:
-            found.append(Target(place, read_primitive(file, place, metres), medium=medium))
+            found.append(Target(key, read_primitive(file, key, metres), medium=medium))
             continue
-        tex_coord, keeps = None if new_uv else _tex_coord(builder.primitive(*place), material), False
+        tex_coord, keeps = None if new_uv else _tex_coord(builder.primitive(*key), material), False
         if made := tex_coord is None:
-            tex_coord = add_uv(builder, place, size)
-        mesh = read_primitive(builder.file() if made else file, place, metres, tex_coord)
+            tex_coord = add_uv(builder, key, size)
+        mesh = read_primitive(builder.file() if made else file, key, metres, tex_coord)
         if not (made or plain_uv):
             mesh, keeps = _transformed(mesh, material, tex_coord)
         if around is not None:
-            mesh = bodies.wound(place, mesh)
-        found.append(Target(place, mesh, tex_coord, keeps, medium, made, around))
+            mesh = bodies.wound(key, mesh)
+        found.append(Target(key, mesh, tex_coord, keeps, medium, made, around))
     if not found:
         told = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
         raise InputError(f"glTF {str(file.path)!r}", told, "give one of them a volume, or a closed mesh")
@@ -129,31 +129,31 @@ def _material(materials: list[GltfMaterial], primitive: Json) -> GltfMaterial | 
 
 def left_out(file: GltfFile, targets: list[Target]) -> list[str]:
     """Primitives that get no thickness, a line for each reason."""
-    materials, chosen = materials_of(file), {target.place for target in targets}
-    reasons: dict[str, list[Place]] = {}
-    for place, primitive in triangle_primitives(file).items():
-        if place not in chosen:
+    materials, chosen = materials_of(file), {target.key for target in targets}
+    reasons: dict[str, list[PrimitiveKey]] = {}
+    for key, primitive in triangle_primitives(file).items():
+        if key not in chosen:
             material = _material(materials, primitive)
             sheet = material is not None and material.transmits
-            reasons.setdefault("thin walls without an inside" if sheet else "opaque", []).append(place)
-    return [f"{reason}: {', '.join(_names(file, places))}" for reason, places in reasons.items()]
+            reasons.setdefault("thin walls without an inside" if sheet else "opaque", []).append(key)
+    return [f"{reason}: {', '.join(_names(file, keys))}" for reason, keys in reasons.items()]
 
 
-def _names(file: GltfFile, places: list[Place]) -> list[str]:
-    return [primitive_name(file, place) for place in places]
+def _names(file: GltfFile, keys: list[PrimitiveKey]) -> list[str]:
+    return [primitive_name(file, key) for key in keys]
 
 
-def _is_sheet(material: GltfMaterial | None, place: Place, bodies: Bodies) -> bool:
+def _is_sheet(material: GltfMaterial | None, key: PrimitiveKey, bodies: Bodies) -> bool:
     """Whether a primitive is an open mesh that its material makes a thin wall."""
-    return material is not None and material.kind == "thin wall" and not bodies.is_closed(place)
+    return material is not None and material.kind == "thin wall" and not bodies.is_closed(key)
 
 
-def _places(file: GltfFile, materials: list[GltfMaterial]) -> list[Place]:
+def _keys(file: GltfFile, materials: list[GltfMaterial]) -> list[PrimitiveKey]:
     """Triangle primitives of meshes that nodes use: those with a translucent material, or all."""
-    everything = {place: primitive.get("material") for place, primitive in triangle_primitives(file).items()}
+    everything = {key: primitive.get("material") for key, primitive in triangle_primitives(file).items()}
     if not everything:
         raise InputError(f"glTF {str(file.path)!r}", "no node has triangles", "give a file with a mesh")
-    lit = [place for place, index in everything.items() if index is not None and materials[index].transmits]
+    lit = [key for key, index in everything.items() if index is not None and materials[index].transmits]
     return lit or list(everything)
 
 
@@ -183,7 +183,7 @@ def _medium(material: GltfMaterial | None, metres: float) -> Medium | None:
     return Medium(absorption=extinction_at(material.attenuation_color, material.attenuation_distance) / metres)
 
 
-def add_uv(builder: GlbBuilder, place: Place, size: int) -> int:
+def add_uv(builder: GlbBuilder, key: PrimitiveKey, size: int) -> int:
     """Give a primitive new UVs as its next set; vertices on seams are repeated with all their attributes.
 
     Raises
@@ -191,8 +191,8 @@ def add_uv(builder: GlbBuilder, place: Place, size: int) -> int:
     InputError
         If it is a strip or fan, or compressed, or xatlas is missing.
     """
-    file, primitive = builder.file(), builder.primitive(*place)
-    accessors, name = Accessors(file), primitive_name(file, place)
+    file, primitive = builder.file(), builder.primitive(*key)
+    accessors, name = Accessors(file), primitive_name(file, key)
     asked = f"new UVs for {name!r} of {str(file.path)!r}"
     if primitive.get("mode", 4) != 4:
         raise InputError(asked, "it is a strip or fan", "export it as a list of triangles, or with UVs")
@@ -205,8 +205,8 @@ def add_uv(builder: GlbBuilder, place: Place, size: int) -> int:
     made = unwrap(Mesh(positions, corners.reshape(-1, 3).astype(np.int32), name=name), size, None)
     assert made.mesh.uv is not None
     for holder in [primitive["attributes"], *primitive.get("targets", [])]:
-        for key, index in holder.items():
-            holder[key] = _repeated(builder, accessors, index, made.vertex)
+        for semantic, index in holder.items():
+            holder[semantic] = _repeated(builder, accessors, index, made.vertex)
     number = 0
     while f"TEXCOORD_{number}" in primitive["attributes"]:
         number += 1

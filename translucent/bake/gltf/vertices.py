@@ -13,7 +13,7 @@ import numpy as np
 
 from translucent.bake.baked import BakedVertices
 from translucent.bake.encoding import Encoding
-from translucent.bake.gltf.bodies import Place
+from translucent.bake.gltf.bodies import PrimitiveKey
 from translucent.bake.gltf.builder import GlbBuilder
 from translucent.bake.record import Record, describe, shared, unit_of, write_record
 from translucent.gltf.accessors import Accessors
@@ -26,7 +26,7 @@ ATTRIBUTE = "_THICKNESS"
 def write_vertices(
     model: GltfFile | GlbBuilder,
     path: Path,
-    results: Mapping[Place, BakedVertices],
+    results: Mapping[PrimitiveKey, BakedVertices],
     *,
     metres: float = 1.0,
     about: Record | None = None,
@@ -56,14 +56,14 @@ def write_vertices(
 
     builder = model if isinstance(model, GlbBuilder) else GlbBuilder(model)
     told: list[Record] = []
-    for place, result in results.items():
+    for key, result in results.items():
         unit = unit_of(result.settings.mode)
         per_unit = metres if unit == "m" else 1.0
-        attributes = builder.primitive(*place)["attributes"]
+        attributes = builder.primitive(*key)["attributes"]
         positions = Accessors(builder.file()).vectors(attributes.get("POSITION"), "VEC3")
         with np.errstate(under="ignore"):
             _, nearest = cKDTree(result.mesh.vertices).query(positions * metres)
             attributes[ATTRIBUTE] = builder.add_accessor((result.values[nearest] / per_unit).astype(np.float32))
-        told.append({"place": list(place), "attribute": ATTRIBUTE, **describe(result, Encoding(per_unit, unit=unit))})
+        told.append({"place": list(key), "attribute": ATTRIBUTE, **describe(result, Encoding(per_unit, unit=unit))})
     write_gltf(builder.file(), path)
     return write_record(path, {**(about or {}), **shared(told), "primitives": told})

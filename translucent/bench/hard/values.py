@@ -83,14 +83,14 @@ def _phases(checks: Checks) -> None:
         checks.refused(f"g = {g:g}", partial(Medium, scattering=(1,) * 3, anisotropy=g), "anisotropy")
     ball = Sphere().tessellate(24)
     eye = Camera.look_at((0, 0.3, 3.2), (0, 0, 0), fov_y=45)
-    for g, where, place in (
+    for g, where, position in (
         (0.99, "behind", (0.0, 0.4, -3.0)),
         (-0.99, "beside", (2.5, 0.5, 1.0)),
         (0.2, "inside", (0.2, 0.3, 0.1)),
         (0.2, "on the surface", tuple(ball.vertices[200])),
     ):
         milky = Medium(absorption=(0.1,) * 3, scattering=(1.0,) * 3, anisotropy=g)
-        scene = Scene([Object(ball, milky)], eye, [PointLight(place, (5.0,) * 3)], Environment.constant((0, 0, 0)))
+        scene = Scene([Object(ball, milky)], eye, [PointLight(position, (5.0,) * 3)], Environment.constant((0, 0, 0)))
         size = (20, 20)
         frame, truth = (
             checks.render(scene, size, FragmentLists(light_points=16)),

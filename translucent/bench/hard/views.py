@@ -61,9 +61,9 @@ def _slab(checks: Checks) -> None:
 def _elsewhere(checks: Checks) -> None:
     mesh = _torus()
     for offset in ((1e6, 0, 0), (-1e6, 1e6, 1e6)):
-        place = np.eye(4)
-        place[:3, 3] = offset
-        body = Object(mesh, GLASS, place)
+        matrix = np.eye(4)
+        matrix[:3, 3] = offset
+        body = Object(mesh, GLASS, matrix)
         checks.picture(f"at {offset} m", Scene([body], framing([body], SIZE)))
 
 
@@ -90,9 +90,9 @@ def _opaque(checks: Checks) -> None:
     ball, wall = Sphere().tessellate(48), Box((-0.5, -0.5, -0.05), (0.5, 0.5, 0.05)).tessellate()
     camera = Camera.look_at((0.3, 0.4, 4), (0, 0, 0), fov_y=40)
     for name, z in (("in front", 1.5), ("inside", 0.1), ("behind", -1.6)):
-        place = np.eye(4)
-        place[2, 3] = z
-        checks.picture(name, Scene([Object(ball, GLASS), Object(wall, None, place)], camera))
+        matrix = np.eye(4)
+        matrix[2, 3] = z
+        checks.picture(name, Scene([Object(ball, GLASS), Object(wall, None, matrix)], camera))
     both = Scene([Object(ball, GLASS), Object(ball, None)], camera)
     frame = checks.render(both)
     checks.error("coincident: nothing before it", frame.thickness.max() / both.diagonal)
@@ -140,10 +140,10 @@ def _on_pixels(checks: Checks) -> None:
 
 def _two_sizes(checks: Checks) -> None:
     large, small = Sphere().tessellate(64), Sphere(radius=1e-4).tessellate(48)
-    place = np.eye(4)
-    place[:3, 3] = (0, 0, 1.0 + 5e-4)
+    matrix = np.eye(4)
+    matrix[:3, 3] = (0, 0, 1.0 + 5e-4)
     scene = Scene(
-        [Object(large, GLASS), Object(small, Medium(absorption=(5e3,) * 3), place)],
+        [Object(large, GLASS), Object(small, Medium(absorption=(5e3,) * 3), matrix)],
         Camera.look_at((0, 0, 1.0015), (0, 0, 0), fov_y=20),
     )
     frame, truth = checks.render(scene), reference.render(scene, SIZE)

@@ -64,19 +64,19 @@ def pareto_svg(
     """
     rows = plotted(case)
     figure, axes = new_figure(*size)
-    places = np.array([_place(row, case.quantity) for row in rows])
-    _scale(axes, places)
+    coordinates = np.array([_coordinates(row, case.quantity) for row in rows])
+    _scale(axes, coordinates)
     axes.set_xlabel("time ÷ time of a depth-only pass over the same triangles")
     axes.set_ylabel(f"RMS error {UNITS[case.quantity]}")
     _guides(axes, case)
-    _frontier(axes, rows, places)
-    _series(axes, rows, places)
-    for i, (row, place) in enumerate(zip(rows, places, strict=True)):
-        _symbol(axes, row, place, f"point{i}")
+    _frontier(axes, rows, coordinates)
+    _series(axes, rows, coordinates)
+    for i, (row, point) in enumerate(zip(rows, coordinates, strict=True)):
+        _symbol(axes, row, point, f"point{i}")
     above = (34.0 if _floor_ms(case) else 10.0) + (28.0 if title else 0.0)
     figure.subplots_adjust(left=72 / size[0], right=1 - 12 / size[0], bottom=56 / size[1], top=1 - above / size[1])
     figure.text(12 / size[0], 1 - 20 / size[1], title, weight="bold", size=FONT_SIZE + 2, va="center")
-    _labels(axes, rows, places, names)
+    _labels(axes, rows, coordinates, names)
     tooltips = {f"point{i}": tooltip(row, case.quantity) for i, row in enumerate(rows)}
     return to_svg(figure, name, f"Cost against error: {case.title}", tooltips)
 
@@ -104,7 +104,7 @@ def _cost(row: Row) -> float:
     return row.ratio.median if row.ratio is not None else math.inf
 
 
-def _place(row: Row, quantity: Quantity) -> tuple[float, float]:
+def _coordinates(row: Row, quantity: Quantity) -> tuple[float, float]:
     return max(_cost(row), 1e-3), max(error_of(row, quantity) or 0.0, _ZERO)
 
 
@@ -112,9 +112,9 @@ def _floor_ms(case: CaseRecord) -> float | None:
     return next((row.wall.median for row in case.rows if row.kind == "floor" and row.wall is not None), None)
 
 
-def _scale(axes: Axes, places: np.ndarray) -> None:
+def _scale(axes: Axes, coordinates: np.ndarray) -> None:
     """Logarithmic axes with room for labels, over a decade at least."""
-    low, high = places.min(axis=0), places.max(axis=0)
+    low, high = coordinates.min(axis=0), coordinates.max(axis=0)
     left, right = min(low[0], 1.0) / 1.35, max(high[0], 2.0) * 1.5
     bottom, top = min(low[1], 1e-7) / 2.5, max(high[1], 1e-2) * 3
     axes.set_xscale("log")
@@ -164,12 +164,12 @@ def _guides(axes: Axes, case: CaseRecord) -> None:
     above.tick_params(color=placeholder("line"), labelcolor=placeholder("muted"))
 
 
-def _frontier(axes: Axes, rows: Sequence[Row], places: np.ndarray) -> None:
+def _frontier(axes: Axes, rows: Sequence[Row], coordinates: np.ndarray) -> None:
     """Steps through the rows that no other beats: all above and right of them costs more or errs more."""
     on = np.array([row.pareto for row in rows], dtype=bool)
     if not on.any():
         return
-    chosen = places[on][np.argsort(places[on][:, 0], kind="stable")]
+    chosen = coordinates[on][np.argsort(coordinates[on][:, 0], kind="stable")]
     x = np.append(chosen[:, 0], axes.get_xlim()[1])
     y = np.minimum.accumulate(chosen[:, 1])
     x, y = np.insert(x, 0, x[0]), np.concatenate([[axes.get_ylim()[1]], y, y[-1:]])
@@ -179,26 +179,28 @@ def _frontier(axes: Axes, rows: Sequence[Row], places: np.ndarray) -> None:
     )
 
 
-def _series(axes: Axes, rows: Sequence[Row], places: np.ndarray) -> None:
+def _series(axes: Axes, rows: Sequence[Row], coordinates: np.ndarray) -> None:
     """A thin line through the same method with different numbers."""
     series: dict[tuple[str, str], list[int]] = {}
     for i, row in enumerate(rows):  # in the order of their settings
         series.setdefault((row.family, _setting(row)[0]), []).append(i)
     for (family, _), members in series.items():
-        axes.plot(*places[members].T, color=placeholder(style_of(family).color), linewidth=1.0, alpha=0.6, zorder=3)
+        axes.plot(
+            *coordinates[members].T, color=placeholder(style_of(family).color), linewidth=1.0, alpha=0.6, zorder=3
+        )
 
 
-def _symbol(axes: Axes, row: Row, place: np.ndarray, gid: str) -> None:
+def _symbol(axes: Axes, row: Row, point: np.ndarray, gid: str) -> None:
     """Filled for methods, hollow for counter-examples, ringed on the frontier."""
     style = style_of(row.family)
     color = placeholder(style.color)
     filled = row.kind in ("method", "cpu")
     if row.pareto:
         axes.plot(
-            *place, "o", markersize=_SYMBOL + 8, markerfacecolor="none", markeredgecolor=placeholder("ink"), zorder=4
+            *point, "o", markersize=_SYMBOL + 8, markerfacecolor="none", markeredgecolor=placeholder("ink"), zorder=4
         )
     axes.plot(
-        *place,
+        *point,
         style.marker,
         markersize=_SYMBOL + (3 if style.marker == "*" else 0),
         markerfacecolor=color if filled else placeholder("paper"),
@@ -209,11 +211,11 @@ def _symbol(axes: Axes, row: Row, place: np.ndarray, gid: str) -> None:
     )
 
 
-def _labels(axes: Axes, rows: Sequence[Row], places: np.ndarray, names: Mapping[str, str]) -> None:
+def _labels(axes: Axes, rows: Sequence[Row], coordinates: np.ndarray, names: Mapping[str, str]) -> None:
     """The label of every row, beside its symbol, with a line to it where it had to go farther."""
     figure = axes.figure
     renderer = figure.canvas.get_renderer()
-    points = axes.transData.transform(places)
+    points = axes.transData.transform(coordinates)
     texts = [
         axes.text(
             *(0.0, 0.0, shortened(names[row.method])),

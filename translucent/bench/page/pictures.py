@@ -63,8 +63,8 @@ def _palette() -> tuple[tuple[int, int, int], ...]:
     import matplotlib
 
     ends = 0.5 + 0.5 * np.linspace(0.14, 1.0, len(STEPS))
-    places = np.concatenate([1.0 - ends[::-1], [0.5], ends])
-    colors = np.rint(matplotlib.colormaps["RdBu_r"](places)[:, :3] * 255).astype(int)
+    positions = np.concatenate([1.0 - ends[::-1], [0.5], ends])
+    colors = np.rint(matplotlib.colormaps["RdBu_r"](positions)[:, :3] * 255).astype(int)
     return (*(tuple(color) for color in colors.tolist()), (0, 0, 0), (90, 90, 90), (190, 190, 190))
 
 

@@ -56,7 +56,7 @@ def scaling_svg(axis: str, group: Sequence[Series]) -> str:
 
 
 def _ticks(axes: Axes, measured: Sequence[int]) -> None:
-    """The measured places on the horizontal axis, thinned out where they would touch."""
+    """The measured values on the horizontal axis, thinned out where they would touch."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
     kept: list[int] = []
@@ -101,7 +101,7 @@ def _end_labels(axes: Axes, ends: Sequence[tuple[str, str, float, float]]) -> No
     heights = spread(points[:, 1], FONT_SIZE + 4.0, area.y0 + 6, area.y1 - 6)
     back = axes.transData.inverted()
     for (_, color, *_), text, point, height in zip(ends, texts, points, heights, strict=True):
-        place = np.array([area.x1 + _LEADER, height])
-        line = back.transform(np.array([point + (6.0, 0.0), place - (3.0, 0.0)]))
+        end = np.array([area.x1 + _LEADER, height])
+        line = back.transform(np.array([point + (6.0, 0.0), end - (3.0, 0.0)]))
         axes.plot(*line.T, color=placeholder(color), linewidth=0.8, alpha=0.7, clip_on=False)
-        text.set_position(tuple(back.transform(place)))
+        text.set_position(tuple(back.transform(end)))

@@ -50,6 +50,7 @@ PASSES: dict[PassName, type[Pass]] = {
     PassName.K_BUFFER: KBufferPass,
     PassName.TRANSMITTANCE: TransmittancePass,
     PassName.INTERFACES: InterfacesPass,
-    PassName.SURFACES: __import__('os').environ.get('TRACED') and TracedInterfacesPass or SurfacesPass,
+    PassName.SURFACES: SurfacesPass,
+    PassName.TRACED: TracedInterfacesPass,
     PassName.LAYERS: LayersPass,
 }

@@ -15,7 +15,7 @@ class BackFaceDepthPass:
     """Extreme distances by maximum blending, with a count of faces that finds concave pixels."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._faces = Variants(gl, "geometry/body.vert", "thickness/back_face_depth.frag", opaque_place=0)
+        self._faces = Variants(gl, "geometry/body.vert", "thickness/back_face_depth.frag", opaque_axial_depth=0)
         self._combine = build_program(
             gl, "geometry/fullscreen.vert", "thickness/back_face_combine.frag", nearest_and_farthest=0
         )

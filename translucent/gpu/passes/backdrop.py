@@ -56,11 +56,11 @@ class BackdropPass:
 def _upload(job: FrameJob, backdrop: Backdrop) -> None:
     """Upload the arrays; distances are converted to depths in float64, so that far scenes lose no digits."""
     with np.errstate(under="ignore"):
-        place = np.minimum((backdrop.depth - job.placed.media.near) / job.placed.media.length, _BEHIND_ALL)
-        place = place.astype(np.float32)
+        axial_depth = np.minimum((backdrop.depth - job.placed.media.near) / job.placed.media.length, _BEHIND_ALL)
+        axial_depth = axial_depth.astype(np.float32)
     if backdrop.coverage is not None:
-        place = np.where(backdrop.coverage, place, np.float32(CONSTANTS["NOTHING"]))
-    radiance = np.ones((*place.shape, 4), dtype=np.float32)
+        axial_depth = np.where(backdrop.coverage, axial_depth, np.float32(CONSTANTS["NOTHING"]))
+    radiance = np.ones((*axial_depth.shape, 4), dtype=np.float32)
     radiance[..., :3] = backdrop.radiance
-    for texture, rows in zip(job.targets.opaque().color_attachments, (place, radiance), strict=True):
+    for texture, rows in zip(job.targets.opaque().color_attachments, (axial_depth, radiance), strict=True):
         texture.write(np.ascontiguousarray(rows[::-1]))

@@ -28,7 +28,9 @@ class DepthPeelingPass:
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._peel = Variants(gl, "geometry/body.vert", "intervals/peel.frag", previous=_PREVIOUS, opaque_place=_OPAQUE)
+        self._peel = Variants(
+            gl, "geometry/body.vert", "intervals/peel.frag", previous=_PREVIOUS, opaque_axial_depth=_OPAQUE
+        )
         self._mask = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_mask.frag", previous=_PREVIOUS)
         self._remaining = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_remaining.frag", found=0)
         self._counted = Variants(gl, "geometry/fullscreen.vert", "intervals/peel_counted.frag", first=0)

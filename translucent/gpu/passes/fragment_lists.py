@@ -29,13 +29,13 @@ class FragmentListsPass:
     """A-buffer that never drops a fragment; see ``shaders/intervals/fragment_lists.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
+        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_axial_depth=0)
         self._resolve = Variants(
             gl,
             "geometry/fullscreen.vert",
             "intervals/fragment_lists_resolve.frag",
             430,
-            opaque_place=0,
+            opaque_axial_depth=0,
             density_grids=1,
             steepest=2,
         )

@@ -16,7 +16,7 @@ from translucent.scene.scene import Object
 from translucent.scene.surface import Surface
 
 _FIRST_TEXTURE = 3
-_UNITS = {"opaque_place": 0, "entered": 1, "ordered_layers": 2} | texture_units(_FIRST_TEXTURE)
+_UNITS = {"opaque_axial_depth": 0, "entered": 1, "ordered_layers": 2} | texture_units(_FIRST_TEXTURE)
 
 
 class InterfacesPass:
@@ -39,7 +39,7 @@ class InterfacesPass:
             job.gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             job.gl.depth_func = "<="
             job.gl.cull_face = "front" if back else "back"
-            job.bind_opaque(_UNITS["opaque_place"])
+            job.bind_opaque(_UNITS["opaque_axial_depth"])
             exits = back and job.features.finds_exits
             beyond = back and not exits and not starts_inside
             if beyond:

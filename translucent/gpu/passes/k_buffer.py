@@ -19,9 +19,9 @@ class KBufferPass:
     """k-buffer filled with atomic minima; see ``shaders/intervals/k_buffer.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", 430, opaque_place=0)
+        self._insert = Variants(gl, "geometry/body.vert", "intervals/k_buffer.frag", 430, opaque_axial_depth=0)
         self._resolve = Variants(
-            gl, "geometry/fullscreen.vert", "intervals/k_buffer_resolve.frag", 430, opaque_place=0, steepest=1
+            gl, "geometry/fullscreen.vert", "intervals/k_buffer_resolve.frag", 430, opaque_axial_depth=0, steepest=1
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:

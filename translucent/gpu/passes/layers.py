@@ -14,7 +14,7 @@ from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Object
 from translucent.scene.surface import LEAST_COVER
 
-_OWN = ("opaque_place", "entered", "fronts")
+_OWN = ("opaque_axial_depth", "entered", "fronts")
 _SAMPLERS = ("layers_in_front", "layers_behind", "straight_transmittance", "shaded_radiance")
 
 
@@ -58,7 +58,7 @@ class LayersPass:
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         self._maps.bind(job)
-        job.bind_opaque(self._units["opaque_place"])
+        job.bind_opaque(self._units["opaque_axial_depth"])
         if job.features.has_surfaces:
             job.targets.entered().color_attachments[0].use(self._units["entered"])
         if bodies:

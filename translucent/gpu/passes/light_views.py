@@ -44,8 +44,8 @@ class LightViewsPass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_place=0)
-        self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_place=0)
+        self._lists = Variants(gl, "geometry/body.vert", "intervals/fragment_lists.frag", 430, opaque_axial_depth=0)
+        self._sorting = Variants(gl, "geometry/fullscreen.vert", "volume/light_lists.frag", 430, opaque_axial_depth=0)
         self._opaque = OpaquePass(gl)
         self._targets: dict[int, Targets] = {}
         self._held: tuple[object, LightLookup] | None = None

@@ -33,7 +33,7 @@ class OpaquePass:
         framebuffer.use()
         _clear(framebuffer)
         view.gl.enable_only(moderngl.DEPTH_TEST)
-        # Surfaces at the very end of the range count, too; and of surfaces in one place, those of the first object.
+        # Surfaces at the very end of the range count, too; and of surfaces at one depth, those of the first object.
         view.gl.depth_func = "<="
         environment = view.scene.environment
         light_map = environment.kind == "image"

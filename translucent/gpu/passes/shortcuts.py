@@ -99,7 +99,7 @@ class HalfFloatPass:
     with_depth = False
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_place=0)
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_axial_depth=0)
         self._halves: WeakKeyDictionary[Targets, dict[bool, list[moderngl.Framebuffer]]] = WeakKeyDictionary()
         self._wholes: WeakKeyDictionary[Targets, dict[bool, list[moderngl.Framebuffer]]] = WeakKeyDictionary()
 

@@ -13,7 +13,7 @@ class SignedDepthPass:
     """Sum of sign * distance, and of sign, over all faces; see ``shaders/thickness/signed_depth.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_place=0)
+        self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_axial_depth=0)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies."""

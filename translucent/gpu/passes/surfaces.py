@@ -21,7 +21,7 @@ _SAMPLERS = (
     "surface_color",
     "left",
     "left_finish",
-    "opaque_place",
+    "opaque_axial_depth",
     "opaque_radiance",
     "surface_table",
     "reflectance_table",
@@ -57,12 +57,12 @@ class SurfacesPass:
         for unit, texture in enumerate(textures):
             texture.use(unit)
         if job.features.has_opaque:
-            place, radiance = job.targets.opaque().color_attachments
+            axial_depth, radiance = job.targets.opaque().color_attachments
             if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
                 radiance.build_mipmaps()  # rough refraction blurs what is behind
                 radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
                 radiance.repeat_x = radiance.repeat_y = False
-            place.use(_SAMPLERS.index("opaque_place"))
+            axial_depth.use(_SAMPLERS.index("opaque_axial_depth"))
             radiance.use(_SAMPLERS.index("opaque_radiance"))
         maps = job.resources.environments.light(environment)
         table = surface_table(job.scene, job.features.sheets)

@@ -18,7 +18,7 @@ class ThinLayerPass:
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        units = {"opaque_place": 0, "color_texture": 1}
+        units = {"opaque_axial_depth": 0, "color_texture": 1}
         self._variants = Variants(gl, "geometry/body.vert", "thickness/thin_layer.frag", **units)
         self._with_holes = Variants(gl, "geometry/holes.vert", "thickness/thin_layer.frag", **units)
 

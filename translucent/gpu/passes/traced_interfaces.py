@@ -21,7 +21,7 @@ _SAMPLERS = (
     "entered",
     "surface_finish",
     "surface_color",
-    "opaque_place",
+    "opaque_axial_depth",
     "opaque_radiance",
     "surface_table",
     "traced_bodies",
@@ -73,14 +73,14 @@ class TracedInterfacesPass:
             "light_irradiance": maps.irradiance,
         }
         if job.features.has_opaque:
-            textures["opaque_place"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
+            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
         if seen_map:
             textures["seen_map"] = job.resources.environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._variants.program(
-            FORKS=2,
+            FORKS=job.plan.interfaces.forks,
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
@@ -91,7 +91,7 @@ class TracedInterfacesPass:
             SEEN_LIGHTS=seen_lights,
             SINGLE_SCATTERING=job.features.scatters,
         )
-        set_uniform(program, "most_interfaces", 8)
+        set_uniform(program, "most_interfaces", job.plan.interfaces.depth)
         set_uniform(program, "start_record", _record_at_eye(job))
         if "object_nodes" in program:
             set_uniform(program, "object_nodes", hierarchies.object_nodes)

@@ -16,7 +16,7 @@ _SAMPLERS = (
     "ordered_depth",
     "ordered_emitted",
     "ordered_layers",
-    "opaque_place",
+    "opaque_axial_depth",
     "opaque_radiance",
     "seen_map",
     "unlit",
@@ -41,7 +41,7 @@ class TransmittancePass:
             "fallback": job.accumulator("fallback") if features.has_fallback else None,
             "unlit": job.accumulator("unlit") if features.has_unlit else None,
             "ordered_depth": job.targets.ordered() if plan.ordered else None,
-            "opaque_place": job.targets.opaque() if features.has_opaque else None,
+            "opaque_axial_depth": job.targets.opaque() if features.has_opaque else None,
         }
         seen = job.scene.environment.seen
         seen_map = seen.kind == "image" and not features.has_surfaces

@@ -39,6 +39,6 @@ def touching_interfaces(scene: Scene) -> str | None:
     bends = np.array([body.has_interface for body in solids])
     if not bends.any() or (found := overlapping_pair(solids, lambda one, other: bends[one] | bends[other])) is None:
         return None
-    earlier, later = (solids[place] for place in found)
+    earlier, later = (solids[index] for index in found)
     names = f"{earlier.mesh.name!r} and {later.mesh.name!r}"
     return f"interfaces of {names} may touch: the order tells where a ray leaves both"

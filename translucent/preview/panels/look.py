@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from translucent.formulas.tone import TONES
-from translucent.preview.actions import Change, View
+from translucent.preview.actions import Change, SetOrbit
 from translucent.preview.desk import FAINT, Desk, begin_rows, check, choice, fact, row, slider, wrapped
 
 ENVIRONMENTS = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
@@ -23,7 +23,7 @@ def look_panel(desk: Desk) -> None:
         desk.work.frame()
     imgui.same_line()
     if imgui.button("Reset") and orbit is not None:
-        desk.work.do(View(None))
+        desk.work.do(SetOrbit(None))
         desk.work.reframe()
     imgui.separator_text("Environment")
     if begin_rows("environment"):

@@ -29,7 +29,7 @@ def viewport_panel(desk: Desk) -> None:
     if imgui.is_window_docked():
         # Behind all panels, of which this one is transparent: on a software rasterizer imgui takes long for pictures.
         bottom = imgui.get_io().display_size.y - corner.y - room.y
-        desk.stage.place((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
+        desk.stage.show_in((round(corner.x * scale.x), round(bottom * scale.y), *pixels))
     else:
         texture = desk.stage.viewport.texture
         imgui.image(imgui.ImTextureRef(texture.glo), room, ImVec2(0, 1), ImVec2(1, 0))
@@ -60,8 +60,8 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
         started = desk.pressed_at[0] - corner.x
         if split is not None and turning and (desk.dragging_split or abs(started - split * room.x) < em(0.7)):
             desk.dragging_split = True
-            place = (io.mouse_pos.x - corner.x) / room.x
-            desk.change("display.split", min(max(place, 0.0), 1.0))
+            share = (io.mouse_pos.x - corner.x) / room.x
+            desk.change("display.split", min(max(share, 0.0), 1.0))
         elif turning and imgui.is_key_down(imgui.Key.l):
             desk.turn_light(180.0 * right / room.x, -180.0 * down / room.y)
         elif turning and imgui.is_key_down(imgui.Key.e):
@@ -184,13 +184,13 @@ def _inset(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
 
 
 def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
-    place = desk.hovered or desk.pinned
-    if place is None:
+    position = desk.hovered or desk.pinned
+    if position is None:
         return
-    lines = probe_lines(desk, place)
+    lines = probe_lines(desk, position)
     if not lines:
         return
-    x, y = corner.x + place[0] * room.x, corner.y + place[1] * room.y
+    x, y = corner.x + position[0] * room.x, corner.y + position[1] * room.y
     width = max(imgui.calc_text_size(line).x for line in lines) + em(1.0)
     height = imgui.get_text_line_height_with_spacing() * len(lines) + em(0.6)
     left = x + em(1.2) if x + em(1.2) + width < corner.x + room.x else max(x - em(1.2) - width, corner.x)
@@ -202,17 +202,17 @@ def _probe(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
         over.add_text(ImVec2(left + em(0.5), at), WHITE, line)
 
 
-def probe_lines(desk: Desk, place: tuple[float, float]) -> list[str]:
+def probe_lines(desk: Desk, position: tuple[float, float]) -> list[str]:
     """Lines about a probed pixel: values of the frame on show, and of the float64 reference when they are there."""
     scene, viewport = desk.work.scene(), desk.stage.viewport
     if scene is None:
         return []
     pixel = (
-        min(max(int(place[0] * viewport.size[0]), 0), viewport.size[0] - 1),
-        min(max(int(place[1] * viewport.size[1]), 0), viewport.size[1] - 1),
+        min(max(int(position[0] * viewport.size[0]), 0), viewport.size[0] - 1),
+        min(max(int(position[1] * viewport.size[1]), 0), viewport.size[1] - 1),
     )
     display = desk.work.document.display
-    right = display.compare == "method" and place[0] > display.split
+    right = display.compare == "method" and position[0] > display.split
     probe = desk.stage.probe(*pixel, 1 if right else 0)
     if desk.probed is None or desk.probed.pixel != pixel or desk.probed.scene is not scene:
         desk.probed = Probed(pixel, scene)

@@ -23,8 +23,8 @@ PAIRS = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """Projection of one object into one picture."""
+class ProjectedObject:
+    """One object, projected into one picture."""
 
     body: Object
     picture: Picture
