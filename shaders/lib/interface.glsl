@@ -1,7 +1,7 @@
 // What boundaries between media do with light. Pure: needs only <constants> and the library. Directions are unit vectors
 // of travel; a normal looks to the side that the light comes from; ior is that of the other side relative to this one.
 // Each function is the float32 twin of the same name in translucent/formulas/interface.py, where the sources are cited: Snell;
-// Stokes 1862; Walter et al. 2007; Heitz 2014; KHR_materials_dispersion. fresnel_dielectric is in optics.glsl.
+// Stokes 1862; Walter et al. 2007; Heitz 2014 and 2018; KHR_materials_dispersion. fresnel_dielectric is in optics.glsl.
 
 #include <constants>
 #include "lib/optics.glsl"
@@ -40,6 +40,21 @@ float ggx_visibility(float cos_light, float cos_view, float alpha) {
     float light = cos_view * sqrt(cos_light * cos_light + slope * (1.0 - cos_light) * (1.0 + cos_light));
     float view = cos_light * sqrt(cos_view * cos_view + slope * (1.0 - cos_view) * (1.0 + cos_view));
     return light + view > 0.0 ? 0.5 / (light + view) : 0.0;
+}
+
+// Normal of a microfacet as it is seen from a direction, at random: towards and the result in a frame whose z axis is the
+// normal of the surface, shares (0 to 1) are the random numbers.
+vec3 ggx_visible_normal(vec3 towards, float alpha, vec2 shares) {
+    vec3 stretched = normalize(vec3(alpha * towards.xy, max(towards.z, 1e-6)));
+    float across = length(stretched.xy);
+    vec3 first = across > 1e-6 ? vec3(-stretched.y, stretched.x, 0.0) / across : vec3(1.0, 0.0, 0.0);
+    vec3 second = cross(stretched, first);
+    float radius = sqrt(shares.x);
+    float x = radius * cos(2.0 * PI * shares.y);
+    float seen = 0.5 * (1.0 + stretched.z);
+    float y = mix(sqrt(max(1.0 - x * x, 0.0)), radius * sin(2.0 * PI * shares.y), seen);
+    vec3 normal = x * first + y * second + sqrt(max(1.0 - x * x - y * y, 0.0)) * stretched;
+    return normalize(vec3(alpha * normal.xy, max(normal.z, 1e-6)));
 }
 
 // Thin wall of two parallel boundaries, all reflections between them added up; optical_depth is that of one passage.

@@ -26,6 +26,7 @@ uniform sampler2D entered;           // interface towards the eye: normal, axial
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 uniform int most_interfaces;
+uniform int sample_number;           // of a pixel; below 0: rough interfaces blur what is seen in them
 uniform uvec4 start_record;          // of rays that start inside bodies
 
 layout(location = 0) out vec4 out_radiance;
@@ -62,6 +63,27 @@ float strength(vec3 share) {
 // Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
 vec3 kept_on_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
+
+// Random numbers for the microfacet at an interface of a path: an additive recurrence over the samples of a pixel (Roberts
+// 2018, "The unreasonable effectiveness of quasirandom sequences"), rotated for each pixel.
+vec2 microfacet_shares(int met, float branch) {
+    uvec2 at = uvec2(gl_FragCoord.xy);
+    uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 69069u + floatBitsToUint(branch)) * 747796405u + 2891336453u;
+    state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    state = (state >> 22u) ^ state;
+    vec2 step = met % 2 == 0 ? vec2(0.8566749, 0.7338919) : vec2(0.6287067, 0.5385973);
+    vec2 turn = vec2(state & 0xffffu, state >> 16) / 65536.0;
+    return fract(turn + float(sample_number) * step);
+}
+
+// A microfacet of a rough interface as the ray sees it.
+vec3 microfacet_normal(vec3 normal, vec3 direction, float alpha, vec2 shares) {
+    vec3 aside = normalize(abs(normal.x) < 0.7 ? cross(normal, vec3(1.0, 0.0, 0.0)) : cross(normal, vec3(0.0, 1.0, 0.0)));
+    vec3 up = cross(normal, aside);
+    vec3 towards = -vec3(dot(direction, aside), dot(direction, up), dot(direction, normal));
+    vec3 local = ggx_visible_normal(towards, alpha, shares);
+    return local.x * aside + local.y * up + local.z * normal;
 }
 
 float index_of(int body, int channel) {
@@ -197,6 +219,12 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             finish = finish_of(vec4(float(owner), body.roughness, body.transmission, 0.0));
             finish.color = body.color;
         }
+#if MICROFACETS
+        if (finish.roughness > 0.0 && sample_number >= 0) {
+            smooth_normal = microfacet_normal(smooth_normal, ray.direction, finish.roughness * finish.roughness, microfacet_shares(ray.met, ray.direction.x));
+            finish.roughness = 0.0;
+        }
+#endif
         float cosine = clamp(-dot(smooth_normal, ray.direction), 0.0, 1.0);
         float reflectance = interface_reflectance(cosine, ior, finish.roughness);
         vec3 share_back = vec3(reflectance);

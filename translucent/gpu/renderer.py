@@ -247,10 +247,11 @@ class GpuRenderer:
         """Add up `samples` shifted renderings in the target for averages."""
         job.targets.average().clear()
         job.averaging = True
-        for right, down in sample_shifts(samples):
+        for number, (right, down) in enumerate(sample_shifts(samples)):
+            job.sample = number
             job.place((right, down))
             self._run_passes(job)
-        job.averaging = False
+        job.averaging, job.sample = False, -1
         job.place((0.0, 0.0))
 
 

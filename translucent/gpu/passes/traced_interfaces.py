@@ -85,6 +85,7 @@ class TracedInterfacesPass:
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
             EMISSION=job.features.emits and not job.features.scatters,
+            MICROFACETS=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             SEEN_MAP=seen_map,
@@ -92,6 +93,8 @@ class TracedInterfacesPass:
             SINGLE_SCATTERING=job.features.scatters,
         )
         set_uniform(program, "most_interfaces", job.plan.interfaces.depth)
+        if "sample_number" in program:
+            set_uniform(program, "sample_number", job.sample)
         set_uniform(program, "start_record", _record_at_eye(job))
         if "object_nodes" in program:
             set_uniform(program, "object_nodes", hierarchies.object_nodes)
