@@ -231,15 +231,25 @@ def test_a_medium_tells_its_paths_and_shows_swatches() -> None:
 # A picked pixel
 
 
-def _png16(path: Path, values: np.ndarray) -> None:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+#: First column and row of each pass of an interlaced PNG file, and the steps from there.
+ADAM7 = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
 
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def _png16(path: Path, values: np.ndarray, extra: bytes = b"", interlaced: bool = False, beyond: int = 0) -> None:
     height, width, channels = values.shape
-    head = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], 0, 0, 0)
-    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in values)
+    head = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], 0, 0, interlaced)
+    parts = [values[y::down, x::right] for x, y, right, down in ADAM7] if interlaced else [values]
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for part in parts if part.size for row in part) + bytes(beyond)
     path.write_bytes(
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+        b"\x89PNG\r\n\x1a\n"
+        + _chunk(b"IHDR", head)
+        + extra
+        + _chunk(b"IDAT", zlib.compress(rows))
+        + _chunk(b"IEND", b"")
     )
 
 
@@ -261,6 +271,49 @@ def test_a_picked_pixel_keeps_16_bits(tmp_path: Path, rng: np.random.Generator, 
     assert parse_color(f"{tmp_path / 'a.png'}@2, 3").tolist() == srgb_to_linear(expected).tolist()
 
 
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("kind", ["interlaced", "gamma", "significant bits", "more than it says"])
+def test_a_picked_pixel_of_16_bits_is_as_it_is_stored(
+    tmp_path: Path, rng: np.random.Generator, channels: int, kind: str
+) -> None:
+    values = rng.integers(256, 65536, (11, 9, channels))
+    extra = {
+        "gamma": _chunk(b"gAMA", struct.pack(">I", 100_000)),
+        "significant bits": _chunk(b"sBIT", bytes([11] * channels)),
+    }.get(kind, b"")
+    beyond = 100_000_000 if kind.startswith("more") else 0
+    _png16(tmp_path / "a.png", values, extra, kind == "interlaced", beyond)
+    for x, y in ((0, 0), (8, 10), (5, 3), (2, 7)):
+        expected = np.broadcast_to(values[y, x, : min(channels, 3)], 3) / 65535
+        assert parse_color(f"{tmp_path / 'a.png'}@{x},{y}").tolist() == srgb_to_linear(expected).tolist()
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("turn", range(1, 9))
+def test_a_picked_pixel_of_16_bits_follows_the_turn(
+    tmp_path: Path, rng: np.random.Generator, channels: int, turn: int
+) -> None:
+    values, exif = rng.integers(256, 65536, (4, 6, channels)), Image.Exif()
+    exif[0x0112] = turn
+    _png16(tmp_path / "a.png", values, _chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0")))
+    shown = values if turn < 5 else values.swapaxes(0, 1)
+    across, down = {1: (1, 1), 2: (-1, 1), 3: (-1, -1), 4: (1, -1), 5: (1, 1), 6: (-1, 1), 7: (-1, -1), 8: (1, -1)}[
+        turn
+    ]
+    shown = shown[::down, ::across]
+    expected = np.broadcast_to(shown[1, 3, : min(channels, 3)], 3) / 65535
+    assert parse_color(f"{tmp_path / 'a.png'}@3,1").tolist() == srgb_to_linear(expected).tolist()
+    with pytest.raises(tl.InputError, match="the image has 6 x 4" if turn < 5 else "the image has 4 x 6"):
+        parse_color(f"{tmp_path / 'a.png'}@9,9")
+
+
+def test_a_clear_pixel_of_16_bits_is_not_picked(tmp_path: Path) -> None:
+    _png16(tmp_path / "a.png", np.array([[[9000, 9, 9, 0], [9000, 9, 9, 65535]]]))
+    assert parse_color(f"{tmp_path / 'a.png'}@1,0").tolist() == srgb_to_linear(np.array([9000, 9, 9]) / 65535).tolist()
+    with pytest.raises(tl.InputError, match="wholly transparent"):
+        parse_color(f"{tmp_path / 'a.png'}@0,0")
+
+
 def test_a_picked_pixel_follows_the_turn_that_the_camera_noted(tmp_path: Path) -> None:
     image, exif = Image.new("RGB", (2, 3)), Image.Exif()
     image.putpixel((0, 2), (255, 255, 255))
@@ -269,9 +322,20 @@ def test_a_picked_pixel_follows_the_turn_that_the_camera_noted(tmp_path: Path) -
     assert parse_color(f"{tmp_path / 'a.png'}@0,0").tolist() == [1, 1, 1]
 
 
+def _tiff16() -> bytes:
+    """One pixel of three channels of 16 bits; of each tag its type and its values."""
+    tags = {256: [1], 257: [1], 258: [16, 16, 16], 259: [1], 262: [2], 273: [8], 277: [3], 278: [1], 279: [6]}
+    fields = b"".join(
+        struct.pack("<HHIHH", tag, 3, len(values), values[0] if len(values) == 1 else 14, 0)
+        for tag, values in tags.items()
+    )
+    return b"II*\0" + struct.pack("<I6x3H", 20, 16, 16, 16) + struct.pack("<H", len(tags)) + fields + bytes(4)
+
+
 def test_pixels_that_cannot_be_picked(tmp_path: Path) -> None:
     Image.new("RGBA", (2, 2), (9, 9, 9, 0)).save(tmp_path / "clear.png")
     Image.new("CMYK", (2, 2)).save(tmp_path / "print.tif")
+    (tmp_path / "deep.tif").write_bytes(_tiff16())
     _png16(tmp_path / "gray_alpha.png", np.zeros((2, 2, 2)))
     (tmp_path / "text.png").write_text("no image")
     whole = (tmp_path / "clear.png").read_bytes()
@@ -280,7 +344,8 @@ def test_pixels_that_cannot_be_picked(tmp_path: Path) -> None:
         ("clear.png@0,0", "wholly transparent"),
         ("clear.png@2,0", "the image has 2 x 2 pixels; count from 0"),
         ("print.tif@0,0", "pixels of the kind"),
-        ("gray_alpha.png@0,0", "pixels of the kind LA;16B"),
+        ("deep.tif@0,0", "pixels of the kind RGB of 16 bits"),
+        ("gray_alpha.png@0,0", "pixels of a kind that is not read"),
         ("text.png@0,0", "not an image that can be read"),
         ("cut.png@0,0", "not an image that can be read"),
         ("none.png@0,0", "no such file; check the path"),

@@ -237,9 +237,16 @@ def test_usda_is_read_in_one_go_whatever_it_says(piece: str) -> None:
         read_usda("#usda 1.0\n" + piece * (200_000 // len(piece)))  # took minutes where each try began anew
 
 
-def test_many_braces_of_usda_are_refused() -> None:
+@pytest.mark.parametrize("text", ["{" * 5000, 'def "a"\n{\n' * 20_000 + "}\n" * 20_000])  # the latter is valid
+def test_many_braces_of_usda_are_refused(text: str) -> None:
     with pytest.raises(tl.InputError, match="more than 100 levels of braces"):
-        read_usda("#usda 1.0\n" + "{" * 5000)
+        read_usda("#usda 1.0\n" + text)
+
+
+def test_a_long_whole_number_of_usda_is_read_in_silence(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(tl.InputError, match="it has no shader"):
+        read_usda('#usda 1.0\ndef "a"\n{\n    int b = ' + "9" * 100_000 + "\n}\n")
+    assert capfd.readouterr() == ("", "")
 
 
 DEEP = "[" * 900 + "]" * 900

@@ -1,4 +1,4 @@
-"""Frozen dataclasses to JSON and back, with every field checked; arrays as compressed text."""
+"""Frozen dataclasses to JSON and back, with every field checked, by cattrs; arrays as compressed text."""
 
 from __future__ import annotations
 
@@ -6,22 +6,27 @@ import base64
 import dataclasses
 import json
 import math
-import types
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from functools import partial
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 import numpy.typing as npt
+from cattrs import BaseValidationError, Converter, ForbiddenExtraKeysError, transform_error
+from cattrs.cols import list_structure_factory, mapping_structure_factory
+from cattrs.gen import make_dict_structure_fn
 
 from translucent.errors import InputError
 from translucent.files.reading import json_value
 
 #: Largest size of an unpacked array in bytes: a damaged file must not fill the memory.
 _LARGEST = 1 << 28
+#: Largest number of wrong values that are collected: each takes 500 times the memory of its text.
+_MOST = 100
 
+_Hook = Callable[[Any, Any], Any]
 T = TypeVar("T")
 
 
@@ -110,69 +115,104 @@ def decode(kind: type[T], text: str, name: str, file_format: str, version: int) 
             "make the report again",
         )
     try:
-        return _read(kind, found, "")  # type: ignore[no-any-return]
-    except _WrongFieldError as error:
-        raise InputError(f"reading {name}", str(error), "make the report again") from None
+        return _Strict().structure(found, kind)
+    except BaseValidationError as error:
+        said, _, where = transform_error(error, "", _said)[0].rpartition(" @ ")
+        raise InputError(
+            f"reading {name}", f"{where.lstrip('.') or 'the report'} {said}", "make the report again"
+        ) from None
+    except _TooManyError:
+        raise InputError(f"reading {name}", f"more than {_MOST} wrong values", "make the report again") from None
 
 
-class _WrongFieldError(ValueError):
-    """Error for a field of the wrong type or value."""
+class _TooManyError(BaseException):
+    """End of structuring. No `Exception`: those are collected."""
 
 
-@cache
-def _fields(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind)
+class _Strict(Converter):
+    """Converter of JSON values that converts nothing: cattrs alone makes an int of ``"3"`` and a tuple of ``{}``."""
 
+    def __init__(self) -> None:
+        super().__init__(forbid_extra_keys=True)
+        self._wrong = 0
+        for kind in (bool, int, str):
+            self.register_structure_hook(kind, self._exact)
+        self.register_structure_hook(float, self._number)
+        for origin, hook in ((Literal, self._option), (tuple, self._list), (Mapping, self._mapping)):
+            self.register_structure_hook_factory(partial(_is_of, origin), hook)
+        self.register_structure_hook_factory(dataclasses.is_dataclass, self._dataclass)
 
-def _read(kind: Any, value: Any, where: str) -> Any:
-    """Read a JSON `value` as the annotated type `kind`."""
-    origin, arguments = get_origin(kind), get_args(kind)
-    if dataclasses.is_dataclass(kind):
-        return _read_dataclass(kind, value, where)
-    if origin in (Union, types.UnionType):
-        others = [option for option in arguments if option is not type(None)]
-        return None if value is None and type(None) in arguments else _read(others[0], value, where)
-    if origin is Literal:
-        _require(value in arguments, where, value, f"one of {', '.join(map(repr, arguments))}")
+    def _require(self, held: bool, value: Any, expected: str) -> None:
+        if not held:
+            shown = repr(value)
+            raise self._error(f"is {shown if len(shown) < 60 else shown[:57] + '...'}, not {expected}")
+
+    def _error(self, said: str) -> ValueError:
+        self._wrong += 1
+        if self._wrong > _MOST:
+            raise _TooManyError
+        return ValueError(said)
+
+    def _exact(self, value: Any, kind: type) -> Any:
+        self._require(type(value) is kind, value, kind.__name__)
         return value
-    if origin is tuple:
-        _require(isinstance(value, list), where, value, "a list")
-        kinds = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
-        _require(len(kinds) == len(value), where, value, f"{len(kinds)} values")
-        return tuple(_read(k, v, f"{where}[{i}]") for i, (k, v) in enumerate(zip(kinds, value, strict=True)))
-    if origin is Mapping:
-        _require(isinstance(value, dict), where, value, "an object")
-        return {key: _read(arguments[1], item, f"{where}.{key}") for key, item in value.items()}
-    if kind is float:
-        number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-        _require(number, where, value, "a number")
+
+    def _number(self, value: Any, _: Any) -> float:
+        self._require(type(value) in (int, float) and math.isfinite(value), value, "a number")
         return float(value)
-    _require(isinstance(value, kind) and (kind is bool or not isinstance(value, bool)), where, value, kind.__name__)
-    return value
+
+    def _option(self, kind: Any) -> _Hook:
+        options = get_args(kind)
+
+        def structure(value: Any, _: Any) -> Any:
+            self._require(value in options, value, f"one of {', '.join(map(repr, options))}")
+            return value
+
+        return structure
+
+    def _holding(self, plain: _Hook, holder: type, expected: str) -> _Hook:
+        def structure(value: Any, kind: Any) -> Any:
+            self._require(isinstance(value, holder), value, expected)
+            return plain(value, kind)
+
+        return structure
+
+    def _list(self, kind: Any) -> _Hook:
+        """Structure a tuple, whose elements are all of one type."""
+        element, *others = get_args(kind)
+        plain = list_structure_factory(list[element], self)  # type: ignore[valid-type]
+
+        def structure(value: list[Any], _: Any) -> Any:
+            self._require(others == [...] or len(value) == 1 + len(others), value, f"{1 + len(others)} values")
+            return tuple(plain(value, kind))
+
+        return self._holding(structure, list, "a list")
+
+    def _mapping(self, kind: Any) -> _Hook:
+        return self._holding(mapping_structure_factory(kind, self, dict), dict, "an object")
+
+    def _dataclass(self, kind: Any) -> _Hook:
+        plain = make_dict_structure_fn(kind, self)
+
+        def structure(value: dict[str, Any], _: Any) -> Any:
+            made = plain(value, kind)
+            try:
+                if hasattr(made, "check"):
+                    made.check()
+            except (ValueError, zlib.error) as error:
+                raise self._error(f"is damaged ({error})") from None
+            return made
+
+        return self._holding(structure, dict, "an object")
 
 
-def _read_dataclass(kind: Any, value: Any, where: str) -> Any:
-    _require(isinstance(value, dict), where or "the report", value, "an object")
-    hints = _fields(kind)
-    if unknown := value.keys() - hints:
-        raise _WrongFieldError(f"{where or 'the report'} has unknown fields {', '.join(sorted(unknown))}")
-    needed = {
-        field.name
-        for field in dataclasses.fields(kind)
-        if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-    }
-    if missing := needed - value.keys():
-        raise _WrongFieldError(f"{where or 'the report'} has no {', '.join(sorted(missing))}")
-    made = kind(**{name: _read(hints[name], item, f"{where}.{name}".lstrip(".")) for name, item in value.items()})
-    try:
-        if hasattr(made, "check"):
-            made.check()
-    except (ValueError, zlib.error) as error:
-        raise _WrongFieldError(f"{where}: {error}") from None
-    return made
+def _is_of(origin: Any, kind: Any) -> bool:
+    """Whether a type is a generic one with arguments, such as ``tuple[int, ...]`` of ``tuple``."""
+    return get_origin(kind) is origin
 
 
-def _require(held: bool, where: str, value: Any, expected: str) -> None:
-    if not held:
-        shown = repr(value)
-        raise _WrongFieldError(f"{where} is {shown if len(shown) < 60 else shown[:57] + '...'}, not {expected}")
+def _said(error: BaseException, _: Any) -> str:
+    """Words for an error, after the path of its field."""
+    if isinstance(error, ForbiddenExtraKeysError):
+        return f"has unknown fields {', '.join(sorted(error.extra_fields))}"
+    return "is missing" if isinstance(error, KeyError) else str(error)

@@ -7,6 +7,12 @@ written as 1, and 0.01 where a layer states none.
 Source: OpenUSD, the .usda file format, UsdShade, UsdGeom (stage metrics).
 
 Read is one layer of text, without what it refers to: no composition, no variants, no binary .usdc.
+
+The reader is not OpenUSD's own (`Sdf.Layer.ImportFromString` of usd-core 26.11), which does not bear hostile text:
+20000 nested prims, 240 kB and valid, end the process (SIGSEGV); 20 kB of opening parentheses make an error message of
+205 MB in 1.3 GB of memory, and both grow as the square; whole numbers that are too long are printed to stderr from
+C++. A check of the depth beforehand would need the tokens of this file. It also makes a float32 of each input,
+1.6000000238 of an ior of 1.6, where this reader returns the number that is written.
 """
 
 from __future__ import annotations

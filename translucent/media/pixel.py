@@ -15,10 +15,14 @@ from translucent.formulas.color import srgb_to_linear
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+    from PIL.ImageFile import ImageFile
 
 
 _EIGHT_BITS = ("1", "L", "LA", "P", "PA", "RGB", "RGBA")
-_SIXTEEN_BITS = ("RGB;16B", "RGBA;16B")
+#: Exif's tag of how a camera was held.
+_ORIENTATION = 0x0112
+#: Where a PNG file states the bits of a channel: its header is its first chunk.
+_PNG_DEPTH = 24
 
 
 def pixel_color(path: str | Path, x: int, y: int) -> Array:
@@ -42,7 +46,7 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
         If there is no such file or pixel, it is no such image, or the pixel is wholly transparent.
     """
     what = f"pixel {x},{y} of {str(path)!r}"
-    image, low = _read(what, path)
+    image, channels = _read(what, path)
     if not (0 <= x < image.width and 0 <= y < image.height):
         raise InputError(what, f"the image has {image.width} x {image.height} pixels", "count from 0 at the top left")
     if image.mode.startswith("I;16"):
@@ -50,34 +54,58 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
     *straight, alpha = _pixel(image.convert("RGBA"), x, y)
     if alpha == 0:
         raise InputError(what, "the pixel is wholly transparent", "pick one that has a color")
-    if low is None:
-        return srgb_to_linear(np.array(straight) / 255.0)
-    return srgb_to_linear((256.0 * np.array(straight) + _pixel(low.convert("RGBA"), x, y)[:3]) / 65535.0)
+    if channels:
+        return srgb_to_linear(np.array([_pixel(channel, x, y) for channel in channels]) / 65535.0)
+    return srgb_to_linear(np.array(straight) / 255.0)
 
 
-def _read(what: str, path: str | Path) -> tuple[Image, Image | None]:
-    """Read an image, and a second one with the low bytes of its channels if they have 16 bits."""
+def _read(what: str, path: str | Path) -> tuple[Image, list[Image]]:
+    """Read an image, and each of its three channels if they have 16 bits, all turned as a camera notes."""
     from PIL import ImageOps
 
-    do = "give an image file and a pixel, for example photo.png@120,45"
+    do, data = "give an image file and a pixel, for example photo.png@120,45", read_bytes(path, what)
     try:
-        with open_picture(read_bytes(path, what), what, per_pixel=16, do=do) as image:
-            kind = str(image.tile[0][3]) if image.tile else ""
-            if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (
-                "16" in kind and image.mode[0] != "I" and kind not in _SIXTEEN_BITS
-            ):
-                raise InputError(what, f"pixels of the kind {kind or image.mode}", "save it as an 8-bit RGB image")
-            high = ImageOps.exif_transpose(image)
-        if kind not in _SIXTEEN_BITS:
-            return high, None
-        # Pillow keeps the first byte of each number. Told that the other one comes first, it keeps the other.
-        with open_picture(read_bytes(path, what), what, per_pixel=16, do=do) as image:
-            image.tile = [tile._replace(args=kind.replace("16B", "16L")) for tile in image.tile]
-            return high, ImageOps.exif_transpose(image)
+        with open_picture(data, what, per_pixel=16, do=do) as image:
+            deep = _is_deep(image, data)
+            if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (deep and image.format != "PNG"):
+                kind = f"{image.mode} of 16 bits" if deep else image.mode
+                raise InputError(what, f"pixels of the kind {kind}", "save it as an 8-bit RGB image")
+            shown, turn = ImageOps.exif_transpose(image), image.getexif().get(_ORIENTATION, 1)
+        return shown, _deep_channels(what, data, turn) if deep else []
     except InputError:
         raise
     except Exception as error:  # each of Pillow's decoders raises its own kinds
         raise InputError(what, "not an image that can be read", do) from error
+
+
+def _is_deep(image: ImageFile, data: bytes) -> bool:
+    """Whether an image has colors of 16 bits per channel, of which Pillow keeps 8."""
+    from PIL import TiffImagePlugin
+
+    if image.mode not in ("RGB", "RGBA"):
+        return False
+    if isinstance(image, TiffImagePlugin.TiffImageFile):
+        return bool(max(image.tag_v2.get(TiffImagePlugin.BITSPERSAMPLE, (8,))) > 8)
+    return image.format == "PNG" and data[_PNG_DEPTH] == 16
+
+
+def _deep_channels(what: str, data: bytes, turn: int) -> list[Image]:
+    """Red, green and blue of a PNG of 16 bits, each as a gray image, turned as Exif's orientation says."""
+    import pyspng
+    from PIL import ImageOps
+    from PIL.Image import fromarray
+
+    try:
+        values = pyspng.load(data)
+    except RuntimeError as error:
+        raise InputError(
+            what, f"pixels of a kind that is not read ({error})", "save it as an 8-bit RGB image"
+        ) from None
+    channels = [fromarray(values[..., i]) for i in range(3)]
+    for channel in channels:
+        channel.getexif()[_ORIENTATION] = turn
+        ImageOps.exif_transpose(channel, in_place=True)
+    return channels
 
 
 def _pixel(image: Image, x: int, y: int) -> Array:
