@@ -42,6 +42,13 @@ float ggx_visibility(float cos_light, float cos_view, float alpha) {
     return light + view > 0.0 ? 0.5 / (light + view) : 0.0;
 }
 
+// Smith's Lambda of GGX: 1 / (1 + Lambda) of the microfacets are seen from a direction.
+float smith_lambda(float cosine, float alpha) {
+    float up = max(cosine, 1e-6);
+    float slope = alpha * alpha * (1.0 - up) * (1.0 + up);
+    return 0.5 * slope / (up * (sqrt(up * up + slope) + up));
+}
+
 // Normal of a microfacet as it is seen from a direction, at random: towards and the result in a frame whose z axis is the
 // normal of the surface, shares (0 to 1) are the random numbers.
 vec3 ggx_visible_normal(vec3 towards, float alpha, vec2 shares) {

@@ -26,7 +26,10 @@ uniform sampler2D entered;           // interface towards the eye: normal, axial
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 uniform int most_interfaces;
-uniform int sample_number;           // of a pixel; below 0: rough interfaces blur what is seen in them
+#if MICROFACETS
+uniform int sample_number;           // of a pixel
+uniform float blurred_share;         // of the variance of microfacets, that blurs what is seen in them; the rest is sampled
+#endif
 uniform uvec4 start_record;          // of rays that start inside bodies
 
 layout(location = 0) out vec4 out_radiance;
@@ -49,11 +52,13 @@ struct Ray {
     int met;          // interfaces
     int forks;        // left
     bool reflected;   // sees the environment as a light
-    float blur;       // roughness of a mirror with the same blur
+    float blur;       // squared alpha of a mirror with the same blur
+    int turns;        // which of its interfaces it was reflected at, a bit each
 };
 
 vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
-    return reflected ? environment_light(direction, blur) : environment_beyond(point, direction, blur);
+    float roughness = sqrt(sqrt(min(blur, 1.0)));
+    return reflected ? environment_light(direction, roughness) : environment_beyond(point, direction, roughness);
 }
 
 float strength(vec3 share) {
@@ -65,16 +70,17 @@ vec3 kept_on_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
-// Random numbers for the microfacet at an interface of a path: an additive recurrence over the samples of a pixel (Roberts
-// 2018, "The unreasonable effectiveness of quasirandom sequences"), rotated for each pixel.
-vec2 microfacet_shares(int met, float branch) {
+#if MICROFACETS
+// Random numbers for the microfacet at an interface of a path: an additive recurrence in four dimensions over the samples of
+// a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
+// random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
+vec2 microfacet_shares(int met, int turns) {
     uvec2 at = uvec2(gl_FragCoord.xy);
-    uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 69069u + floatBitsToUint(branch)) * 747796405u + 2891336453u;
+    uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 2654435761u + uint(turns) * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     state = (state >> 22u) ^ state;
     vec2 step = met % 2 == 0 ? vec2(0.8566749, 0.7338919) : vec2(0.6287067, 0.5385973);
-    vec2 turn = vec2(state & 0xffffu, state >> 16) / 65536.0;
-    return fract(turn + float(sample_number) * step);
+    return fract(vec2(state & 0xffffu, state >> 16) / 65536.0 + float(sample_number) * step);
 }
 
 // A microfacet of a rough interface as the ray sees it.
@@ -85,6 +91,14 @@ vec3 microfacet_normal(vec3 normal, vec3 direction, float alpha, vec2 shares) {
     vec3 local = ggx_visible_normal(towards, alpha, shares);
     return local.x * aside + local.y * up + local.z * normal;
 }
+
+// Share of the light on a microfacet that leaves the surface: G2 / G1 of Smith's masking, heights correlated (Heitz 2014).
+float masking_ratio(float cos_in, float cos_out, float alpha) {
+    if (cos_out <= 0.0) { return 0.0; }
+    float into = smith_lambda(cos_in, alpha);
+    return (1.0 + into) / (1.0 + into + smith_lambda(cos_out, alpha));
+}
+#endif
 
 float index_of(int body, int channel) {
     if (body == AIR) { return 1.0; }
@@ -219,9 +233,17 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             finish = finish_of(vec4(float(owner), body.roughness, body.transmission, 0.0));
             finish.color = body.color;
         }
+        float alpha = finish.roughness * finish.roughness;
 #if MICROFACETS
-        if (finish.roughness > 0.0 && sample_number >= 0) {
-            smooth_normal = microfacet_normal(smooth_normal, ray.direction, finish.roughness * finish.roughness, microfacet_shares(ray.met, ray.direction.x));
+        vec3 facet, facet_normal;
+        float facet_alpha = 0.0, full_alpha = 0.0;
+        if (finish.roughness > 0.0 && blurred_share < 1.0) {
+            facet_alpha = sqrt(1.0 - blurred_share) * alpha;
+            full_alpha = alpha;
+            alpha *= sqrt(blurred_share);
+            facet = microfacet_normal(smooth_normal, ray.direction, facet_alpha, microfacet_shares(ray.met, ray.turns));
+            facet_normal = smooth_normal;
+            smooth_normal = facet;
             finish.roughness = 0.0;
         }
 #endif
@@ -237,19 +259,32 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         } else {
             on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
         }
+#if MICROFACETS
+        if (facet_alpha > 0.0) {
+            float towards = -dot(facet_normal, ray.direction);
+            vec3 mirrored_way = reflected_direction(ray.direction, facet);
+            share_back *= masking_ratio(towards, dot(facet_normal, mirrored_way), full_alpha);
+            share_on *= kind == KIND_SHEET ? 1.0 : masking_ratio(towards, -dot(facet_normal, on_way), full_alpha);
+        }
+#endif
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
         if (finish.transmission < 1.0 && outside) {
             sum.light += ray.share * share_on * (1.0 - finish.transmission) * paint(finish, point, smooth_normal);
         }
         if (kind == KIND_SHEET || owner == after) { share_on *= finish.transmission * finish.color; }
+        float ior_inside = max(ior, 1.0 / ior);
         float occlusion = first ? first_finish.unoccluded : 1.0;
         Ray back = Ray(point + SURFACE_OFFSET * surface_reach * face_normal, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
-            first ? 0 : ray.forks, true, max(ray.blur, finish.roughness));
+            first ? 0 : ray.forks, true,
+            ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
+            ray.turns * 2 + 1);
         Ray on = Ray(beyond, on_way, ray.share * share_on, after_record, ray.met + 1, ray.forks, ray.reflected,
-            max(ray.blur, refraction_roughness(finish.roughness, ior)));
+            ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2);
         bool on_stronger = strength(on.share) >= strength(back.share);
         bool last = ray.met + 1 >= most_interfaces;
         Ray weaker = back;
+        vec3 arrival = ray.direction;
+        bool arrived_reflected = ray.reflected;
         vec3 again = outside ? vec3(1.0) : passed;
         ray = on;
         if (!on_stronger) {
@@ -265,8 +300,11 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         if (strength(weaker.share) > 0.0) {
             sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * environment_seen(weaker.origin, weaker.direction, weaker.reflected, weaker.blur);
         }
-        if (last || strength(ray.share) < 3.0 * FAINTEST) {
-            sum.light += (on_stronger ? vec3(1.0) : again) * ray.share * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
+        if (last || strength(ray.share) < 12.0 * FAINTEST) {
+            // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
+            bool total = reflectance == 1.0;
+            sum.light += (on_stronger ? vec3(1.0) : again) * ray.share
+                * environment_seen(ray.origin, total ? arrival : ray.direction, total ? arrived_reflected : ray.reflected, ray.blur);
             ends = true;
         }
     }
@@ -281,7 +319,7 @@ void main() {
     vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
     vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
     vec4 front = texelFetch(entered, texel, 0);
-    out_transmittance = vec4(through, 1.0);
+    out_transmittance = vec4(through, 1.0);  // alpha: whether the pixel can be trusted
     bool starts_inside = start_record.x != 0u;
     if (front.w >= NOTHING && !starts_inside) {
         out_radiance = vec4(background(pixel, direction, texel) * through + emitted, 1.0);
@@ -302,7 +340,7 @@ void main() {
         path = front.w < NOTHING ? length(point - origin) : NOTHING;
         reach = NOTHING;
     }
-    Ray ray = Ray(origin, direction, vec3(1.0), start_record, 0, FORKS, false, 0.0);
+    Ray ray = Ray(origin, direction, vec3(1.0), start_record, 0, FORKS, false, 0.0, 0);
     int object = int(surface.x + 0.5);
 #if DISPERSION
     Sum sum = follow(ray, object, path, front.xyz, reach, finish, 1);
@@ -322,4 +360,5 @@ void main() {
 #endif
     }
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
+    out_transmittance.a = sum.sound ? 1.0 : 0.0;
 }

@@ -46,8 +46,8 @@ class FrameJob(SceneView):
     features : FrameFeatures
     averaging : bool
         The samples of the frame are being summed up.
-    sample : int
-        Number of the sample that is drawn, from 0; -1 for a picture of the pixel centers alone.
+    sample, samples : int
+        Number of the sample that is drawn, from 0, and how many are summed up; 0 of 1 at the pixel centers.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class FrameJob(SceneView):
         self.plan = plan
         self.backdrop = backdrop
         self.averaging = False
-        self.sample = -1
+        self.sample, self.samples = 0, 1
         self.features = FrameFeatures(scene, plan)
         placed = PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))

@@ -172,6 +172,11 @@ class GpuRenderer:
         optical_depth, thickness = _read_floats(result, 2, 3), _read_floats(result, 3, 1)
         seconds = self._timer.seconds()
         seconds["total"] = time.perf_counter() - job.started
+        sound = np.ones(flags.shape, dtype=bool)
+        if job.features.traced:
+            # Rays that end inside a body, or in more of them than they can remember, have no right color.
+            picture, whole = (job.targets.average(), samples) if samples > 1 else (job.targets.surfaced(), 1)
+            sound = _read_floats(picture, 1, 4)[..., 3] == np.float32(whole)
         layers = truncated = None
         if job.plan.ordered:
             counts = _read_floats(job.targets.ordered(), 2, 4)[::-1]
@@ -183,7 +188,7 @@ class GpuRenderer:
             optical_depth=optical_depth,
             thickness=thickness,
             coverage=(flags & 1).astype(bool),
-            valid=(flags & 2).astype(bool),
+            valid=(flags & 2).astype(bool) & sound,
             plan=job.plan,
             seconds=seconds,
             provenance=dict(self.provenance),
@@ -248,10 +253,10 @@ class GpuRenderer:
         job.targets.average().clear()
         job.averaging = True
         for number, (right, down) in enumerate(sample_shifts(samples)):
-            job.sample = number
+            job.sample, job.samples = number, samples
             job.place((right, down))
             self._run_passes(job)
-        job.averaging, job.sample = False, -1
+        job.averaging, job.sample, job.samples = False, 0, 1
         job.place((0.0, 0.0))
 
 

@@ -95,6 +95,7 @@ class TracedInterfacesPass:
         set_uniform(program, "most_interfaces", job.plan.interfaces.depth)
         if "sample_number" in program:
             set_uniform(program, "sample_number", job.sample)
+            set_uniform(program, "blurred_share", blurred_share(job.samples))
         set_uniform(program, "start_record", _record_at_eye(job))
         if "object_nodes" in program:
             set_uniform(program, "object_nodes", hierarchies.object_nodes)
@@ -102,6 +103,14 @@ class TracedInterfacesPass:
         self._variants.draw_fullscreen(program)
         for table in tables:
             table.release()
+
+
+def blurred_share(samples: int) -> float:
+    """Share of the variance of microfacets that blurs what is seen in them, 1 for a single sample of a pixel.
+
+    The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
+    """
+    return float(samples) ** -0.2
 
 
 def media_center(scene: Scene) -> Array:
