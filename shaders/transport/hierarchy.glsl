@@ -8,6 +8,13 @@ uniform usampler2D hierarchy_triangles;  // three texels each: corners, and thei
 uniform int object_nodes;                // nodes of the hierarchy of objects
 uniform vec4 objects_frame;              // center and scale of its coordinates
 
+#if ONE_OBJECT
+TracedBody only_body;
+TracedBody traced_body(int object) { return only_body; }
+#else
+TracedBody traced_body(int object) { return traced_bodies_row(object); }
+#endif
+
 struct Hit {
     float path;      // metres; NOTHING where there is none
     int object;
@@ -67,7 +74,7 @@ void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, 
 }
 
 void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
-    TracedBody place = traced_bodies_row(object);
+    TracedBody place = traced_body(object);
     vec3 along = vec3(dot(place.local_x.xyz, direction), dot(place.local_y.xyz, direction), dot(place.local_z.xyz, direction));
     vec4 point = vec4(origin, 1.0);
     LocalRay ray = local_ray(vec3(dot(place.local_x, point), dot(place.local_y, point), dot(place.local_z, point)), along);
@@ -75,23 +82,25 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
     int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     vec3 turned = along_last(along, axis);
     vec3 shear = vec3(turned.xy, 1.0) / turned.z;
-    int node = int(place.first_node.x) << 12 | int(place.first_node.y);
-    int end = int(place.end_node.x) << 12 | int(place.end_node.y);
+    int octant = (along.x < 0.0 ? 1 : 0) + (along.y < 0.0 ? 2 : 0) + (along.z < 0.0 ? 4 : 0);
+    int count = int(place.node_count.x) << 12 | int(place.node_count.y);
+    int node = (int(place.first_node.x) << 12 | int(place.first_node.y)) + octant * count;
+    int end = node + count;
     while (node < end) {
-        uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
-        bool leaf = found.w >= 0x80000000u;
-        if (!meets_bounds(found, ray, start, hit.path)) {
-            node = leaf ? node + 1 : int(found.w);
-            continue;
+        // All rays of a group look for their next leaf, and then test triangles together.
+        uint held = 0u;
+        while (node < end && held == 0u) {
+            uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
+            bool met = meets_bounds(found, ray, start, hit.path);
+            bool leaf = found.w >= 0x80000000u;
+            held = leaf && met ? found.w : 0u;
+            node = leaf || met ? node + 1 : int(found.w);
         }
-        if (leaf) {
-            int first = int(found.w & 0x1fffffffu);
-            int last = first + int(found.w >> 29 & 3u);
-            for (int triangle = first; triangle <= last; ++triangle) {
-                meet_triangle(triangle, object, ray.origin, shear, axis, start, hit);
-            }
+        int triangle = int(held & 0x1fffffffu);
+        int last = held == 0u ? triangle - 1 : triangle + int(held >> 29 & 3u);
+        for (; triangle <= last; ++triangle) {
+            meet_triangle(triangle, object, ray.origin, shear, axis, start, hit);
         }
-        ++node;
     }
 }
 
@@ -130,7 +139,7 @@ vec3 unpacked_normal(uint packed_normal) {
 
 // Unit normals outwards where a ray has hit: of the smooth surface and of the face.
 void hit_normals(Hit hit, out vec3 smooth_normal, out vec3 face_normal) {
-    TracedBody place = traced_bodies_row(hit.object);
+    TracedBody place = traced_body(hit.object);
     uvec4 a = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle), 0);
     uvec4 b = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 1), 0);
     uvec4 c = texelFetch(hierarchy_triangles, hierarchy_texel(3 * hit.triangle + 2), 0);

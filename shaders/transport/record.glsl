@@ -58,7 +58,7 @@ int dominant_body(uvec4 record) {
     for (int i = 0; i < RECORD_SIZE; ++i) {
         uint entry = record_entry(record, i);
         if (entry == 0u) { break; }
-        float rank = traced_bodies_row(int(entry) - 1).rank;
+        float rank = traced_body(int(entry) - 1).rank;
         if (rank > highest) {
             highest = rank;
             best = int(entry) - 1;
@@ -78,7 +78,7 @@ Filling filling_of(uvec4 record, int dominant) {
     Filling sum = Filling(vec3(0.0), vec3(0.0));
 #if ONE_OBJECT || PRIORITY
     if (dominant != AIR) {
-        TracedBody body = traced_bodies_row(dominant);
+        TracedBody body = traced_body(dominant);
         sum = Filling(body.extinction, body.emission);
     }
 #if ONE_OBJECT && !PRIORITY && !UNION
@@ -92,11 +92,11 @@ Filling filling_of(uvec4 record, int dominant) {
     for (int i = 0; i < RECORD_SIZE; ++i) {
         uint entry = record_entry(record, i);
         if (entry == 0u) { break; }
-        TracedBody body = traced_bodies_row(int(entry) - 1);
+        TracedBody body = traced_body(int(entry) - 1);
 #if UNION
         bool counted = false;
         for (int k = 0; k < i; ++k) {
-            counted = counted || traced_bodies_row(int(record_entry(record, k)) - 1).slot == body.slot;
+            counted = counted || traced_body(int(record_entry(record, k)) - 1).slot == body.slot;
         }
         if (counted) { continue; }
 #endif

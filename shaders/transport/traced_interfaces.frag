@@ -102,7 +102,7 @@ float masking_ratio(float cos_in, float cos_out, float alpha) {
 
 float index_of(int body, int channel) {
     if (body == AIR) { return 1.0; }
-    TracedBody row = traced_bodies_row(body);
+    TracedBody row = traced_body(body);
 #if DISPERSION
     return channel_iors(row.ior, row.dispersion)[channel];
 #else
@@ -172,7 +172,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ends = true;
             continue;
         }
-        TracedBody body = traced_bodies_row(hit.object);
+        TracedBody body = traced_body(hit.object);
         int kind = int(body.kind);
         vec3 smooth_normal, face_normal;
         hit_normals(hit, smooth_normal, face_normal);
@@ -199,7 +199,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         // Surfaces of two bodies in one place are one interface.
         float within = offset / max(-dot(face_normal, ray.direction), 1e-2);
         Hit other = kind == KIND_SOLID ? nearest_hit(ray.origin, ray.direction, max(hit.path - 0.5 * within, 0.0), hit.path + within, hit.object) : Hit(NOTHING, AIR, 0, vec2(0.0));
-        if (other.object >= 0 && int(traced_bodies_row(other.object).kind) == KIND_SOLID) {
+        if (other.object >= 0 && int(traced_body(other.object).kind) == KIND_SOLID) {
             vec3 other_smooth, other_face;
             hit_normals(other, other_smooth, other_face);
             bool other_outside = dot(other_face, ray.direction) < 0.0;
@@ -210,7 +210,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
                 smooth_normal = other_outside ? other_smooth : -other_smooth;
                 facing = dot(smooth_normal, ray.direction);
                 if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
-                body = traced_bodies_row(other.object);
+                body = traced_body(other.object);
                 hit.object = other.object;
                 outside = other_outside;
             }
@@ -221,8 +221,8 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         float ior = kind == KIND_SHEET ? index_of(hit.object, channel) / index_of(before, channel)
                                        : index_of(after, channel) / index_of(before, channel);
         bool matters = kind == KIND_SHEET ? true
-            : before != after && (ior != 1.0 || (before != AIR && traced_bodies_row(before).plain == 0.0)
-                || (after != AIR && traced_bodies_row(after).plain == 0.0));
+            : before != after && (ior != 1.0 || (before != AIR && traced_body(before).plain == 0.0)
+                || (after != AIR && traced_body(after).plain == 0.0));
         if (!matters) {
             ray.origin = beyond;
             ray.record = after_record;
@@ -312,6 +312,9 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
 }
 
 void main() {
+#if ONE_OBJECT
+    only_body = traced_bodies_row(0);
+#endif
     vec2 pixel = gl_FragCoord.xy + frame_size.zw;
     ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
     ivec2 here = ivec2(gl_FragCoord.xy);

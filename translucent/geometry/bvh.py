@@ -7,8 +7,9 @@ each other become one. All clusters of a round are handled at once, so that NumP
 are as good as those of the surface area heuristic. Which subtrees become leaves is decided by that heuristic
 (MacDonald & Booth 1990).
 
-Nodes are stored depth-first with skip links (Smits 1998, "Efficiency issues for ray tracing"): a ray that meets the
-bounds of a node goes on to the next node, any other to the node behind the subtree; no stack is needed.
+Nodes are visited depth-first with skip links (Smits 1998, "Efficiency issues for ray tracing"): a ray that meets the
+bounds of a node goes on to the next node, any other to the node behind the subtree; no stack is needed. There is an
+order for each octant of directions, in which the nearer child comes first.
 """
 
 from __future__ import annotations
@@ -40,27 +41,31 @@ _CURVE_BITS = 20
 
 @dataclass(frozen=True, eq=False)
 class Hierarchy:
-    """Bounding volume hierarchy of a mesh, its nodes in depth-first order.
+    """Bounding volume hierarchy of a mesh.
 
     Attributes
     ----------
     low, high : (n, 3) float32
-        Bounds of the nodes.
-    skip : (n,) int32
-        Node to go on with where a ray misses a node's bounds, or after a leaf; n ends.
+        Bounds of the nodes, parents before children; the first is the root.
+    size : (n,) int32
+        Number of nodes in the subtree of each.
     first : (n,) int32
-        First triangle of a leaf, in the order of `faces`; -1 for an inner node.
+        First triangle of a leaf, in the order of `faces`; 0 for an inner node.
     count : (n,) int32
         Number of triangles of a leaf; 0 for an inner node.
+    orders : (8, n) int32
+        Place of each node in the depth-first order for an octant of directions; bit k of the octant is set where axis k
+        is negative. A ray goes on `size` places farther where it misses a node's bounds.
     faces : (m,) int32
         Faces of the mesh in the order in which leaves hold them.
     """
 
     low: Floats
     high: Floats
-    skip: npt.NDArray[np.int32]
+    size: npt.NDArray[np.int32]
     first: npt.NDArray[np.int32]
     count: npt.NDArray[np.int32]
+    orders: npt.NDArray[np.int32]
     faces: npt.NDArray[np.int32]
 
 
@@ -180,27 +185,42 @@ def _laid_out(tree: _Tree, order: Integers, leaf_size: int) -> Hierarchy:
         is_leaf[begin:end] = (counts[begin:end] <= leaf_size) & (whole <= split)
         cost[begin:end] = np.where(is_leaf[begin:end], whole, split)
         nodes[begin:end] = np.where(is_leaf[begin:end], 1, 1 + nodes[left] + nodes[right])
-    position, first, shown = np.zeros(total, np.int32), np.zeros(total, np.int32), np.ones(total, bool)
+    first, shown = np.zeros(total, np.int32), np.ones(total, bool)
     for begin, end in reversed(tree.rounds):
         left, right = tree.children[:, begin:end]
-        position[left] = position[begin:end] + 1
-        position[right] = position[left] + nodes[left]
         first[left] = first[begin:end]
         first[right] = first[begin:end] + counts[left]
         shown[left] = shown[right] = shown[begin:end] & ~is_leaf[begin:end]
     faces = np.empty(leaves, np.int32)
     faces[first[:leaves]] = order
-    chosen = np.flatnonzero(shown)
-    chosen = chosen[np.argsort(position[chosen])]
+    chosen = np.flatnonzero(shown)[::-1]  # the root was made last
     leaf = is_leaf[chosen]
     return Hierarchy(
         np.ascontiguousarray(tree.low[:, chosen].T),
         np.ascontiguousarray(tree.high[:, chosen].T),
-        (position[chosen] + nodes[chosen]).astype(np.int32),
-        np.where(leaf, first[chosen], -1).astype(np.int32),
+        nodes[chosen],
+        np.where(leaf, first[chosen], 0).astype(np.int32),
         np.where(leaf, counts[chosen], 0).astype(np.int32),
+        _depth_first(tree, nodes)[:, chosen],
         faces,
     )
+
+
+def _depth_first(tree: _Tree, nodes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """(8, n): place of each node in the order for each octant; `nodes` counts those of subtrees."""
+    center = tree.low + tree.high
+    orders = np.zeros((8, len(nodes)), np.int32)
+    octants = np.arange(8)
+    for begin, end in reversed(tree.rounds):
+        left, right = tree.children[:, begin:end]
+        apart = center[:, right] - center[:, left]
+        axis = np.abs(apart).argmax(axis=0)
+        swapped = np.take_along_axis(apart, axis[None], axis=0)[0] < 0
+        swap = swapped ^ (octants[:, None] >> axis & 1).astype(bool)
+        place = orders[:, begin:end] + 1
+        orders[:, left] = place + np.where(swap, nodes[right], 0)
+        orders[:, right] = place + np.where(swap, 0, nodes[left])
+    return orders
 
 
 def sah_cost(hierarchy: Hierarchy) -> float:

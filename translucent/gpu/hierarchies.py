@@ -44,8 +44,8 @@ class PackedMesh:
 
     Attributes
     ----------
-    nodes : (n, 4) uint32
-        Links count from the first node and the first triangle of the mesh.
+    nodes : (8, n, 4) uint32
+        Of `packed_nodes`; triangles count from the first of the mesh.
     triangles : (3 m, 4) uint32
     center : (3,) float64
     scale : float
@@ -77,17 +77,21 @@ def packed_mesh(mesh: Mesh) -> PackedMesh:
 
 
 def packed_nodes(tree: Hierarchy) -> Words:
-    """(n, 4): nodes of a hierarchy within -1 to 1, their bounds rounded outwards by one to two steps."""
+    """(8, n, 4): nodes of a hierarchy within -1 to 1, in the orders of all octants.
+
+    Bounds are rounded outwards by one to two steps; links count from the first node of their order.
+    """
     half = STEPS / 2
     low = np.clip(np.floor((tree.low.astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
     high = np.clip(np.ceil((tree.high.astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
     leaf = tree.count > 0
-    first = np.where(leaf, tree.first, 0).astype(np.uint32)
-    follow = np.where(leaf, tree.count - 1, 0).astype(np.uint32)
-    link = np.where(leaf, np.uint32(1 << 31) | follow << _FIRST_BITS | first, tree.skip.astype(np.uint32))
-    return np.stack(
-        [low[:, 0] | low[:, 1] << 16, low[:, 2] | high[:, 0] << 16, high[:, 1] | high[:, 2] << 16, link], axis=1
-    )
+    held = np.uint32(1 << 31) | (tree.count - 1).astype(np.uint32) << _FIRST_BITS | tree.first.astype(np.uint32)
+    bounds = [low[:, 0] | low[:, 1] << 16, low[:, 2] | high[:, 0] << 16, high[:, 1] | high[:, 2] << 16]
+    nodes = np.empty((8, len(leaf), 4), np.uint32)
+    for order, found in zip(tree.orders, nodes, strict=True):
+        link = np.where(leaf, held, (order + tree.size).astype(np.uint32))
+        found[order] = np.stack([*bounds, link], axis=1)
+    return nodes
 
 
 def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
@@ -101,10 +105,10 @@ def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """Nodes of one mesh in the texture."""
+    """Nodes of one mesh in the texture: the first, and how many there are in each of eight orders."""
 
     first: int
-    end: int
+    count: int
 
 
 class SceneHierarchies:
@@ -122,17 +126,17 @@ class SceneHierarchies:
         self._packed = [packed_mesh(mesh) for mesh in meshes]
         self._rows = -(-2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
-        parts, triangles, first, start = [], 0, self._rows * _WIDTH, self._rows * _WIDTH
+        start = self._rows * _WIDTH
+        parts, triangles, first = [np.zeros((start, 4), np.uint32)], 0, start
         for mesh, packed in zip(meshes, self._packed, strict=True):
-            nodes = packed.nodes.copy()
-            leaf = nodes[:, 3] >= 1 << 31
-            nodes[:, 3] += np.where(leaf, triangles, first).astype(np.uint32)
-            parts.append(nodes)
-            self._spans[id(mesh)] = _Span(first, first + len(nodes))
-            first += len(nodes)
+            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1])
+            for order in packed.nodes:
+                nodes = order.copy()
+                nodes[:, 3] += np.where(nodes[:, 3] >= 1 << 31, triangles, first).astype(np.uint32)
+                parts.append(nodes)
+                first += len(nodes)
             triangles += len(packed.triangles) // 3
-        reserved = np.zeros((start, 4), np.uint32)
-        self.nodes = _texture(gl, np.concatenate([reserved, *parts]))
+        self.nodes = _texture(gl, np.concatenate(parts))
         self.triangles = _texture(gl, np.concatenate([packed.triangles for packed in self._packed]))
         self.object_nodes = 0
 
@@ -152,9 +156,9 @@ class SceneHierarchies:
         scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
         local: Floats = ((boxes - middle) * scale).astype(np.float32)
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
-        nodes = packed_nodes(tree)
-        leaf = tree.count > 0
-        nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[tree.first[leaf]].astype(np.uint32)
+        nodes = packed_nodes(tree)[0]
+        leaf = nodes[:, 3] >= 1 << 31
+        nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[nodes[leaf, 3] & 0x1FFFFFFF].astype(np.uint32)
         reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
@@ -180,7 +184,7 @@ class SceneHierarchies:
             "local_y": rows[1],
             "local_z": rows[2],
             "first_node": divmod(span.first, 1 << 12),
-            "end_node": divmod(span.end, 1 << 12),
+            "node_count": divmod(span.count, 1 << 12),
             "extinction": bounded_extinction(medium, scene.diagonal),
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
             "emission": np.asarray(medium.emission),
