@@ -17,6 +17,11 @@ vec3 environment_light(vec3 direction, float roughness) {
     return light_scale * (share == 0.0 ? smoother : mix(smoother, rough, share));
 }
 
+// The same of a polished mirror.
+vec3 mirrored_environment(vec3 direction) {
+    return light_scale * textureLod(light_map, equirectangular_uv(direction, light_turn), 0.0).rgb;
+}
+
 vec3 environment_irradiance(vec3 normal) {
     return light_scale * textureLod(light_irradiance, equirectangular_uv(normal, light_turn), 0.0).rgb;
 }

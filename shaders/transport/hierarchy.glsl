@@ -96,8 +96,8 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
             held = leaf && met ? found.w : 0u;
             node = leaf || met ? node + 1 : int(found.w);
         }
-        int triangle = int(held & 0x1fffffffu);
-        int last = held == 0u ? triangle - 1 : triangle + int(held >> 29 & 3u);
+        int triangle = int(held & 0x0fffffffu);
+        int last = held == 0u ? triangle - 1 : triangle + int(held >> 28 & 7u);
         for (; triangle <= last; ++triangle) {
             meet_triangle(triangle, object, ray.origin, shear, axis, start, hit);
         }
@@ -120,7 +120,7 @@ Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, int left_ou
             node = leaf ? node + 1 : int(found.w);
             continue;
         }
-        int object = int(found.w & 0x1fffffffu);
+        int object = int(found.w & 0x0fffffffu);
         if (leaf && object != left_out) { meet_object(object, origin, direction, start, hit); }
         ++node;
     }

@@ -57,8 +57,14 @@ struct Ray {
 };
 
 vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
+#if MICROFACETS
     float roughness = sqrt(sqrt(min(blur, 1.0)));
     return reflected ? environment_light(direction, roughness) : environment_beyond(point, direction, roughness);
+#elif SEEN_LIGHTS
+    return mirrored_environment(direction);
+#else
+    return reflected ? mirrored_environment(direction) : environment_beyond(point, direction, 0.0);
+#endif
 }
 
 float strength(vec3 share) {
@@ -228,32 +234,30 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ray.record = after_record;
             continue;
         }
-        Finish finish = first_finish;
-        if (!first) {
-            finish = finish_of(vec4(float(owner), body.roughness, body.transmission, 0.0));
-            finish.color = body.color;
-        }
-        float alpha = finish.roughness * finish.roughness;
+        float roughness = first ? first_finish.roughness : body.roughness;
+        float transmission = first ? first_finish.transmission : body.transmission;
+        vec3 tint = first ? first_finish.color : body.color;
+        float alpha = roughness * roughness;
 #if MICROFACETS
         vec3 facet, facet_normal;
         float facet_alpha = 0.0, full_alpha = 0.0;
-        if (finish.roughness > 0.0 && blurred_share < 1.0) {
+        if (roughness > 0.0 && blurred_share < 1.0) {
             facet_alpha = sqrt(1.0 - blurred_share) * alpha;
             full_alpha = alpha;
             alpha *= sqrt(blurred_share);
             facet = microfacet_normal(smooth_normal, ray.direction, facet_alpha, microfacet_shares(ray.met, ray.turns));
             facet_normal = smooth_normal;
             smooth_normal = facet;
-            finish.roughness = 0.0;
+            roughness = 0.0;
         }
 #endif
         float cosine = clamp(-dot(smooth_normal, ray.direction), 0.0, 1.0);
-        float reflectance = interface_reflectance(cosine, ior, finish.roughness);
+        float reflectance = interface_reflectance(cosine, ior, roughness);
         vec3 share_back = vec3(reflectance);
         vec3 share_on = vec3(1.0 - reflectance);
         vec3 on_way = ray.direction;
         if (kind == KIND_SHEET) {
-            vec3 depth = finish.sheet_depth / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
+            vec3 depth = finish_of(vec4(float(hit.object), 0.0, 0.0, 0.0)).sheet_depth / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
             share_back = slab_reflectance(reflectance, depth);
             share_on = slab_transmittance(reflectance, depth);
         } else {
@@ -268,10 +272,15 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         }
 #endif
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
-        if (finish.transmission < 1.0 && outside) {
-            sum.light += ray.share * share_on * (1.0 - finish.transmission) * paint(finish, point, smooth_normal);
+        if (transmission < 1.0 && outside) {
+            Finish finish = first_finish;
+            if (!first) {
+                finish = finish_of(vec4(float(owner), roughness, transmission, 0.0));
+                finish.color = tint;
+            }
+            sum.light += ray.share * share_on * (1.0 - transmission) * paint(finish, point, smooth_normal);
         }
-        if (kind == KIND_SHEET || owner == after) { share_on *= finish.transmission * finish.color; }
+        if (kind == KIND_SHEET || owner == after) { share_on *= transmission * tint; }
         float ior_inside = max(ior, 1.0 / ior);
         float occlusion = first ? first_finish.unoccluded : 1.0;
         Ray back = Ray(point + SURFACE_OFFSET * surface_reach * face_normal, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,

@@ -30,7 +30,7 @@ REACH = 8
 LEAF_SIZE = 4
 
 #: Cost of testing a box, relative to that of a triangle.
-BOX_COST = 0.7
+BOX_COST = 1.0
 
 #: Share of the clusters of a round that must find a partner; else neighbors pair up whatever their bounds.
 LEAST_MERGED = 0.05

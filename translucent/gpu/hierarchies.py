@@ -34,8 +34,8 @@ STEPS = 65535
 
 _WIDTH = 1 << HIERARCHY_WIDTH_BITS
 
-#: Bits of a leaf's link that hold its first triangle; two others hold how many follow it, the highest tells a leaf.
-_FIRST_BITS = 29
+#: Bits of a leaf's link that hold its first triangle; three others hold how many follow it, the highest tells a leaf.
+_FIRST_BITS = 28
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class SceneHierarchies:
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
         nodes = packed_nodes(tree)[0]
         leaf = nodes[:, 3] >= 1 << 31
-        nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[nodes[leaf, 3] & 0x1FFFFFFF].astype(np.uint32)
+        nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[nodes[leaf, 3] & 0x0FFFFFFF].astype(np.uint32)
         reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
