@@ -14,6 +14,7 @@ uniform sampler2D straight_transmittance;
 #endif
 #if SUM
 uniform sampler2D shaded_radiance;
+uniform sampler2D shaded_transmittance;  // alpha: whether the pixel can be trusted
 #endif
 
 layout(location = 0) out vec4 first;
@@ -25,7 +26,7 @@ void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
 #if SUM
     first = texelFetch(shaded_radiance, here, 0);
-    second = texelFetch(straight_transmittance, here, 0);
+    second = vec4(texelFetch(straight_transmittance, here, 0).rgb, texelFetch(shaded_transmittance, here, 0).a);
 #else
     ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
     vec4 in_front = texelFetch(layers_in_front, texel, 0);

@@ -1,10 +1,5 @@
-// What an opaque object with a surface sends to the eye: a metal, or a coat over paint, or between the two (glTF 2.0,
-// Appendix B), lit by the environment (split sum, Karis 2013) and by lights that nothing shadows. Energy that a rough
-// surface loses between its microfacets is given back by a factor (Turquin 2019). Needs <constants> and <Lights>.
+// The surface of an opaque object at a fragment, with its textures. Needs <constants> and <Lights>.
 
-#include "lib/interface.glsl"
-#include "shade/environment_light.glsl"
-#include "shade/highlight.glsl"
 #include "shade/surface_textures.glsl"
 
 uniform sampler2D reflectance_table;  // scale and bias of the reflectance at normal incidence
@@ -13,17 +8,7 @@ uniform vec4 opaque_passed;           // share of light on the paint that passes
 uniform float opaque_passed_share;    // the same without its color: what paint does not reflect
 uniform vec3 opaque_emissive;
 
-struct OpaqueFinish {
-    vec3 base;          // albedo of paint, and reflectance of metal
-    float metallic;
-    float roughness;
-    vec3 emitted;
-    vec3 normal;        // unit, towards the side that the mesh calls outside
-    float variance;     // of normals within a pixel
-    float opacity;      // of texture and vertices
-    float unoccluded;   // share of the light of the environment that reaches it
-    bool is_hole;
-};
+#include "shade/opaque_light.glsl"
 
 // Of a fragment; takes derivatives. vertex: color and opacity of the mesh there.
 OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 position, vec2 uv, vec4 vertex) {
@@ -31,59 +16,7 @@ OpaqueFinish opaque_finish_at(vec3 base, vec3 normal, vec3 position, vec2 uv, ve
     vec4 rough = texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv));
     vec3 emitted = opaque_emissive * texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb;
     vec3 mapped = mapped_normal(normal, position, uv);
-    return OpaqueFinish(base * painted.rgb, opaque_finish.x * rough.b, clamp(opaque_finish.y * rough.g, 0.0, 1.0), emitted,
+    return OpaqueFinish(base * painted.rgb, opaque_finish.x * rough.b, clamp(opaque_finish.y * rough.g, 0.0, 1.0), opaque_finish.z,
+                        opaque_passed.rgb, opaque_passed_share, emitted,
                         mapped, normal_variance(mapped), painted.a, unoccluded(uv), painted.a < opaque_finish.w);
-}
-
-// What the microfacets of one of the two layers mirror, relative to those without any loss.
-struct Layer {
-    vec3 facing;    // reflectance face-on, and
-    vec3 grazing;   // edge-on (Schlick 1994)
-    vec3 regained;  // what is lost between microfacets, as a factor
-    vec3 mirrored;  // share of uniform light
-};
-
-Layer layer_of(vec3 facing, vec2 table) {
-    // Only what hardly has a step in ior reflects less than 2 % face-on: that fades at grazing angles, too.
-    vec3 grazing = min(50.0 * facing, vec3(1.0));
-    vec3 regained = 1.0 + facing * (1.0 / max(table.x + table.y, 1e-3) - 1.0);
-    return Layer(facing, grazing, regained, (facing * table.x + grazing * table.y) * regained);
-}
-
-vec3 fresnel_of(Layer layer, float away) {
-    return (layer.facing + (layer.grazing - layer.facing) * away) * layer.regained;
-}
-
-// ray: unit, from the eye; normal: to the eye's side; position: from the eye.
-vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 position) {
-    float ior = opaque_finish.z;
-    float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
-    vec2 table = textureLod(reflectance_table, reflectance_coordinate(cos_view, finish.roughness), 0.0).rg;
-    Layer coat = layer_of(vec3((ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0))), table);
-    Layer metal = layer_of(finish.base, table);
-    float painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored.r);
-    vec3 paint = finish.base * (1.0 - opaque_passed_share);
-
-    vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)
-            * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + painted * (paint * environment_irradiance(normal) + opaque_passed.rgb * environment_irradiance(-normal)) / PI);
-    float alpha = highlight_alpha(finish.roughness, finish.variance);
-    for (int light = 0; light < light_count; ++light) {
-        vec4 at = light_position[light];
-        vec3 way = at.xyz - at.w * position;
-        float distance_m = max(length(way), 1e-18);
-        vec3 towards = way / distance_m;
-        vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;
-        float cos_light = dot(normal, towards);
-        if (cos_light <= 0.0) {
-            sum -= painted * opaque_passed.rgb / PI * cos_light * irradiance;
-            continue;
-        }
-        vec3 half_way = normalize(towards - ray);
-        float away = pow(1.0 - clamp(dot(half_way, towards), 0.0, 1.0), 5.0);
-        vec3 glint = mix(fresnel_of(coat, away), fresnel_of(metal, away), finish.metallic)
-            * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
-        sum += (glint + painted * paint / PI) * cos_light * irradiance;
-    }
-    return sum + finish.emitted;
 }

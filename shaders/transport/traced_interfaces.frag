@@ -17,6 +17,7 @@
 #include "shade/environment_light.glsl"
 #include "shade/environment_beyond.glsl"
 #include "shade/interface_light.glsl"
+#include "shade/opaque_light.glsl"
 #include "transport/hierarchy.glsl"
 #include "transport/record.glsl"
 
@@ -38,6 +39,7 @@ layout(location = 1) out vec4 out_transmittance;
 const int KIND_SOLID = 0;
 const int KIND_SHEET = 1;
 const int KIND_OPAQUE = 2;
+const int KIND_UNSEEN = 3;  // drawn over the picture, or from its back
 const float EDGE_ON = 1e-3;
 const float FAINTEST = 1.0 / 1024.0;
 const int MOST_STEPS = 512;
@@ -123,7 +125,13 @@ struct Sum {
     bool sound;
 };
 
-#include "transport/opaque_light.glsl"
+// Radiance of an opaque object along a ray, lit as where it is seen directly, but in the mean color of its textures.
+vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
+    if (body.plain == 1.0) { return body.color * irradiance_on(point, normal, 1.0) / PI; }
+    OpaqueFinish finish = OpaqueFinish(body.color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
+        body.emissive, normal, 0.0, 1.0, 1.0, false);
+    return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
+}
 
 // The record beyond a surface of a solid. sound: not yet unbalanced, nor beyond what a record holds.
 uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
@@ -191,6 +199,10 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         if (first && hit.object == first_object && abs(hit.path - first_path) < 1e-3 * surface_reach) { smooth_normal = first_normal; }
         float facing = dot(smooth_normal, ray.direction);
         if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
+        if (kind == KIND_UNSEEN || (kind == KIND_OPAQUE && !outside && body.one_sided == 1.0)) {
+            ray.origin = point - SURFACE_OFFSET * surface_reach * face_normal;
+            continue;
+        }
         if (kind == KIND_OPAQUE) {
             sum.light += ray.share * opaque_light(body, smooth_normal, ray.direction, point);
             ends = true;

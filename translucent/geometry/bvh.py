@@ -89,7 +89,9 @@ def _curve_order(centers: Floats) -> Integers:
     start = centers.min(axis=0)
     extent = np.maximum(centers.max(axis=0) - start, np.finfo(np.float32).tiny)
     cells = ((centers - start) / extent * np.float32((1 << _CURVE_BITS) - 1)).astype(np.uint64)
-    return np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2]) << np.uint64(2))
+    return np.argsort(
+        _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2]) << np.uint64(2)
+    )
 
 
 def _spread(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:

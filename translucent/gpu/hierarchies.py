@@ -163,22 +163,21 @@ class SceneHierarchies:
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
         self.object_nodes = len(nodes)
-        ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1]
+        ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1] + 1.0
         media = _media_numbers(scene)
-        rows = [
-            self._row(scene, i, center) | {"rank": ranks[i] + 1.0 if _decides(scene, body) else 0.0, "slot": media[i]}
-            for i, body in enumerate(scene.objects)
-        ]
+        rows = []
+        for i, body in enumerate(scene.objects):
+            own = {"rank": ranks[i] if _decides(scene, body) else 0.0, "slot": media[i]}
+            rows.append({**self._row(scene, body, center), **own})
         return TRACED_BODY.pack(rows), (*middle, scale)
 
-    def _row(self, scene: Scene, number: int, center: Array) -> Mapping[str, npt.ArrayLike]:
-        body = scene.objects[number]
+    def _row(self, scene: Scene, body: Object, center: Array) -> Mapping[str, npt.ArrayLike]:
         packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
         local = packed.scale * np.linalg.inv(body.matrix[:3, :3])
         offset = local @ (center - body.matrix[:3, 3]) - packed.scale * packed.center
         rows = np.column_stack([local, offset])
         medium, surface = body.medium or Medium(), body.surface or Surface()
-        kind = 2.0 if body.medium is None else 0.0 if body.sheet_thickness is None else 1.0
+        opaque = body.medium is None
         return {
             "local_x": rows[0],
             "local_y": rows[1],
@@ -188,13 +187,18 @@ class SceneHierarchies:
             "extinction": bounded_extinction(medium, scene.diagonal),
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
             "emission": np.asarray(medium.emission),
-            "kind": kind,
-            "color": np.asarray(surface.color) if body.medium is not None else body.base_color,
+            "kind": _kind(body),
+            "color": body.base_color if opaque else np.asarray(surface.color),
             "transmission": surface.transmission,
-            "ior": medium.ior,
+            "ior": surface.ior if opaque else medium.ior,
             "dispersion": surface.dispersion,
             "roughness": surface.roughness,
-            "plain": float(surface.plain),
+            "plain": float(body.surface is None if opaque else surface.plain),
+            "passed": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
+            "passed_share": surface.diffuse_transmission,
+            "emissive": np.asarray(surface.emissive),
+            "metallic": surface.metallic,
+            "one_sided": float(not surface.double_sided),
         }
 
     def release(self) -> None:
@@ -208,9 +212,9 @@ class HierarchyCache:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._key: tuple[int, ...] = ()
         self._held: SceneHierarchies | None = None
         self._meshes: tuple[Mesh, ...] = ()
+        self._objects = 0
 
     def of(self, scene: Scene) -> SceneHierarchies:
         """The hierarchies of a scene."""
@@ -226,6 +230,13 @@ class HierarchyCache:
         if self._held is not None:
             self._held.release()
             self._held = None
+
+
+def _kind(body: Object) -> float:
+    """Kind of an object, as ``shaders/transport/traced_interfaces.frag`` numbers them."""
+    if body.medium is None:
+        return 2.0
+    return 3.0 if body.covers else 0.0 if body.sheet_thickness is None else 1.0
 
 
 def _decides(scene: Scene, body: Object) -> bool:

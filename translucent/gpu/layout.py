@@ -346,7 +346,12 @@ TRACED_BODY = PackedTable(
         ("ior", "f4", ()),
         ("dispersion", "f4", ()),
         ("roughness", "f4", ()),
-        ("plain", "f4", ()),  # 1 where its surface only bends and mirrors light
+        ("plain", "f4", ()),  # 1 where its surface only bends and mirrors light; of what is opaque: has none
+        ("passed", "f4", (3,)),  # of what is opaque: share of light on the paint that passes, with its color,
+        ("passed_share", "f4", ()),  # and without
+        ("emissive", "f4", (3,)),
+        ("metallic", "f4", ()),
+        ("one_sided", "f4", ()),
         ("rank", "f4", ()),  # the higher, the more it decides on the medium of a ray; 0: not at all
         ("slot", "f4", ()),  # the same for objects of one medium
     ),

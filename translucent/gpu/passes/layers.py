@@ -15,7 +15,7 @@ from translucent.scene.scene import Object
 from translucent.scene.surface import LEAST_COVER
 
 _OWN = ("opaque_axial_depth", "entered", "fronts")
-_SAMPLERS = ("layers_in_front", "layers_behind", "straight_transmittance", "shaded_radiance")
+_SAMPLERS = ("layers_in_front", "layers_behind", "straight_transmittance", "shaded_radiance", "shaded_transmittance")
 
 
 class LayersPass:
@@ -88,7 +88,7 @@ class LayersPass:
         gl.enable_only(moderngl.BLEND)
         in_front, behind = targets.layers().color_attachments
         transmittance = targets.result().color_attachments[1]
-        for unit, texture in enumerate((in_front, behind, transmittance, job.picture.color_attachments[0])):
+        for unit, texture in enumerate((in_front, behind, transmittance, *job.picture.color_attachments[:2])):
             texture.use(unit)
         shown = "surfaced" if job.features.has_surfaces else "result"
         steps = (

@@ -33,6 +33,7 @@ _SAMPLERS = (
     "light_irradiance",
     "seen_map",
 )
+_ENTERED = ("entered", "surface_finish", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
 
 
@@ -58,11 +59,13 @@ class TracedInterfacesPass:
         maps = job.resources.environments.light(environment)
         hierarchies = job.resources.hierarchies.of(scene)
         rows, frame = hierarchies.place(scene, media_center(scene))
-        tables = [gl.texture(t.shape[1::-1], 4, t, dtype="f4") for t in (surface_table(scene, job.features.sheets), rows)]
+        contents = surface_table(scene, job.features.sheets), rows
+        tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
+        depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         textures = {
             "emitted_radiance_sum": emitted,
             "straight_transmittance": through,
-            **dict(zip(("entered", "surface_finish", "surface_color"), job.targets.entered().color_attachments, strict=True)),
+            **dict(zip(_ENTERED, job.targets.entered().color_attachments, strict=True)),
             "surface_table": tables[0],
             "traced_bodies": tables[1],
             "hierarchy_nodes": hierarchies.nodes,
@@ -80,7 +83,7 @@ class TracedInterfacesPass:
             texture.use(_UNITS[name])
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._variants.program(
-            FORKS=job.plan.interfaces.forks,
+            FORKS=forks,
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
@@ -92,7 +95,7 @@ class TracedInterfacesPass:
             SEEN_LIGHTS=seen_lights,
             SINGLE_SCATTERING=job.features.scatters,
         )
-        set_uniform(program, "most_interfaces", job.plan.interfaces.depth)
+        set_uniform(program, "most_interfaces", depth)
         if "sample_number" in program:
             set_uniform(program, "sample_number", job.sample)
             set_uniform(program, "blurred_share", blurred_share(job.samples))
@@ -110,7 +113,7 @@ def blurred_share(samples: int) -> float:
 
     The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
     """
-    return float(samples) ** -0.2
+    return float(samples**-0.2)
 
 
 def media_center(scene: Scene) -> Array:

@@ -51,6 +51,11 @@ class Interfaces:
     one_interface: ClassVar[bool] = False
     finds_exits: ClassVar[bool] = False
 
+    @property
+    def tree(self) -> tuple[int, int]:
+        """Number of interfaces that a traced ray may meet, and of forks."""
+        return 0, 0
+
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
         """Reason why rays cannot bend so in a scene, and what to do; None if they can."""
         return None

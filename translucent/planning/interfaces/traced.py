@@ -49,6 +49,11 @@ class TracedInterfaces(Interfaces):
         check_count("TracedInterfaces depth", self.depth, MAX_DEPTH)
         check_count("TracedInterfaces forks", self.forks, MAX_FORKS, least=0, example=2)
 
+    @property
+    def tree(self) -> tuple[int, int]:
+        """`depth` and `forks`."""
+        return self.depth, self.forks
+
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
         """Reason: rays of one picture start in different media, or media vary along a ray."""
         solids = [body for body in scene.bodies if body.sheet_thickness is None]
