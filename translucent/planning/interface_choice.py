@@ -15,10 +15,14 @@ from translucent.scene.scene import Scene
 _OLD_NAMES = {"both": ScreenInterfaces(), "front": FrontInterface()}
 
 
+#: Interfaces that rays may meet if nobody asks for a number: wine in a glass needs them, and few rays go as far.
+USUAL_DEPTH = 12
+
+
 def default_interfaces(scene: Scene, capabilities: Capabilities) -> Interfaces:
     """The way that the planner takes, if nobody asks for one, in a scene with interfaces."""
     solid = any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
-    return TracedInterfaces() if solid else ScreenInterfaces()
+    return TracedInterfaces(depth=USUAL_DEPTH) if solid else ScreenInterfaces()
 
 
 def check_interfaces(interfaces: object) -> None:

@@ -16,7 +16,7 @@ from translucent.scene.scene import Scene, object_names
 #: Largest number of interfaces that a ray may meet: each takes a walk through the meshes.
 MAX_DEPTH = 64
 
-#: Largest number of forks: each doubles the rays.
+#: Largest number of forks: rays multiply with each.
 MAX_FORKS = 4
 
 #: Time of tracing, in depth-only draws of the same geometry; a guess, not measured.
@@ -35,8 +35,8 @@ class TracedInterfaces(Interfaces):
     depth : int
         Interfaces that a ray may meet, from 1; behind the last one it sees the environment, as if nothing was ahead.
     forks : int
-        Interfaces on a ray at which both the reflected and the refracted ray are followed, from 0. At all others the
-        stronger one is, and the weaker one sees the environment.
+        How often a ray may go on as the weaker of the two, reflected or refracted, from 0; the mirror image at the first
+        interface is free. The stronger one is always followed; a weaker one beyond that sees the environment.
     """
 
     name: ClassVar[str] = "traced"
@@ -75,8 +75,7 @@ class TracedInterfaces(Interfaces):
         effects = effects_of(scene, bends=not straight, mirrored="what is around them")
         traced = f"{effects}; rays are traced from there on, through at most {self._count}"
         if self.forks:
-            forks = "the first" if self.forks == 1 else f"the first {self.forks}"
-            traced += f", and both ways at {forks}"
+            traced += f", {self._times} as the weaker of reflected and refracted light"
         return (
             PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
             PassSpec(PassName.TRACED, traced, cost=TRACE_COST),
@@ -84,12 +83,16 @@ class TracedInterfaces(Interfaces):
 
     def unmodelled(self) -> list[Note]:
         """Notes: what the tree leaves out."""
-        after = {0: "", 1: " after 1 fork"}.get(self.forks, f" after {self.forks} forks")
+        often = f" more often than {self._times}" if self.forks else ""
         text = (
-            f"light that meets more than {self._count}, and the weaker of reflected and refracted light{after}: looked "
+            f"light that meets more than {self._count}, or is the weaker of reflected and refracted light{often}: looked "
             "up in the environment, as if nothing was ahead"
         )
         return [Note(NoteKind.CUT_OFF_PATHS, text)]
+
+    @property
+    def _times(self) -> str:
+        return {1: "once", 2: "twice"}.get(self.forks, f"{self.forks} times")
 
     @property
     def _count(self) -> str:
