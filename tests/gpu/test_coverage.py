@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 import trimesh
@@ -71,7 +73,7 @@ def require_equal(renderer: tl.Renderer, scene: tl.Scene, method: tl.Method | No
         shade_everything(patch)
         expected = renderer.render(scene, SIZE, method, samples=samples)
     # What the frame before has left behind must not show.
-    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE), SIZE)
+    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE), SIZE, method)
     found = renderer.render(scene, SIZE, method, samples=samples)
     for name in ARRAYS:
         assert np.array_equal(getattr(found, name), getattr(expected, name), equal_nan=True), name
@@ -104,7 +106,7 @@ def test_with_nothing_in_view_the_environment_is_all(
 ) -> None:
     camera = tl.Camera.look_at((0, 0, 5), (0, 0, 10))
     scene = tl.Scene([tl.Object(MESHES[0], medium)], camera, environment=tl.Environment.constant((0.25, 0.5, 0.75)))
-    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE), SIZE)
+    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE), SIZE, method)
     frame = renderer.render(scene, SIZE, method)
     assert (frame.radiance == (0.25, 0.5, 0.75)).all()
     assert (frame.transmittance == 1.0).all()
@@ -112,6 +114,7 @@ def test_with_nothing_in_view_the_environment_is_all(
     assert not frame.optical_depth.any()
     assert frame.valid.all()
     assert not frame.coverage.any()
+    assert frame.layers is None or not frame.layers.any()
 
 
 @pytest.mark.parametrize("kind", ["far", "near", "flat"])
@@ -161,3 +164,25 @@ def test_a_part_and_its_rest_are_each_pixel_once(part: Part) -> None:
     for each in (part, *part.rest(SIZE)):
         count[each.bottom : each.top, each.left : each.right] += 1
     assert (count == 1).all()
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+@pytest.mark.parametrize("interfaces", ["both", "front"])
+def test_glass_changes_what_it_covers_and_nothing_else(
+    interfaces: Literal["both", "front"], samples: int, renderer: tl.Renderer
+) -> None:
+    camera = tl.Camera.look_at((0, 0, 4), (0, 0, 0), fov_y=45.0)
+    checks = tl.Environment.checkerboard((0.1, 0.2, 0.3), (0.9, 0.8, 0.7), 7)
+
+    def drawn(medium: tl.Medium) -> tl.Frame:
+        scene = tl.Scene([tl.Object(MESHES[1], medium)], camera, environment=checks)
+        return renderer.render(scene, SIZE, samples=samples, interfaces=interfaces)
+
+    glass, matched = drawn(tl.Medium(absorption=0.1, ior=1.5)), drawn(tl.Medium(absorption=0.1))
+    # The hole of the ring is not covered either, and averaged edges are.
+    away = (glass.transmittance == 1.0).all(axis=2)
+    changed = (glass.radiance != matched.radiance).any(axis=2)
+    assert 0.5 < away.mean() < 0.8
+    assert not changed[away].any()
+    assert changed[~away].mean() > 0.99
+    assert (glass.radiance > 0.02).all()  # the darkest square is 0.1
