@@ -1,6 +1,7 @@
 // Light at the interfaces of bodies: what they reflect, what enters and bends, and what paint and many scattering events
 // give back. What the media absorb and emit on straight rays has been found; the first interval of a refracted ray is as long
 // as it is bent. Row 0 of the output is the top row. ONE_INTERFACE: rays bend where they enter, and leave without bending.
+// Drawn where there is an interface: shade/no_interface.frag shades the rest, and leaves the depth that tells the two apart.
 
 #include <constants>
 #include <View>
@@ -114,10 +115,6 @@ void main() {
     vec4 back = texelFetch(left, texel, 0);
     bool starts_inside = back.w < front.w;
 #endif
-    if (front.w >= NOTHING && !starts_inside) {
-        out_radiance = vec4(background(pixel, ray, texel) * through + emitted, 1.0);
-        return;
-    }
 #if ONE_INTERFACE
     vec4 surface = texelFetch(surface_finish, texel, 0);
 #else

@@ -10,6 +10,7 @@ import numpy as np
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.balance import Balance, face_counts
 from translucent.gpu.body_uniforms import body_roles
+from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.densities import density_uniforms, scene_grids
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, UniformBlock
@@ -48,6 +49,9 @@ class FrameJob(SceneView):
         The samples of the frame are being summed up.
     sample, samples : int
         Number of the sample that is drawn, from 0, and how many are summed up; 0 of 1 at the pixel centers.
+    covered : Part
+        Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
+        the bottom, as geometry is drawn.
     """
 
     def __init__(
@@ -71,6 +75,9 @@ class FrameJob(SceneView):
         super().__init__(gl, placed, body_roles(self.features, counts), contents, targets, resources)
         self._cleared: set[str] = set()
         self._lit = False
+        self._extents = extents(scene.objects, scene.camera, targets.size)
+        self._in_view = frozenset(np.flatnonzero(self._extents[:, 2] > self._extents[:, 0]).tolist())
+        self._media = np.array([body.medium is not None for body in scene.objects])
         if self.features.marches and not self.features.scatters:
             self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))
         self.place((0.0, 0.0))
@@ -80,7 +87,12 @@ class FrameJob(SceneView):
         scene = self.scene
         depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
         self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths))
+        self.covered = part_of(self._extents[self._media], shift, self.targets.size)
         self._cleared.clear()
+
+    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+        """Draw those of the objects that are in view with the current state."""
+        super().draw(program, tuple(i for i in objects if i in self._in_view))
 
     def light(self, lights: LightLookup) -> None:
         """Write the uniforms of the lights that media scatter; they are the same for all samples."""
@@ -119,6 +131,11 @@ class FrameJob(SceneView):
         self.gl.enable_only(moderngl.BLEND)
         self.gl.blend_equation = moderngl.FUNC_ADD
         self.gl.blend_func = moderngl.ONE, moderngl.ONE
+
+    def clear_layers(self) -> None:
+        """Set the counts of layers to 0, as they stay beyond `covered`, where nothing else of `ordered` is read."""
+        self.targets.ordered()
+        self.targets.view("ordered", 2).clear()
 
     def bind_opaque(self, unit: int) -> None:
         """Bind the axial depths where rays end for the shader that reads texture `unit`, if there are any."""

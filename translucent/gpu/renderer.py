@@ -194,7 +194,7 @@ class GpuRenderer:
             provenance=dict(self.provenance),
             layers=layers,
             truncated=truncated,
-            normals=_read_normals(job.targets.entered()) if job.features.has_surfaces else None,
+            normals=_read_normals(job) if job.features.has_surfaces else None,
         )
 
     def close(self) -> None:
@@ -274,8 +274,11 @@ def _read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components:
     return array
 
 
-def _read_normals(interfaces: moderngl.Framebuffer) -> npt.NDArray[np.float32]:
+def _read_normals(job: FrameJob) -> npt.NDArray[np.float32]:
     """(h, w, 3): normals of the interfaces that the interfaces pass has found, 0 where there is none."""
-    found = _read_floats(interfaces, 0, 4)[::-1]
-    there = found[..., 3:] < float(CONSTANTS["NOTHING"])
-    return np.ascontiguousarray(np.where(there, found[..., :3], np.float32(0.0)))
+    width, height = job.targets.size
+    normals = np.zeros((height, width, 3), dtype=np.float32)
+    if job.covered:
+        found = _read_floats(job.targets.entered(), 0, 4)[::-1]
+        np.copyto(normals, found[..., :3], where=found[..., 3:] < float(CONSTANTS["NOTHING"]))
+    return normals

@@ -46,8 +46,8 @@ class Targets:
         return self._get("left", (4, 4), with_depth=True)
 
     def surfaced(self) -> moderngl.Framebuffer:
-        """RGBA32F radiance with what interfaces do to it, and transmittance."""
-        return self._get("surfaced", (4, 4))
+        """RGBA32F radiance with what interfaces do to it, and transmittance, with a depth buffer."""
+        return self._get("surfaced", (4, 4), with_depth=True)
 
     def ordered(self) -> moderngl.Framebuffer:
         """RGBA32F optical depth and soundness, emitted radiance and thickness, and counts of layers."""
@@ -80,8 +80,8 @@ class Targets:
         return self._get("result", (4, 4, 4, 1, -1))
 
     def average(self) -> moderngl.Framebuffer:
-        """RGBA32F radiance and transmittance, summed over the samples of a pixel."""
-        return self._get("average", (4, 4))
+        """RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer."""
+        return self._get("average", (4, 4), with_depth=True)
 
     def layers(self) -> moderngl.Framebuffer:
         """RGBA32F layers in front of all bodies, and those behind the first one on a ray."""

@@ -41,6 +41,9 @@ class DepthPeelingPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Peel until a pass finds nothing more, or the layers of the method are used up."""
+        job.clear_layers()
+        if not job.covered:
+            return
         method = cast(DepthPeeling, job.plan.method)
         both = method.order == "both-ends"
         ends = {"NEAR": method.order != "back-to-front", "FAR": method.order != "front-to-back"}
@@ -129,7 +132,7 @@ class DepthPeelingPass:
         last: bool,
     ) -> None:
         """Walk along the crossings of the first `walked` passes of a batch."""
-        (job.targets.ordered() if last else job.targets.peel_state(folds % 2)).use()
+        framebuffer = job.targets.ordered() if last else job.targets.peel_state(folds % 2)
         # Samplers of passes that this batch is short of must not stay with what is drawn into.
         for unit in range(PEEL_BATCH):
             batch[min(unit, len(batch) - 1)].color_attachments[0].use(unit)
@@ -150,4 +153,4 @@ class DepthPeelingPass:
         program = self._fold.program(**switches)
         set_uniform(program, "passes", len(batch))
         set_uniform(program, "walked", walked)
-        self._fold.draw_fullscreen(program)
+        self._fold.draw_covered(job, program, framebuffer)

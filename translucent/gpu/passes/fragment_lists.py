@@ -42,11 +42,13 @@ class FragmentListsPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw and resolve the frame, in bands of rows where one buffer cannot hold it all."""
+        job.clear_layers()
+        if not job.covered:
+            return
         try:
             self._run_bands(job, spec)
         finally:
-            for framebuffer in (job.targets.steepest(), job.targets.ordered()):
-                framebuffer.scissor = None
+            job.targets.steepest().scissor = None
 
     def _run_bands(self, job: FrameJob, spec: PassSpec) -> None:
         width, height = job.targets.size
@@ -100,7 +102,6 @@ class FragmentListsPass:
         return int(np.frombuffer(count.read(), np.uint32)[0])
 
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
-        _use_rows(job.targets.ordered(), first, last)
         job.bind_opaque(0)
         job.bind_grids(1)
         job.targets.steepest().color_attachments[0].use(2)
@@ -112,7 +113,7 @@ class FragmentListsPass:
             set_uniform(program, "march_rule", int(CONSTANTS[f"MARCH_{method.quadrature.upper()}"]))
             set_uniform(program, "march_seed", method.seed - (1 << 32 if method.seed >= 1 << 31 else 0))
             set_uniform(program, "march_jitter", int(method.jitter))
-        self._resolve.draw_fullscreen(program)
+        self._resolve.draw_covered(job, program, job.targets.ordered(), rows=(first, last))
         # The next lists must not begin before these have been walked along.
         job.gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)
 

@@ -27,6 +27,8 @@ class InterfacesPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies for each interface, with the depth test on; sheets have one, seen from either side."""
+        if not job.covered:
+            return
         nothing = float(CONSTANTS["NOTHING"])
         thin = job.features.sheets
         sheets = tuple(i for i in spec.objects if i in thin)

@@ -26,6 +26,9 @@ class KBufferPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies, then walk along the crossings that were kept."""
+        job.clear_layers()
+        if not job.covered:
+            return
         gl, k = job.gl, cast(KBuffer, job.plan.method).k
         width, height = job.targets.size
         words = job.targets.buffers.get("words", 4 * (k + 1) * width * height)
@@ -45,12 +48,11 @@ class KBufferPass:
         gl.blend_equation = moderngl.FUNC_ADD
         gl.enable_only(moderngl.NOTHING)
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT)
-        job.targets.ordered().use()
         steepest.color_attachments[0].use(1)
         program = self._resolve.program(
             **walk_switches(job.features), OPAQUE=job.features.has_opaque, INTERFACES=job.features.finds_exits
         )
         set_uniform(program, "k", k)
-        self._resolve.draw_fullscreen(program)
+        self._resolve.draw_covered(job, program, job.targets.ordered())
         # The next frame must not clear the words before these have been walked along.
         gl.memory_barrier(moderngl.SHADER_STORAGE_BARRIER_BIT | moderngl.BUFFER_UPDATE_BARRIER_BIT)

@@ -31,6 +31,17 @@ _SAMPLERS = (
     "seen_map",
 )
 
+#: Of these, what is read where there is no interface.
+_PLAIN_SAMPLERS = (
+    "emitted_radiance_sum",
+    "straight_transmittance",
+    "entered",
+    "left",
+    "opaque_place",
+    "opaque_radiance",
+    "seen_map",
+)
+
 
 class SurfacesPass:
     """Reflection, refraction, paint and diffuse light; see ``shaders/shade/surfaces.frag``."""
@@ -38,20 +49,51 @@ class SurfacesPass:
     def __init__(self, gl: moderngl.Context) -> None:
         units = {name: unit for unit, name in enumerate(_SAMPLERS)}
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/surfaces.frag", **units)
+        plain = {name: units[name] for name in _PLAIN_SAMPLERS}
+        self._plain = Variants(gl, "geometry/fullscreen.vert", "shade/no_interface.frag", **plain)
         self._reflectance = reflectance_table(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
-        gl, environment = job.gl, job.scene.environment
+        gl = job.gl
         require_interfaces(gl.info)
         sums = job.sums_after(spec.name)
-        (job.targets.average() if sums else job.targets.surfaced()).use()
-        gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
+        framebuffer = job.targets.average() if sums else job.targets.surfaced()
+        blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        seen_map = environment.seen.kind == "image"
-        seen_lights = seen_map and environment.seen is environment
-        textures = [*job.targets.result().color_attachments[:4], *job.targets.entered().color_attachments]
+        seen = job.scene.environment.seen
+        if seen.kind == "image":
+            job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
+        self._bind_paths(job)
+        background = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": seen.kind == "image"}
+        one_interface = job.features.one_interface
+        gl.enable_only(blending)
+        rest = self._plain.program(REST=True, ONE_INTERFACE=False, **background)
+        self._plain.draw_rest(job, rest, framebuffer, top_first=True)
+        if not job.covered:
+            return
+        # The depth test keeps the costly program from pixels without an interface before it runs: where it returned at
+        # once, a software rasterizer would go through all of it nevertheless.
+        gl.enable_only(blending | moderngl.DEPTH_TEST)
+        gl.depth_func = "1"
+        plain = self._plain.program(REST=False, ONE_INTERFACE=one_interface, **background)
+        self._plain.draw_covered(job, plain, framebuffer, top_first=True)
+        gl.depth_func = "<"
+        program = self._variants.program(
+            ONE_INTERFACE=one_interface,
+            SEEN_LIGHTS=background["SEEN_MAP"] and seen is job.scene.environment,
+            SINGLE_SCATTERING=job.features.scatters,
+            **background,
+        )
+        finishes = self._bind_finishes(job)
+        self._variants.draw_covered(job, program, framebuffer, top_first=True)
+        gl.enable_only(blending)
+        finishes.release()
+
+    def _bind_paths(self, job: FrameJob) -> None:
+        """Bind what passes before have found: paths, interfaces and opaque surfaces."""
+        textures = job.targets.result().color_attachments[:4] + job.targets.entered().color_attachments
         if not job.features.one_interface:
             textures += job.targets.left().color_attachments
         for unit, texture in enumerate(textures):
@@ -64,9 +106,13 @@ class SurfacesPass:
                 radiance.repeat_x = radiance.repeat_y = False
             axial_depth.use(_SAMPLERS.index("opaque_axial_depth"))
             radiance.use(_SAMPLERS.index("opaque_radiance"))
+
+    def _bind_finishes(self, job: FrameJob) -> moderngl.Texture:
+        """Bind surfaces and lights; returns the texture of surfaces, which the caller releases."""
+        environment = job.scene.environment
         maps = job.resources.environments.light(environment)
         table = surface_table(job.scene, job.features.sheets)
-        finishes = gl.texture(table.shape[1::-1], 4, table, dtype="f4")
+        finishes = job.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
         rest = (
             finishes,
             self._reflectance,
@@ -76,14 +122,4 @@ class SurfacesPass:
         )
         for unit, item in enumerate(rest, _SAMPLERS.index("surface_table")):
             item.use(unit)
-        if seen_map:
-            job.resources.environments.sharp(environment.seen).use(_SAMPLERS.index("seen_map"))
-        program = self._variants.program(
-            ONE_INTERFACE=job.features.one_interface,
-            OPAQUE=job.features.has_opaque,
-            SEEN_MAP=seen_map,
-            SEEN_LIGHTS=seen_lights,
-            SINGLE_SCATTERING=job.features.scatters,
-        )
-        self._variants.draw_fullscreen(program)
-        finishes.release()
+        return finishes

@@ -48,28 +48,34 @@ class TransmittancePass:
         if seen_map:
             job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
         sums = job.sums_after(spec.name)
+        into = job.targets.average() if sums else job.targets.result()
+        into.use()
         if sums:
-            job.targets.average().use()
             gl.enable_only(moderngl.BLEND)
             gl.blend_equation = moderngl.FUNC_ADD
             gl.blend_func = moderngl.ONE, moderngl.ONE
         else:
-            job.targets.result().use()
             gl.enable_only(moderngl.NOTHING)
         for first, framebuffer in inputs.items():
             if framebuffer is not None:
                 for unit, texture in enumerate(framebuffer.color_attachments, _SAMPLERS.index(first)):
                     texture.use(unit)
-        program = self._variants.program(
-            SPECTRAL=plan.spectral,
-            FALLBACK=features.has_fallback,
-            UNLIT=features.has_unlit,
-            AVERAGE=sums,
-            SURFACES=features.has_surfaces,
-            SEEN_MAP=seen_map,
-            EMISSION=features.emits and not plan.ordered,
-            ORDERED=plan.ordered,
-            ACCUMULATED=features.accumulates,
-            OPAQUE=features.has_opaque,
-        )
-        self._variants.draw_fullscreen(program)
+        paths = {
+            "SPECTRAL": plan.spectral,
+            "FALLBACK": features.has_fallback,
+            "UNLIT": features.has_unlit,
+            "EMISSION": features.emits and not plan.ordered,
+            "ORDERED": plan.ordered,
+            "ACCUMULATED": features.accumulates,
+        }
+        switches = {
+            "AVERAGE": sums,
+            "SURFACES": features.has_surfaces,
+            "SEEN_MAP": seen_map,
+            "OPAQUE": features.has_opaque,
+        }
+        program = self._variants.program(**switches, **paths)
+        # Where there is no medium no path is read, and all of it is 0.
+        empty = self._variants.program(**switches, **dict.fromkeys(paths, False))
+        self._variants.draw_covered(job, program, into, top_first=True)
+        self._variants.draw_rest(job, empty, into, top_first=True)

@@ -6,7 +6,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.gpu.coverage import Part
 from translucent.gpu.features import FrameFeatures
+from translucent.gpu.job import FrameJob
 from translucent.gpu.ledger import before_making
 from translucent.gpu.shaders import build_program
 from translucent.scene.scene import Object
@@ -47,6 +49,55 @@ class Variants:
         if program.glo not in self._fullscreen:
             self._fullscreen[program.glo] = self._gl.vertex_array(program, [])
         self._fullscreen[program.glo].render(moderngl.TRIANGLES, vertices=3)
+
+    def draw_covered(
+        self,
+        job: FrameJob,
+        program: moderngl.Program,
+        framebuffer: moderngl.Framebuffer,
+        *,
+        top_first: bool = False,
+        rows: tuple[int, int] | None = None,
+    ) -> None:
+        """Run one of the programs for the pixels of `job.covered` alone: those where a ray may meet a medium.
+
+        The contract of a pass over pixels: it runs its program here, and gives the other pixels by `draw_rest`, or by
+        clearing them, what that program would have written without a medium. What is read beyond `job.covered` was
+        never written by `draw_covered`. Both use the framebuffer and leave it without a scissor; they change no other
+        state, so that blending and the depth test are the caller's.
+
+        Parameters
+        ----------
+        job : FrameJob
+        program : moderngl.Program
+            Of ``geometry/fullscreen.vert``.
+        framebuffer : moderngl.Framebuffer
+            Of the size of the frame.
+        top_first : bool
+            Row 0 of what is written is the top one, as in `Targets.result`; else the bottom one.
+        rows : (int, int), optional
+            Only rows from the first to before the second, counted as they are written.
+        """
+        part = job.covered.flipped(job.targets.size[1]) if top_first else job.covered
+        self._draw_parts(program, framebuffer, (part if rows is None else part.rows(*rows),))
+
+    def draw_rest(
+        self, job: FrameJob, program: moderngl.Program, framebuffer: moderngl.Framebuffer, *, top_first: bool = False
+    ) -> None:
+        """Run one of the programs for the pixels that `draw_covered` leaves out, each once."""
+        part = job.covered.flipped(job.targets.size[1]) if top_first else job.covered
+        self._draw_parts(program, framebuffer, part.rest(job.targets.size))
+
+    def _draw_parts(
+        self, program: moderngl.Program, framebuffer: moderngl.Framebuffer, parts: tuple[Part, ...]
+    ) -> None:
+        for part in parts:
+            if part:
+                framebuffer.scissor = part.scissor
+                framebuffer.use()
+                self.draw_fullscreen(program)
+        framebuffer.scissor = None
+        framebuffer.use()
 
 
 def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:

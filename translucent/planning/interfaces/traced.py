@@ -35,8 +35,8 @@ class TracedInterfaces(Interfaces):
     depth : int
         Interfaces that a ray may meet, from 1; behind the last one it sees the environment, as if nothing was ahead.
     forks : int
-        How often a ray may go on as the weaker of the two, reflected or refracted, from 0; the mirror image at the first
-        interface is free. The stronger one is always followed; a weaker one beyond that sees the environment.
+        How often a ray may go on as the weaker of the two, reflected or refracted, from 0; the mirror image at the
+        first interface is free. The stronger one is always followed; a weaker one beyond that sees the environment.
     """
 
     name: ClassVar[str] = "traced"
@@ -85,8 +85,8 @@ class TracedInterfaces(Interfaces):
         """Notes: what the tree leaves out."""
         often = f" more often than {self._times}" if self.forks else ""
         text = (
-            f"light that meets more than {self._count}, or is the weaker of reflected and refracted light{often}: looked "
-            "up in the environment, as if nothing was ahead"
+            f"light that meets more than {self._count}, or is the weaker of reflected and refracted light{often}: "
+            "looked up in the environment, as if nothing was ahead"
         )
         return [Note(NoteKind.CUT_OFF_PATHS, text)]
 

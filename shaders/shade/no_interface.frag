@@ -1,0 +1,47 @@
+// Where a ray meets no interface: what is behind, through the media there. Row 0 of the output is the top row.
+// REST: beyond the part of the picture that media may cover. In that part, depth lets shade/surfaces.frag pass where there
+// is an interface, and nothing is added to a sum there.
+
+#include <constants>
+#include <View>
+#include <Environment>
+#include "lib/optics.glsl"
+#include "lib/ray.glsl"
+#include "shade/background.glsl"
+
+#if !REST
+uniform sampler2D emitted_radiance_sum;
+uniform sampler2D straight_transmittance;
+uniform sampler2D entered;
+#if !ONE_INTERFACE
+uniform sampler2D left;
+#endif
+#endif
+
+layout(location = 0) out vec4 out_radiance;
+layout(location = 1) out vec4 out_transmittance;
+
+void main() {
+    vec2 pixel = gl_FragCoord.xy + frame_size.zw;
+    ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
+    vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
+    // The same operations as before a ray is refracted: the picture must not tell the two shaders apart.
+    vec3 behind = background(pixel, ray / length(ray), texel);
+#if REST
+    out_radiance = vec4(behind, 1.0);
+    out_transmittance = vec4(1.0);
+#else
+    ivec2 here = ivec2(gl_FragCoord.xy);
+    vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
+    vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
+    float front = texelFetch(entered, texel, 0).w;
+#if ONE_INTERFACE
+    bool none = front >= NOTHING;
+#else
+    bool none = front >= NOTHING && texelFetch(left, texel, 0).w >= front;
+#endif
+    gl_FragDepth = none ? 0.0 : 1.0;
+    out_radiance = none ? vec4(behind * through + emitted, 1.0) : vec4(0.0);
+    out_transmittance = none ? vec4(through, 1.0) : vec4(0.0);
+#endif
+}
