@@ -6,6 +6,7 @@ import moderngl
 
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.no_interface import NoInterface
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import surface_table
@@ -31,17 +32,6 @@ _SAMPLERS = (
     "seen_map",
 )
 
-#: Of these, what is read where there is no interface.
-_PLAIN_SAMPLERS = (
-    "emitted_radiance_sum",
-    "straight_transmittance",
-    "entered",
-    "left",
-    "opaque_place",
-    "opaque_radiance",
-    "seen_map",
-)
-
 
 class SurfacesPass:
     """Reflection, refraction, paint and diffuse light; see ``shaders/shade/surfaces.frag``."""
@@ -49,8 +39,7 @@ class SurfacesPass:
     def __init__(self, gl: moderngl.Context) -> None:
         units = {name: unit for unit, name in enumerate(_SAMPLERS)}
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/surfaces.frag", **units)
-        plain = {name: units[name] for name in _PLAIN_SAMPLERS}
-        self._plain = Variants(gl, "geometry/fullscreen.vert", "shade/no_interface.frag", **plain)
+        self._no_interface = NoInterface(gl)
         self._reflectance = reflectance_table(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -62,29 +51,20 @@ class SurfacesPass:
         blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        seen = job.scene.environment.seen
-        if seen.kind == "image":
-            job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
-        self._bind_paths(job)
-        background = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": seen.kind == "image"}
-        one_interface = job.features.one_interface
-        gl.enable_only(blending)
-        rest = self._plain.program(REST=True, ONE_INTERFACE=False, **background)
-        self._plain.draw_rest(job, rest, framebuffer, top_first=True)
+        self._no_interface.draw(job, framebuffer, blending)
         if not job.covered:
             return
-        # The depth test keeps the costly program from pixels without an interface before it runs: where it returned at
-        # once, a software rasterizer would go through all of it nevertheless.
-        gl.enable_only(blending | moderngl.DEPTH_TEST)
-        gl.depth_func = "1"
-        plain = self._plain.program(REST=False, ONE_INTERFACE=one_interface, **background)
-        self._plain.draw_covered(job, plain, framebuffer, top_first=True)
-        gl.depth_func = "<"
+        self._bind_paths(job)
+        seen = job.scene.environment.seen
+        seen_map = seen.kind == "image"
+        if seen_map:
+            job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
         program = self._variants.program(
-            ONE_INTERFACE=one_interface,
-            SEEN_LIGHTS=background["SEEN_MAP"] and seen is job.scene.environment,
+            ONE_INTERFACE=job.features.one_interface,
+            OPAQUE=job.features.has_opaque,
+            SEEN_MAP=seen_map,
+            SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,
-            **background,
         )
         finishes = self._bind_finishes(job)
         self._variants.draw_covered(job, program, framebuffer, top_first=True)

@@ -7,7 +7,9 @@ import numpy as np
 
 from translucent.arrays import Array
 from translucent.gpu.drivers import require_interfaces
+from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.no_interface import NoInterface
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
@@ -43,47 +45,51 @@ class TracedInterfacesPass:
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/traced_interfaces.frag", **_UNITS)
         self._reflectance = reflectance_table(gl)
+        self._no_interface = NoInterface(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
-        gl, scene, environment = job.gl, job.scene, job.scene.environment
+        gl = job.gl
         require_interfaces(gl.info)
         sums = job.sums_after(spec.name)
-        (job.targets.average() if sums else job.targets.surfaced()).use()
-        gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
+        framebuffer = job.targets.average() if sums else job.targets.surfaced()
+        blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        seen_map = environment.seen.kind == "image"
-        seen_lights = seen_map and environment.seen is environment
-        emitted, through, *_ = job.targets.result().color_attachments
-        maps = job.resources.environments.light(environment)
-        hierarchies = job.resources.hierarchies.of(scene)
-        rows, frame = hierarchies.place(scene, media_center(scene))
-        contents = surface_table(scene, job.features.sheets), rows
+        record = _record_at_eye(job)
+        gl.enable_only(blending)
+        if not any(record):
+            self._no_interface.draw(job, framebuffer, blending)
+            if not job.covered:
+                return
+        hierarchies = job.resources.hierarchies.of(job.scene)
+        rows, frame = hierarchies.place(job.scene, media_center(job.scene))
+        contents = surface_table(job.scene, job.features.sheets), rows
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
-        depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
-        textures = {
-            "emitted_radiance_sum": emitted,
-            "straight_transmittance": through,
-            **dict(zip(_ENTERED, job.targets.entered().color_attachments, strict=True)),
-            "surface_table": tables[0],
-            "traced_bodies": tables[1],
-            "hierarchy_nodes": hierarchies.nodes,
-            "hierarchy_triangles": hierarchies.triangles,
-            "reflectance_table": self._reflectance,
-            "light_map": job.resources.environments.sharp(environment),
-            "light_levels": maps.levels,
-            "light_irradiance": maps.irradiance,
+        self._bind(job, hierarchies, *tables)
+        program = self._program(job)
+        values = {
+            "most_interfaces": job.plan.interfaces.tree[0] if job.plan.interfaces else 0,
+            "start_record": record,
+            "sample_number": job.sample,
+            "blurred_share": blurred_share(job.samples),
+            "object_nodes": hierarchies.object_nodes,
+            "objects_frame": frame,
         }
-        if job.features.has_opaque:
-            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
-        if seen_map:
-            textures["seen_map"] = job.resources.environments.sharp(environment.seen)
-        for name, texture in textures.items():
-            texture.use(_UNITS[name])
+        for name, value in values.items():
+            if name in program:
+                set_uniform(program, name, value)
+        self._variants.draw_covered(job, program, framebuffer, top_first=True)
+        gl.enable_only(blending)
+        for table in tables:
+            table.release()
+
+    def _program(self, job: FrameJob) -> moderngl.Program:
+        scene, environment = job.scene, job.scene.environment
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
-        program = self._variants.program(
-            FORKS=forks,
+        seen_map = environment.seen.kind == "image"
+        return self._variants.program(
+            FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
@@ -92,20 +98,40 @@ class TracedInterfacesPass:
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             SEEN_MAP=seen_map,
-            SEEN_LIGHTS=seen_lights,
+            SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
         )
-        set_uniform(program, "most_interfaces", depth)
-        if "sample_number" in program:
-            set_uniform(program, "sample_number", job.sample)
-            set_uniform(program, "blurred_share", blurred_share(job.samples))
-        set_uniform(program, "start_record", _record_at_eye(job))
-        if "object_nodes" in program:
-            set_uniform(program, "object_nodes", hierarchies.object_nodes)
-            set_uniform(program, "objects_frame", frame)
-        self._variants.draw_fullscreen(program)
-        for table in tables:
-            table.release()
+
+    def _bind(
+        self,
+        job: FrameJob,
+        hierarchies: SceneHierarchies,
+        surface_rows: moderngl.Texture,
+        traced_rows: moderngl.Texture,
+    ) -> None:
+        environment = job.scene.environment
+        environments = job.resources.environments
+        emitted, through, *_ = job.targets.result().color_attachments
+        maps = environments.light(environment)
+        textures = {
+            "emitted_radiance_sum": emitted,
+            "straight_transmittance": through,
+            **dict(zip(_ENTERED, job.targets.entered().color_attachments, strict=True)),
+            "surface_table": surface_rows,
+            "traced_bodies": traced_rows,
+            "hierarchy_nodes": hierarchies.nodes,
+            "hierarchy_triangles": hierarchies.triangles,
+            "reflectance_table": self._reflectance,
+            "light_map": environments.sharp(environment),
+            "light_levels": maps.levels,
+            "light_irradiance": maps.irradiance,
+        }
+        if job.features.has_opaque:
+            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
+        if environment.seen.kind == "image":
+            textures["seen_map"] = environments.sharp(environment.seen)
+        for name, texture in textures.items():
+            texture.use(_UNITS[name])
 
 
 def blurred_share(samples: int) -> float:
