@@ -37,7 +37,7 @@ ROULETTE = 0.1
 
 #: Number of interfaces after which paths end by Russian roulette whatever they carry, and their chance to go on each
 #: time. Light that total reflection holds in a lossless body loses nothing, and might never leave.
-MANY_INTERFACES, GOES_ON = 1000, 0.95
+MANY_INTERFACES, GOES_ON = 256, 0.95
 
 #: Number of mean free paths after which surfaces are searched for anew: few rays in dense media get as far.
 FREE_PATHS = 3.0
