@@ -1,4 +1,4 @@
-"""Light of lamps that reaches places in media on a straight way, past all interfaces that bend it."""
+"""Light of lamps that reaches places on a straight way, past all interfaces that bend it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from translucent.scene.scene import Light
 class StraightLight:
     """Light of point and directional lights, as far as no interface bends it.
 
-    A path that is bent meets such a light with probability 0, so that nothing random finds it.
+    A path that polished interfaces bend meets such a light with probability 0, so that nothing random finds it.
 
     Parameters
     ----------
@@ -28,6 +28,11 @@ class StraightLight:
         self.light, self.own = light, own
         self.transmission = np.array([surface.transmission for surface in own.surfaces])
         self.color = np.array([surface.color for surface in own.surfaces], dtype=np.float64)
+
+    def at_interfaces(self, points: Array) -> Array:
+        """(lights, k, 3): unit vectors from points (k, 3) to all lights."""
+        found = [_way(light, points)[0] for light in self.light.lights]
+        return np.array(found).reshape(len(found), len(points), 3)
 
     def scattered(self, legs: Legs, weights: Array, channel: int) -> Array:
         """(k, 3): radiance that media scatter from lights at the origins of `legs` back along them, for each unit that
@@ -44,28 +49,37 @@ class StraightLight:
         volume, rays = self.light.volume, legs.rays
         radiance = np.zeros((len(legs), 3))
         total = weights @ volume.scattering[:, channel]
-        for light in self.light.lights:
-            share = self.share(light, rays.origins, legs.inside)
-            some = np.flatnonzero(share.any(axis=1))
-            arrival = self.light.arrival(light, rays.origins[some])
-            cosine = -np.einsum("ki,ki->k", arrival.travel, rays.directions[some])
-            phase = volume.source(weights[some], cosine)[:, channel] / np.where(total[some] > 0, total[some], 1.0)
+        for number, to_light in enumerate(self.at_interfaces(rays.origins)):
+            arriving = self.irradiance(number, rays.origins, legs.inside)
+            cosine = np.einsum("ki,ki->k", to_light, rays.directions)
+            phase = volume.source(weights, cosine)[:, channel] / np.where(total > 0, total, 1.0)
             with np.errstate(under="ignore"):
-                radiance[some] += share[some] * arrival.irradiance * phase[:, None]
+                radiance += arriving * phase[:, None]
         return radiance
 
-    def share(self, light: Light, points: Array, inside: Inside) -> Array:
-        """(k, 3): share of a light that passes all interfaces on the straight way to points `inside` bodies.
+    def irradiance(self, number: int, points: Array, inside: Inside, start: float = 0.0) -> Array:
+        """Irradiance (k, 3) of one light, straight on, at points (k, 3) `inside` bodies.
 
-        What absorbs it on the way is another matter.
+        Parameters
+        ----------
+        number : int
+            Index into `LightPaths.lights`.
+        points : (k, 3) float64
+        inside : Inside
+        start : float
+            Distance in metres from the points within which no surface counts: that they lie on.
         """
-        if isinstance(light, PointLight):
-            way = np.asarray(light.position) - points
-            distance = np.linalg.norm(way, axis=1)
-            directions = way / np.where(distance > 0, distance, 1.0)[:, None]
-        else:
-            directions, distance = np.tile(-np.asarray(light.direction), (len(points), 1)), np.full(len(points), np.inf)
-        lines = Lines(points, directions, np.zeros(len(points)), distance)
+        light, found = self.light.lights[number], np.zeros((len(points), 3))
+        share = self._share(light, points, inside, start)
+        some = np.flatnonzero(share.any(axis=1))
+        with np.errstate(under="ignore"):
+            found[some] = share[some] * self.light.arrival(light, points[some]).irradiance
+        return found
+
+    def _share(self, light: Light, points: Array, inside: Inside, start: float) -> Array:
+        """(k, 3): share of a light that passes all interfaces; what absorbs it on the way is another matter."""
+        directions, distance = _way(light, points)
+        lines = Lines(points, directions, np.full(len(points), start), distance)
         hits, share = self.light.tracer.hits(lines), np.ones((len(points), 3))
         while True:
             interfaces = self.own.first_interfaces(hits, inside)
@@ -81,3 +95,12 @@ class StraightLight:
             passed[met] = np.where(bends, np.inf, interfaces.distance[met] + self.own.tolerance)
             hits = [line.where(line.distance > passed[line.pixel]) for line in hits]
             inside = interfaces.there
+
+
+def _way(light: Light, points: Array) -> tuple[Array, Array]:
+    """Unit vectors (k, 3) from points (k, 3) to a light, and how far it is (k,)."""
+    if not isinstance(light, PointLight):
+        return np.tile(-np.asarray(light.direction), (len(points), 1)), np.full(len(points), np.inf)
+    way = np.asarray(light.position) - points
+    distance = np.linalg.norm(way, axis=1)
+    return way / np.where(distance > 0, distance, 1.0)[:, None], distance
