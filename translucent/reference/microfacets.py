@@ -103,7 +103,7 @@ def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array
     fresnel = optics.fresnel_dielectric(np.clip(cos_way, 0.0, 1.0), ior)
     stretch = across * across * np.abs(cos_light) / np.where(turns, length, 1.0) ** 2
     density = np.where(back, fresnel, 1.0 - fresnel) * cos_way * ggx_distribution(np.abs(half[:, 2]), alpha) * stretch
-    leaves = np.where(back, height, 1.0 - height) ** _lambda(np.abs(light[:, 2]), alpha)
+    leaves = np.where(back, height, 1.0 - height) ** _lambda(np.maximum(np.abs(light[:, 2]), LEVEL), alpha)
     return np.where(turns, density * leaves / np.where(turns, area, 1.0), 0.0)
 
 

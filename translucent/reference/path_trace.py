@@ -46,13 +46,23 @@ def path_trace(
 ) -> tuple[Frame, Array]:
     """Path trace a scene, with multiple scattering of all lights, of the environment and of emission.
 
-    Opaque surfaces send back what they do for `render`, and a backdrop fixed to the picture lights like the mean of its
-    squares. Light inside a medium has no finite variance: there the error bars say little.
+    Where interfaces change light (`Object.has_interface`), each path is reflected or refracted by chance: by Fresnel
+    between the media of its record (Schmidt & Budge 2002), at rough interfaces by a walk among GGX microfacets that
+    loses nothing (Heitz et al. 2016). Sheets, tints, paint, dispersion and smooth normals are what they are for
+    `render`, without a limit of bounces. Radiance is basic radiance L / n^2, as there.
+
+    Point and directional lights are followed straight on, and through the microfacets of rough interfaces. What
+    polished interfaces bend of them no path finds: caustics, and light in media behind such interfaces. The plan tells
+    where this leaves out something. Light of the environment is all there.
+
+    Opaque surfaces and paint send back what they do for `render`, and a backdrop fixed to the picture lights like the
+    mean of its squares. Light inside a medium has no finite variance: there the error bars say little. Nor do they
+    with few paths before rare bright reflections.
 
     Parameters
     ----------
     scene : Scene
-        Its bodies are closed, and none is a sheet.
+        Its bodies are closed or sheets, and no sheet scatters.
     size : (width, height)
         In pixels.
     paths : int
@@ -72,7 +82,8 @@ def path_trace(
     Raises
     ------
     InputError
-        If an argument is not in its range, a body is open or a sheet, the media are too deep, or radiance is ambient.
+        If an argument is not in its range, a body is open, a sheet scatters, an interface has textures, the media are
+        too deep, or radiance is ambient.
     """
     began = time.perf_counter()
     width, height = check_size(size)
@@ -129,9 +140,17 @@ def _check(scene: Scene, paths: int, max_events: int | None) -> None:
 
 def _left_out(scene: Scene) -> tuple[Note, ...]:
     """Notes on light that no path finds."""
-    if not scene.lights or all(body.medium is None or body.medium.ior == 1.0 for body in scene.bodies):
+    polished = [
+        body
+        for body in scene.bodies
+        if body.has_interface
+        and body.medium is not None
+        and body.medium.ior != 1.0
+        and (body.surface is None or body.surface.roughness == 0.0 or body.sheet_thickness is not None)
+    ]
+    if not scene.lights or not polished:
         return ()
-    text = "light of point and directional lights that interfaces bend on its way, in media and as caustics"
+    text = "light of point and directional lights that polished interfaces bend on its way: in media, and as caustics"
     return (Note(NoteKind.LIGHTS_LEFT_OUT, text),)
 
 
