@@ -151,15 +151,16 @@ def test_lights_go_straight_where_no_interface_bends_them() -> None:
 
 def test_many_lights_through_rough_interfaces_are_a_furnace() -> None:
     """A lossless cube in suns from everywhere: what its microfacets turn to them adds up to what white light shows."""
-    count = 400
+    count = 30
     up = 1 - (2 * np.arange(count) + 1) / count
     turn = np.pi * (1 + math.sqrt(5)) * np.arange(count)
     ways = np.stack([np.sqrt(1 - up**2) * np.cos(turn), up, np.sqrt(1 - up**2) * np.sin(turn)], axis=1)
     suns = [DirectionalLight(tuple(way), 4 * np.pi / count) for way in ways]
     cube = Object(box((-1, -1, -1), (1, 1, 1)), CLEAR, surface=Surface(roughness=0.8))
     camera = Camera.look_at((2, 3, 4), (0, 0, 0), fov_y=5)
-    frame, error = path_trace(Scene([cube], camera, suns, BLACK), (2, 2), paths=50)
-    bound = 4 * math.sqrt((error[..., 0] ** 2).sum()) / 4 + 0.01
+    frame, error = path_trace(Scene([cube], camera, suns, BLACK), (4, 4), paths=400)
+    # And what the sum over so few directions is off.
+    bound = 4 * math.sqrt((error[..., 0] ** 2).sum()) / 16 + 0.02
     assert bound < 0.1
     assert abs(frame.radiance[..., 0].mean() - 1.0) < bound
     assert not frame.plan.says(NoteKind.LIGHTS_LEFT_OUT)
