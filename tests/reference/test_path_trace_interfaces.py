@@ -9,7 +9,7 @@ import pytest
 
 from tests.reference.dielectrics import BLACK, UP_AND_DOWN, WHITE, Array, box, oblique, reflectance, slab
 from translucent.errors import InputError
-from translucent.formulas.interface import slab_reflectance, slab_transmittance
+from translucent.formulas.interface import channel_iors, slab_reflectance, slab_transmittance
 from translucent.frames.frame import Frame
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Sphere, Torus
@@ -46,14 +46,15 @@ def assert_agree(frame: Frame, error: Array, truth: Array, rest: Array | float =
     assert error.max() > 0.0
 
 
-@pytest.mark.parametrize("degrees", [0.0, 60.0])
-def test_an_absorbing_slab_reflects_between_its_faces_without_end(degrees: float) -> None:
+@pytest.mark.parametrize(("degrees", "dispersion"), [(0.0, 0.0), (60.0, 0.0), (0.0, 10.0)])
+def test_an_absorbing_slab_reflects_between_its_faces_without_end(degrees: float, dispersion: float) -> None:
     medium = Medium(absorption=(0.1, 0.4, 0.9), ior=1.5)
-    scene = Scene([Object(slab(-1.0, 0.0), medium)], oblique(degrees), environment=UP_AND_DOWN)
-    frame, error = path_trace(scene, (1, 1), paths=20_000)
+    body = Object(slab(-1.0, 0.0), medium, surface=Surface(dispersion=dispersion))
+    frame, error = path_trace(Scene([body], oblique(degrees), environment=UP_AND_DOWN), (1, 1), paths=20_000)
     sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    r = reflectance(sine, 1.5)
-    depth = medium.extinction / math.sqrt(1 - (sine / 1.5) ** 2)
+    iors = channel_iors(1.5, dispersion)
+    r = np.array([reflectance(sine, ior) for ior in iors])
+    depth = medium.extinction / np.sqrt(1 - (sine / iors) ** 2)
     above, below = (UP_AND_DOWN.lighting(np.array([-sine, side * cosine, 0.0])) for side in (1, -1))
     truth = slab_reflectance(r, depth) * above + slab_transmittance(r, depth) * below
     assert (np.abs(frame.radiance[0, 0] - truth) < 4 * error[0, 0]).all()
@@ -115,6 +116,16 @@ def test_against_the_ray_tree(name: str) -> None:
     scene = Scene(objects, CAMERA, environment=environment, overlap=overlap)
     tree, _ = refracted_light(scene, (10, 8), bounces=12)
     frame, error = path_trace(scene, (10, 8), paths=100)
+    assert_agree(frame, error, tree.radiance.reshape(8, 10, 3), 2.0 * tree.residual.reshape(8, 10, 3))
+
+
+def test_unscattered_light_knows_its_media() -> None:
+    """Past surfaces that bend nothing, in media so dense that paths go in steps."""
+    outer = Object(BALL, Medium((0.1, 0.4, 0.9), 3.0, ior=1.4))
+    inner = Object(Sphere(radius=0.6).tessellate(8), Medium((2.0, 0.5, 0.1), 0.0, emission=0.5, ior=1.4), priority=1)
+    scene = Scene([outer, inner], CAMERA, environment=UP_AND_DOWN, overlap="priority")
+    tree, _ = refracted_light(scene, (10, 8), bounces=12)
+    frame, error = path_trace(scene, (10, 8), paths=200, max_events=0)
     assert_agree(frame, error, tree.radiance.reshape(8, 10, 3), 2.0 * tree.residual.reshape(8, 10, 3))
 
 
