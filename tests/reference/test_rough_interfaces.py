@@ -11,7 +11,7 @@ from tests.reference.dielectrics import BLACK, UP_AND_DOWN, Array, oblique, slab
 from translucent.formulas import interface, optics
 from translucent.media.medium import Medium
 from translucent.reference import microfacets, refracted_light
-from translucent.reference.microfacets import scattered_at_interface
+from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
@@ -63,6 +63,33 @@ def test_light_passed_by_one_microfacet(rng: np.random.Generator, monkeypatch: p
     )
     expected = (1 + hidden) * math.gamma(1 + hidden) ** 2 / math.gamma(2 + 2 * hidden)
     assert found.any(axis=1).mean() == pytest.approx(expected, abs=4 * math.sqrt(expected / count) + 1e-4)
+
+
+@pytest.mark.parametrize("ior", [1.5, 1 / 1.5])
+@pytest.mark.parametrize(("alpha", "cosine"), [(0.09, 0.9), (0.5, 0.3)])
+def test_light_turned_to_lamps_is_the_density_of_directions(
+    ior: float, alpha: float, cosine: float, rng: np.random.Generator
+) -> None:
+    """Means over random directions, and over directions of lamps all around; four standard errors."""
+    count = 100_000
+    way, every = [math.sqrt(1 - cosine**2), 0.0, -cosine], np.ones(count)
+    lamps = rng.normal(size=(count, 3))
+    lamps /= np.linalg.norm(lamps, axis=1, keepdims=True)
+    found, _, seen = lit_at_interface(
+        np.tile(way, (count, 1)), np.tile([0.0, 0.0, 1.0], (count, 1)), ior * every, alpha * every, lamps[None], rng
+    )
+    # What is hidden deep enough underflows.
+    shown = 4 * np.pi * np.where(seen[0] < 1e-100, 0.0, seen[0])
+    for value in (
+        lambda v: v[:, 2] > 0,
+        lambda v: v[:, 2] < 0,
+        lambda v: v[:, 0],
+        lambda v: np.minimum(v[:, 2], 0) ** 2,
+        lambda v: (v[:, 2] > 0) & (v[:, 2] < 0.4),
+    ):
+        by_paths, by_lamps = value(found).astype(float), shown * value(lamps)
+        error = math.hypot(by_paths.std(), by_lamps.std()) / math.sqrt(count)
+        assert abs(by_paths.mean() - by_lamps.mean()) < 4 * error
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.7])

@@ -146,7 +146,10 @@ def test_refusals() -> None:
         (lambda: path_trace(scene, (2, 0)), "size"),
         (lambda: path_trace(Scene([Object(BOX, Medium(0.0, 1e9))], CAMERA), (2, 2)), "deep, .* give max_events"),
         (lambda: path_trace(Scene([Object(opened, medium)], CAMERA), (2, 2)), "not closed"),
-        (lambda: path_trace(Scene([Object(BOX, medium, sheet_thickness=1e-3)], CAMERA), (2, 2)), "a sheet"),
+        (
+            lambda: path_trace(Scene([Object(BOX, medium, sheet_thickness=1e-3)], CAMERA), (2, 2)),
+            "a sheet that scatters",
+        ),
     ]
     for call, message in cases:
         with pytest.raises(InputError, match=message):

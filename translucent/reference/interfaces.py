@@ -153,8 +153,11 @@ class Optics:
 
     def at_origins(self, hits: Sequence[Hits], count: int) -> Inside:
         """State of rays at their origins, from all surfaces behind them."""
-        behind = [line.where(line.distance < 0) for line in hits]
-        return _Walk(self, behind, self.outside(count)).through()
+        return self.crossed([line.where(line.distance < 0) for line in hits], self.outside(count))
+
+    def crossed(self, hits: Sequence[Hits], inside: Inside) -> Inside:
+        """State of rays that start `inside` bodies, behind surfaces."""
+        return _Walk(self, hits, inside).through()
 
     def first_interfaces(self, hits: Sequence[Hits], inside: Inside) -> Interfaces:
         """First interfaces among the surfaces ahead of rays that start `inside` bodies."""

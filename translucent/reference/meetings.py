@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.formulas.interface import (
     ggx_distribution,
@@ -16,10 +16,11 @@ from translucent.formulas.interface import (
     slab_reflectance,
     slab_transmittance,
 )
-from translucent.reference.interfaces import Interfaces, Optics, interface_normals
+from translucent.reference.interfaces import Inside, Interfaces, Optics, interface_normals
 from translucent.reference.legs import Legs
-from translucent.reference.microfacets import scattered_at_interface
+from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
 from translucent.reference.opaque import irradiance_at, seen_from
+from translucent.reference.straight_light import StraightLight
 from translucent.scene.lights import PointLight
 
 #: Number of passages through a rough sheet after which light counts as lost.
@@ -53,10 +54,20 @@ class Meetings:
     interfaces : Interfaces
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
+    lamps : StraightLight, optional
+        To add the light of point and directional lights that rough interfaces of solids turn into the legs, on either
+        side, attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
     """
 
-    def __init__(self, own: Optics, legs: Legs, interfaces: Interfaces, rng: np.random.Generator | None) -> None:
-        self.own, self.legs, self.interfaces, self.rng = own, legs, interfaces, rng
+    def __init__(
+        self,
+        own: Optics,
+        legs: Legs,
+        interfaces: Interfaces,
+        rng: np.random.Generator | None,
+        lamps: StraightLight | None = None,
+    ) -> None:
+        self.own, self.legs, self.interfaces, self.rng, self.lamps = own, legs, interfaces, rng, lamps
         self.normals, self.faces = interface_normals(own, interfaces, legs.rays.directions)
         self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
         self.is_sheet = interfaces.before == interfaces.after
@@ -76,7 +87,7 @@ class Meetings:
             (self.is_sheet & rough, self._at_rough_sheets),
         )
         self.radiance = np.zeros((len(self.legs), 3))
-        self._add_highlights(np.flatnonzero(rough))
+        self._add_highlights(np.flatnonzero(rough & (self.is_sheet | (self.lamps is None))))
         branches: list[Legs] = []
         for mask, method in ways:
             chosen = np.flatnonzero(mask)
@@ -107,9 +118,7 @@ class Meetings:
         if self.rng is not None:
             passed = self.rng.random(len(chosen)) >= share_back[:, 0]
             rough = np.flatnonzero((self.alpha[chosen] > 0) & (self.ior[chosen] != 1.0))
-            back_way[rough], passed[rough] = scattered_at_interface(
-                directions[rough], normals[rough], self.ior[chosen[rough]], self.alpha[chosen[rough]], self.rng
-            )
+            back_way[rough], passed[rough] = self._at_microfacets(chosen[rough], self.rng)
             on_way[rough] = back_way[rough]
             share_on = passed[:, None].astype(np.float64)
             share_back = 1.0 - share_on
@@ -121,6 +130,35 @@ class Meetings:
         )
         refracted = legs.where(on).turned(on_way[on], passing, there.where(chosen[on]), bent=True, reflected=False)
         return [reflected, refracted], share_on
+
+    def _at_microfacets(self, chosen: Integers, rng: np.random.Generator) -> tuple[Array, Mask]:
+        """Directions from rough interfaces, and whether they pass; adds the light of lamps."""
+        directions, normals, points = self.legs.rays.directions[chosen], self.normals[chosen], self.legs.rays.origins
+        lamps = None if self.lamps is None else self.lamps.at_interfaces(points[chosen])
+        found = directions, normals, self.ior[chosen], self.alpha[chosen]
+        if lamps is None or not len(lamps):
+            return scattered_at_interface(*found, rng)
+        way, passed, seen = lit_at_interface(*found, lamps, rng)
+        for number, to_light in enumerate(lamps):
+            across, by_face = (np.einsum("ki,ki->k", to_light, n) for n in (normals, self.faces[chosen]))
+            for side, passing, inside in (
+                (1.0, np.ones((len(chosen), 3)), self.interfaces.here),
+                (-1.0, self._passing(chosen), self.interfaces.there),
+            ):
+                # Light that comes from the other side of the face than of the smooth surface does not exist.
+                some = np.flatnonzero((seen[number] > 0) & (side * across > 0) & (side * by_face > 0))
+                to_eye = passing[some] * seen[number, some, None]
+                self.radiance[chosen[some]] += self._arriving(number, chosen[some], inside, to_eye)
+        return way, passed
+
+    def _arriving(self, number: int, chosen: Integers, inside: Inside, share: Array) -> Array:
+        """(k, 3): a share (k, 3) of one lamp's light."""
+        assert self.lamps is not None
+        arriving = self.lamps.irradiance(
+            number, self.legs.rays.origins[chosen], inside.where(chosen), self.own.tolerance
+        )
+        with np.errstate(under="ignore"):
+            return arriving * share
 
     def _at_sheets(self, chosen: Integers) -> tuple[list[Legs], Array]:
         """Branches at polished sheets, as `_at_interfaces`: both sides of each at once."""

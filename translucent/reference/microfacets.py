@@ -11,7 +11,7 @@ import numpy as np
 
 from translucent.arrays import Array, Mask
 from translucent.formulas import optics
-from translucent.formulas.interface import reflected_direction, refracted_direction
+from translucent.formulas.interface import ggx_distribution, reflected_direction, refracted_direction
 
 #: Number of meetings with microfacets after which light counts as lost; at a roughness of 1 one in a million gets as
 #: far.
@@ -43,8 +43,26 @@ def scattered_at_interface(
         Zero where light is lost.
     passed : (n,) bool
     """
+    found, passed, _ = lit_at_interface(directions, normals, ior, alpha, np.empty((0, *directions.shape)), rng)
+    return found, passed
+
+
+def lit_at_interface(
+    directions: Array, normals: Array, ior: Array, alpha: Array, to_lights: Array, rng: np.random.Generator
+) -> tuple[Array, Mask, Array]:
+    """As `scattered_at_interface`, and an estimate (lights, n) in 1/sr of how much light turns to each of `to_lights`.
+
+    At each microfacet, as much as it sends there and as gets past the others (Heitz et al. 2016, section 5.3); the
+    density of the random directions, if they were many.
+
+    Parameters
+    ----------
+    to_lights : (lights, n, 3) float64
+        Unit vectors to point and directional lights, on either side.
+    """
     axes = _axes(normals)
-    found = np.zeros_like(directions)
+    found, seen = np.zeros_like(directions), np.zeros(to_lights.shape[:2])
+    lights = np.einsum("kij,lkj->lki", axes, to_lights)
     above = np.ones(len(directions), dtype=bool)
     ray = np.arange(len(directions))
     way = np.einsum("kij,kj->ki", axes, directions)
@@ -57,12 +75,36 @@ def scattered_at_interface(
         ray, way, height, side = ray[~leaves], way[~leaves], height[~leaves], side[~leaves]
         if not ray.size:
             break
+        relative = np.where(above[ray], ior[ray], 1.0 / ior[ray])
+        for light, own in zip(lights, seen, strict=True):
+            own[ray] += _turned_to(side * light[ray], side * way, height, relative, alpha[ray])
         facet = side * _visible_normals(-side * way, alpha[ray], rng)
-        way, passed = _meet(way, facet, np.where(above[ray], ior[ray], 1.0 / ior[ray]), rng)
+        way, passed = _meet(way, facet, relative, rng)
         above[ray] ^= passed
         # Heights count upwards on either side.
         height = np.where(passed, 1.0 - height, height)
-    return np.einsum("kji,kj->ki", axes, found), ~above
+    return np.einsum("kji,kj->ki", axes, found), ~above, seen
+
+
+@np.errstate(under="ignore")
+def _turned_to(light: Array, way: Array, height: Array, ior: Array, alpha: Array) -> Array:
+    """(n,): density in 1/sr with which microfacets at `height` turn light on its `way` (n, 3) to `light` (n, 3), unseen
+    by others.
+
+    Visible normals have the density (m.w) D / (Lambda w_z); Walter et al. 2007, eq. 13 to 17, make one of directions.
+    """
+    back, across = light[:, 2] > 0, np.where(light[:, 2] > 0, 1.0, ior)
+    half = -way + across[:, None] * light
+    length = np.linalg.norm(half, axis=1)
+    half *= (np.where(half[:, 2] < 0, -1.0, 1.0) / np.where(length > 0, length, 1.0))[:, None]
+    cos_way, cos_light = -np.einsum("ki,ki->k", way, half), np.einsum("ki,ki->k", light, half)
+    area = _lambda(way[:, 2], alpha) * way[:, 2]
+    turns = (cos_way > 0) & ((cos_light > 0) == back) & (length > LEVEL) & (area > 0)
+    fresnel = optics.fresnel_dielectric(np.clip(cos_way, 0.0, 1.0), ior)
+    stretch = across * across * np.abs(cos_light) / np.where(turns, length, 1.0) ** 2
+    density = np.where(back, fresnel, 1.0 - fresnel) * cos_way * ggx_distribution(np.abs(half[:, 2]), alpha) * stretch
+    leaves = np.where(back, height, 1.0 - height) ** _lambda(np.maximum(np.abs(light[:, 2]), LEVEL), alpha)
+    return np.where(turns, density * leaves / np.where(turns, area, 1.0), 0.0)
 
 
 def _meet(way: Array, facet: Array, ior: Array, rng: np.random.Generator) -> tuple[Array, Mask]:

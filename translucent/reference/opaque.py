@@ -32,6 +32,10 @@ class OpaqueHits:
     item: Integers
     face: Integers
 
+    def where(self, chosen: Integers) -> OpaqueHits:
+        """Selection of rays by indices."""
+        return OpaqueHits(self.distance[chosen], self.item[chosen], self.face[chosen])
+
 
 def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHits:
     """Find the first opaque surface ahead of each origin; of several at one distance, that of the first object.

@@ -26,7 +26,8 @@ from translucent.reference.intervals import Intervals, body_intervals, merge, un
 from translucent.reference.legs import Legs, joined
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.meetings import Meetings
-from translucent.reference.opaque import OpaqueHits, nearest_opaque, reflected_radiance
+from translucent.reference.opaque import nearest_opaque
+from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
 from translucent.reference.scattering import scattered_once
 from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
@@ -39,9 +40,6 @@ FAINTEST = 1e-5
 
 #: Number of rays of the picture that are followed together: the working arrays stay below 500 MB.
 BATCH = 1 << 13
-
-#: Smallest cosine between a ray and the view with which it meets the backdrop.
-ACROSS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +89,9 @@ class RefractedRays:
         tolerance: float = 1e-6,
         rng: np.random.Generator | None = None,
     ) -> None:
-        self.scene, self.sheets, self.aspect, self.bounces = scene, sheets, aspect, bounces
+        self.scene, self.sheets, self.bounces = scene, sheets, bounces
         self.paths, self.tolerance, self.rng = paths, tolerance, rng
+        self.ends = RayEnds(scene, aspect)
         self.tracer, self.volume = Tracer(scene), Volume(scene)
         dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
         self.channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
@@ -106,23 +105,6 @@ class RefractedRays:
                 owner = np.arange(begin, min(begin + BATCH, len(rays)))
                 _Tree(self, own, found).grow(rays.where(owner), owner, carried)
         return found
-
-    def on_backdrop(self, rays: Rays) -> tuple[Array, Mask]:
-        """Places at which rays meet a backdrop that stands across the view behind all objects (`Rays.backdrop`), and a
-        mask.
-        """
-        camera = self.scene.camera
-        low, high = self.scene.bounds - camera.eye
-        farthest = float(np.maximum(low * camera.forward, high * camera.forward).sum())
-        towards = rays.directions @ camera.forward
-        ahead = towards > ACROSS
-        path = np.maximum(farthest - rays.origins @ camera.forward, 0.0) / np.where(ahead, towards, 1.0)
-        points = rays.origins + path[:, None] * rays.directions
-        depth = points @ camera.forward if camera.fov_y is not None else np.ones(len(points))
-        ahead &= depth > 0
-        heights = 2.0 * camera.half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
-        across = np.stack([points @ camera.right, -(points @ camera.up)], axis=1) / heights[:, None]
-        return across + (0.5 * self.aspect, 0.5), ahead
 
 
 class _Tree:
@@ -166,7 +148,7 @@ class _Tree:
         interfaces = self.own.first_interfaces([line.before(wall.distance) for line in hits], legs.inside)
         legs = self._through_media(legs, hits, interfaces.distance, wall.distance)
         ends = np.isinf(interfaces.distance)
-        self._add(legs.where(ends), self._at_end(legs.where(ends), wall, np.flatnonzero(ends)))
+        self._add(legs.where(ends), self.refracted.ends.radiance(legs.where(ends), wall.where(np.flatnonzero(ends))))
         met = np.flatnonzero(~ends)
         interfaces, legs = interfaces.where(met), legs.where(met)
         with np.errstate(under="ignore"):
@@ -197,22 +179,3 @@ class _Tree:
         self._add(legs, emitted)
         with np.errstate(under="ignore"):
             return replace(legs, throughput=legs.throughput * optics.transmittance(depth))
-
-    def _at_end(self, legs: Legs, wall: OpaqueHits, chosen: Integers) -> Array:
-        """(k, 3): radiance at the ends of ray segments, the `chosen` ones of all that met `wall`: opaque, or
-        environment.
-        """
-        own = OpaqueHits(wall.distance[chosen], wall.item[chosen], wall.face[chosen])
-        seen = reflected_radiance(self.scene, legs.rays, own)
-        free = np.flatnonzero(np.isinf(own.distance))
-        seen[free] = self._environment(legs.where(free))
-        return seen
-
-    def _environment(self, legs: Legs) -> Array:
-        """(k, 3): radiance of unblocked ray segments: the environment's light in reflections, else its background."""
-        environment, rays = self.scene.environment, legs.rays
-        position, ahead = self.refracted.on_backdrop(rays)
-        seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], position, rays.backdrop))
-        if environment.seen.kind == "checkerboard":
-            seen[legs.bent & ~ahead] = environment.seen.mean
-        return np.where(legs.reflected[:, None], environment.lighting(rays.directions), seen)

@@ -97,12 +97,17 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
         raise InputError(f"{bounces} bounces", "below 0", "use for example 8")
     if paths < 2:
         raise InputError(f"{paths} paths through rough interfaces", "no spread without two", "use for example 64")
+    check_untextured(scene, "use refraction=False")
+
+
+def check_untextured(scene: Scene, instead: str) -> None:
+    """Check that interfaces are the same all over each body; errors say what to do `instead`."""
     for body in scene.bodies:
         if body.covers or not body.has_interface:
             continue
         if body.surface is not None and any(texture is not None for texture in body.surface.textures):
             what = f"reference of {body.mesh.name!r}"
-            raise InputError(what, "its surface has textures", "give it a surface without, or use refraction=False")
+            raise InputError(what, "its surface has textures", f"give it a surface without, or {instead}")
         if body.mesh.colors is not None:
             what = f"reference of {body.mesh.name!r}"
-            raise InputError(what, "its vertices have colors", "give it a mesh without, or use refraction=False")
+            raise InputError(what, "its vertices have colors", f"give it a mesh without, or {instead}")

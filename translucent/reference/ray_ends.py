@@ -1,0 +1,61 @@
+"""Ends of refracted rays: radiance of the environment, of a backdrop, and of opaque surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from translucent.arrays import Array, Mask
+from translucent.reference.legs import Legs
+from translucent.reference.opaque import OpaqueHits, reflected_radiance
+from translucent.reference.rays import Rays
+from translucent.scene.scene import Scene
+
+#: Smallest cosine between a ray and the view with which it meets the backdrop.
+ACROSS = 1e-2
+
+
+class RayEnds:
+    """Radiance at the ends of refracted rays.
+
+    Parameters
+    ----------
+    scene : Scene
+    aspect : float
+        Width of the picture divided by its height.
+    """
+
+    def __init__(self, scene: Scene, aspect: float) -> None:
+        self.scene, self.aspect = scene, aspect
+
+    def radiance(self, legs: Legs, wall: OpaqueHits) -> Array:
+        """(k, 3): of the opaque surfaces that stop ray segments, or where none does of the environment."""
+        seen = reflected_radiance(self.scene, legs.rays, wall)
+        free = np.flatnonzero(np.isinf(wall.distance))
+        seen[free] = self._environment(legs.where(free))
+        return seen
+
+    def _environment(self, legs: Legs) -> Array:
+        """(k, 3): radiance of unblocked ray segments: the environment's light in reflections, else its background."""
+        environment, rays = self.scene.environment, legs.rays
+        place, ahead = self._on_backdrop(rays)
+        seen = environment.radiance(rays.directions, np.where(legs.bent[:, None], place, rays.backdrop))
+        if environment.seen.kind == "checkerboard":
+            seen[legs.bent & ~ahead] = environment.seen.mean
+        return np.where(legs.reflected[:, None], environment.lighting(rays.directions), seen)
+
+    def _on_backdrop(self, rays: Rays) -> tuple[Array, Mask]:
+        """Places at which rays meet a backdrop that stands across the view behind all objects (`Rays.backdrop`), and a
+        mask.
+        """
+        camera = self.scene.camera
+        low, high = self.scene.bounds - camera.eye
+        farthest = float(np.maximum(low * camera.forward, high * camera.forward).sum())
+        towards = rays.directions @ camera.forward
+        ahead = towards > ACROSS
+        path = np.maximum(farthest - rays.origins @ camera.forward, 0.0) / np.where(ahead, towards, 1.0)
+        points = rays.origins + path[:, None] * rays.directions
+        depth = points @ camera.forward if camera.fov_y is not None else np.ones(len(points))
+        ahead &= depth > 0
+        heights = 2.0 * camera.half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
+        across = np.stack([points @ camera.right, -(points @ camera.up)], axis=1) / heights[:, None]
+        return across + (0.5 * self.aspect, 0.5), ahead
