@@ -1,12 +1,14 @@
 """Whether frames got slower: two checkouts of the project draw the same frames in turns.
 
-``python tools/compare_checkouts.py OLDER [NEWER]``; NEWER is this checkout unless given, and ``git worktree add`` makes
-others. Each draws in a process of its own an absorbing body without interfaces, lights or scattering; the times are
-processor time, which other programs hardly change.
+``python tools/compare_checkouts.py OLDER [NEWER] [--scene SCENE]``; NEWER is this checkout unless given, and
+``git worktree add`` makes others. Each draws in a process of its own; the times are processor time, which other
+programs hardly change. Scenes: ``absorbing`` is a body without interfaces, lights or scattering; ``glass`` a bear with
+interfaces, which covers a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import statistics
 import subprocess
@@ -15,19 +17,38 @@ from pathlib import Path
 
 ROUNDS = 40
 
+_BEAR = """
+mesh = tl.load_mesh("meshes/bear.ply")
+size, center = (640, 480), mesh.vertices.min(axis=0) / 2 + mesh.vertices.max(axis=0) / 2
+glass = tl.Medium(absorption=[share / mesh.diagonal for share in (0.3, 0.6, 1.0)], ior=1.5)
+eye = center + (0, 0, 1.12 * mesh.diagonal)
+camera = tl.Camera.look_at(eye, {target}, fov_y=45.0)
+scene = tl.Scene([tl.Object(mesh, glass)], camera, environment=tl.Environment.constant((1, 1, 1)))
+"""
+
+#: What makes a scene and its size, by any version of the project.
+SCENES = {
+    "absorbing": """
+size = (512, 512)
+scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 0.3, 0.2), 0.01), size)
+""",
+    "glass": _BEAR.format(target="center"),
+    "empty": _BEAR.format(target="2 * eye - center"),
+}
+
 #: Answers every line on its input with the processor time of some frames.
 DRAWS = """
 import time
 import translucent as tl
-scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 0.3, 0.2), 0.01), (512, 512))
+{scene}
 renderer = tl.Renderer()
 for _ in range(5):
-    renderer.render(scene, (512, 512))
+    renderer.render(scene, size, samples=1)
 print("ready", flush=True)
 while input() != "end":
     begin = time.process_time()
     for _ in range(5):
-        renderer.render(scene, (512, 512))
+        renderer.render(scene, size, samples=1)
     print((time.process_time() - begin) / 5, flush=True)
 """
 
@@ -35,11 +56,11 @@ while input() != "end":
 class Checkout:
     """A process that draws with the code of a checkout."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, scene: str) -> None:
         if not (root / "translucent" / "__init__.py").is_file():
             raise SystemExit(f"{root}: no checkout of this project; give the folder that holds translucent/")
         self._process = subprocess.Popen(
-            [sys.executable, "-c", DRAWS],
+            [sys.executable, "-c", DRAWS.format(scene=SCENES[scene])],
             cwd=root,
             env={**os.environ, "PYTHONPATH": str(root)},
             stdin=subprocess.PIPE,
@@ -73,10 +94,12 @@ class Checkout:
 
 def main() -> int:
     """Measure and print."""
-    if not 2 <= len(sys.argv) <= 3:
-        raise SystemExit(__doc__)
-    roots = [Path(text).resolve() for text in sys.argv[1:]] + [Path(__file__).resolve().parents[1]]
-    older, newer = (Checkout(root) for root in roots[:2])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("older", type=Path)
+    parser.add_argument("newer", type=Path, nargs="?", default=Path(__file__).parents[1])
+    parser.add_argument("--scene", choices=SCENES, default="absorbing")
+    chosen = parser.parse_args()
+    older, newer = (Checkout(root.resolve(), chosen.scene) for root in (chosen.older, chosen.newer))
     times: list[tuple[float, float]] = []
     for number in range(ROUNDS):
         if number % 2:
