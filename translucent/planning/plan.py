@@ -152,5 +152,7 @@ def _plan_traced(scene: Scene, method: Method | None, capabilities: Capabilities
         PassSpec(PassName.SHADE, "sheets in order" if sheets else "the intervals between them in order, exactly"),
     )
     limits = (*(chosen.limits(scene) if sheets else open_limits(scene)), *mesh_limits(scene, chosen))
-    unmodelled = unmodelled_effects(scene, scattering=capabilities.scattering and scatters(scene))
+    effects = unmodelled_effects(scene, scattering=capabilities.scattering and scatters(scene))
+    # Rays bend, and are followed.
+    unmodelled = tuple(effect for effect in effects if effect.kind is not NoteKind.REFRACTION)
     return RenderPlan(chosen, passes, True, limits, unmodelled, traced=True)

@@ -1,0 +1,186 @@
+"""Light at the interfaces that beams meet: normals, reflected and refracted shares, and their directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from translucent.arrays import Array, Integers
+from translucent.cpu.beams import Beams
+from translucent.cpu.caster import Caster
+from translucent.cpu.facets import Spread, visible_normals
+from translucent.formulas import optics
+from translucent.formulas.interface import (
+    reflected_direction,
+    refracted_direction,
+    slab_reflectance,
+    slab_transmittance,
+)
+from translucent.reference.interfaces import EDGE_ON, Optics
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places at which beams meet interfaces, one for each beam.
+
+    Attributes
+    ----------
+    item : (k,) int64
+        Whose interface it is.
+    face : (k,) int64
+        Of `Caster.faces`.
+    before, after : (k,) int64
+        Bodies that light is in on this side and on the other, or `AIR`; equal for a sheet.
+    """
+
+    item: Integers
+    face: Integers
+    before: Integers
+    after: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Meetings:
+    """Reflection and refraction at interfaces.
+
+    Attributes
+    ----------
+    item : (k,) int64
+        Whose interfaces these are.
+    normals : (k, 3) float64
+        For shading, towards where the beams come from.
+    ior, alpha, cosine : (k,) float64
+        Index of the other side relative to this one, width of the microfacets' distribution, and cosine of incidence.
+    reflected, refracted : (k, 3) float64
+        Directions.
+    reflectance, passed : (k, 3) float64
+        Shares of light that are mirrored, and not.
+    passing : (k, 3) float64
+        Share that is refracted: what paint leaves of `passed`.
+    emitted : (k, 3) float64
+        Radiance that sheets emit.
+    blur_reflected, blur_refracted : (k,) float64
+        What is added to `Beams.blur`.
+    """
+
+    item: Integers
+    normals: Array
+    ior: Array
+    alpha: Array
+    cosine: Array
+    reflected: Array
+    refracted: Array
+    reflectance: Array
+    passed: Array
+    passing: Array
+    emitted: Array
+    blur_reflected: Array
+    blur_refracted: Array
+
+
+class Interfaces:
+    """Interfaces of a scene for one color of light, or for all together.
+
+    Parameters
+    ----------
+    caster : Caster
+    own : Optics
+    """
+
+    def __init__(self, caster: Caster, own: Optics) -> None:
+        self.caster, self.own = caster, own
+        surfaces = own.surfaces
+        self.alpha = np.array([surface.roughness for surface in surfaces]) ** 2
+        self.transmission = np.array([surface.transmission for surface in surfaces])
+        self.color = np.array([surface.color for surface in surfaces], dtype=np.float64)
+        self.metres = np.array([metres or 0.0 for metres in own.sheets])
+        media = [body.medium for body in own.scene.objects]
+        self.extinction = np.array([np.zeros(3) if m is None else m.extinction for m in media])
+        self.emission = np.stack([own.scene.source(body) for body in own.scene.objects])
+
+    def meet(self, beams: Beams, places: Places, pixel: Integers, spread: Spread | None) -> Meetings:
+        """Reflection and refraction of beams that have come to places, on microfacets if there is a `spread`."""
+        own, directions = self.own, beams.directions
+        sheet = places.before == places.after
+        ior = own.iors[np.where(sheet, places.item, places.after)] / own.iors[places.before]
+        normals, flat = self._normals(places.face, beams)
+        alpha = np.where(ior != 1.0, self.alpha[places.item], 0.0)
+        facets = normals if spread is None else _facets(beams, normals, alpha, pixel, spread)
+        cosine = np.clip(-np.einsum("ki,ki->k", facets, directions), 0.0, 1.0)
+        share = optics.fresnel_dielectric(cosine, ior)[:, None] * np.ones(3)
+        passed, emitted = 1.0 - share, np.zeros((len(beams), 3))
+        refracted = _towards(refracted_direction(directions, facets, ior), -flat)
+        chosen = np.flatnonzero(sheet)
+        if chosen.size:
+            share[chosen], passed[chosen], emitted[chosen] = self._slabs(
+                places.item[chosen], share[chosen], cosine[chosen], ior[chosen]
+            )
+            refracted[chosen] = directions[chosen]
+        enters = sheet | (places.item == places.after)
+        tint = np.where(enters[:, None], self.color[places.item], 1.0) * self.transmission[places.item, None]
+        reflected = _towards(reflected_direction(directions, facets), flat)
+        blurred = (1.0 if spread is None else spread.blurred) * alpha * alpha
+        # A facet turns a mirror image by twice its angle, which a ray that leaves magnifies; refraction, seen from
+        # outside, turns it by n - 1 times that.
+        wide = np.where(ior < 1.0, 1.0 / ior, 1.0)
+        narrow = 0.5 * (np.maximum(ior, 1.0 / ior) - 1.0)
+        return Meetings(
+            places.item,
+            normals,
+            ior,
+            alpha,
+            cosine,
+            reflected,
+            refracted,
+            share,
+            passed,
+            passed * tint,
+            emitted,
+            blurred * wide * wide,
+            blurred * narrow * narrow,
+        )
+
+    def _slabs(self, item: Integers, share: Array, cosine: Array, ior: Array) -> tuple[Array, Array, Array]:
+        """Reflectance, transmittance and emitted radiance (k, 3) of sheets whose surfaces reflect `share` (k, 1)."""
+        path = optics.thin_layer_thickness(self.metres[item], cosine, ior)[:, None]
+        with np.errstate(over="ignore", under="ignore"):
+            depth = self.extinction[item] * path
+            kept = 1.0 - share * optics.transmittance(depth)
+            # What a sheet emits goes back and forth in it, too.
+            leaving = np.where(kept > 0.0, (1.0 - share) / np.where(kept > 0.0, kept, 1.0), 0.0)
+            emitted = leaving * optics.emitted_radiance(self.emission[item], self.extinction[item], path)
+        return slab_reflectance(share, depth), slab_transmittance(share, depth), emitted
+
+    def _normals(self, face: Integers, beams: Beams) -> tuple[Array, Array]:
+        """Unit normals (k, 3) towards where beams come from: for shading, as they face the beams, and of the faces."""
+        caster, directions = self.caster, beams.directions
+        weights = caster.barycentric(face, beams.origins)
+        smooth = np.einsum("kij,ki->kj", caster.smooth[face], weights)
+        flat = caster.faces.outward[face].copy()
+        away = np.einsum("ki,ki->k", flat, directions) > 0
+        flat[away] *= -1.0
+        smooth[away] *= -1.0
+        smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        facing = np.einsum("ki,ki->k", smooth, directions)
+        edge_on = np.flatnonzero(facing > -EDGE_ON)
+        smooth[edge_on] -= (facing[edge_on] + EDGE_ON)[:, None] * directions[edge_on]
+        smooth[edge_on] /= np.linalg.norm(smooth[edge_on], axis=1, keepdims=True)
+        return smooth, flat
+
+
+def _facets(beams: Beams, normals: Array, alpha: Array, pixel: Integers, spread: Spread) -> Array:
+    """(k, 3): normals of microfacets where interfaces are rough, else those of the surface."""
+    rough = np.flatnonzero(alpha > 0)
+    facets = normals.copy()
+    if rough.size:
+        points = spread.at(pixel[rough], beams.met[rough])
+        sampled = alpha[rough] * np.sqrt(1.0 - spread.blurred)
+        facets[rough] = visible_normals(beams.directions[rough], normals[rough], sampled, points)
+    return facets
+
+
+def _towards(directions: Array, side: Array) -> Array:
+    """Directions (k, 3), reflected to the `side` (k, 3) of a face where other normals mislead them."""
+    across = np.minimum(np.einsum("ki,ki->k", directions, side), 0.0)
+    return np.asarray(directions - 2.0 * across[:, None] * side)
