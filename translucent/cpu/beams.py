@@ -52,10 +52,16 @@ class Beams:
         return len(self.owner)
 
     def where(self, chosen: Integers | Mask) -> Beams:
-        """Selection of beams by indices or a mask."""
-        return Beams(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        """Selection of beams by ascending indices or a mask."""
+        index = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+        if len(index) == len(self):  # all of them, since none is chosen twice
+            return self
+        return Beams(*(getattr(self, field.name).take(index, axis=0) for field in fields(self)))
 
 
 def joined(parts: Sequence[Beams]) -> Beams:
     """Concatenate beams; at least one part."""
+    parts = [part for part in parts if len(part)] or parts[:1]
+    if len(parts) == 1:
+        return parts[0]
     return Beams(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Beams)))

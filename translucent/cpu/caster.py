@@ -14,13 +14,14 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.cpu.embree import STEP, embree_scene
+from translucent.cpu.vectors import dot
 from translucent.geometry.normals import drawn_normals
 from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.tracer import TracedObject, center_from
 from translucent.scene.scene import Object
 
 #: Shortest way from a surface to the next, in radii of the scene: anything nearer counts as behind.
-NEAREST = 1e-10
+NEAREST = 1e-13
 
 #: Largest error, in radii, of a place on the plane of a face: beyond it the ray runs along the plane.
 PLANE_ERROR = 1e-4
@@ -167,9 +168,7 @@ class Caster:
         """(k,): distances to the planes of faces, near those that are known roughly."""
         normal = self.faces.outward[face]
         with np.errstate(under="ignore", divide="ignore", invalid="ignore", over="ignore"):
-            exact = np.einsum("ki,ki->k", self.faces.corner[face] - origins, normal) / np.einsum(
-                "ki,ki->k", directions, normal
-            )
+            exact = dot(self.faces.corner[face] - origins, normal) / np.einsum("ki,ki->k", directions, normal)
         return np.where(np.abs(exact - rough) <= PLANE_ERROR, exact, rough)
 
     def nearest_exactly(self, origins: Array, directions: Array) -> tuple[Integers, Array]:
@@ -188,8 +187,8 @@ class Caster:
         """(k, 3): weights of the corners of faces at points (k, 3) on them, in radii from the center."""
         one, other = self.faces.edges[face].transpose(1, 0, 2)
         across = points - self.faces.corner[face]
-        a, b, c = (np.einsum("ki,ki->k", x, y) for x, y in ((one, one), (one, other), (other, other)))
-        p, q = np.einsum("ki,ki->k", across, one), np.einsum("ki,ki->k", across, other)
+        a, b, c = (dot(x, y) for x, y in ((one, one), (one, other), (other, other)))
+        p, q = dot(across, one), dot(across, other)
         area = a * c - b * b
         area = np.where(area > 0, area, 1.0)
         v, w = np.clip((c * p - b * q) / area, 0.0, 1.0), np.clip((a * q - b * p) / area, 0.0, 1.0)

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.cpu.vectors import dot, unit
 
 #: Interfaces of a ray that have points of their own; those behind take them again, with other offsets.
 INTERFACES = 8
@@ -54,10 +55,9 @@ class Spread:
 def visible_normals(directions: Array, normals: Array, alpha: Array, points: tuple[Array, Array]) -> Array:
     """Normals (k, 3) of microfacets that light meets in directions (k, 3), around the normals (k, 3) of a surface."""
     first, second = _frame(normals)
-    towards = np.stack([-_dot(directions, first), -_dot(directions, second), -_dot(directions, normals)], axis=1)
+    towards = np.stack([-dot(directions, first), -dot(directions, second), -dot(directions, normals)], axis=1)
     stretch = np.stack([alpha, alpha, np.ones_like(alpha)], axis=1)
-    seen = towards * stretch
-    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    seen = unit(towards * stretch)
     one, other = _frame(seen)
     radius, angle = np.sqrt(points[0]), 2.0 * np.pi * points[1]
     x, y = radius * np.cos(angle), radius * np.sin(angle)
@@ -67,7 +67,7 @@ def visible_normals(directions: Array, normals: Array, alpha: Array, points: tup
     z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
     facet = (x[:, None] * one + y[:, None] * other + z[:, None] * seen) * stretch
     facet[:, 2] = np.maximum(facet[:, 2], 0.0)
-    facet /= np.linalg.norm(facet, axis=1, keepdims=True)
+    facet = unit(facet)
     return np.asarray(facet[:, :1] * first + facet[:, 1:2] * second + facet[:, 2:] * normals)
 
 
@@ -81,10 +81,6 @@ def _frame(normals: Array) -> tuple[Array, Array]:
         np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1),
         np.stack([b, sign + y * y * a, -y], axis=1),
     )
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("ki,ki->k", a, b))
 
 
 @lru_cache(maxsize=4)

@@ -6,6 +6,7 @@ import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.cpu.meetings import Meetings
+from translucent.cpu.vectors import dot, unit
 from translucent.formulas import optics
 from translucent.formulas.interface import ggx_distribution, ggx_visibility, slab_reflectance
 from translucent.reference.interfaces import Optics
@@ -62,18 +63,16 @@ class InterfaceLight:
     def _add_highlights(self, found: Array, rays: Rays, met: Meetings, rough: Integers) -> None:
         """Add single reflections of lights without shadows."""
         points, normals, to_eye = rays.origins[rough], met.normals[rough], -rays.directions[rough]
-        cos_view = np.clip(np.einsum("ki,ki->k", normals, to_eye), 0.0, 1.0)
+        cos_view = np.clip(dot(normals, to_eye), 0.0, 1.0)
         for light in self.scene.lights:
             own = seen_from(light, self.scene.camera.eye)
             if isinstance(own, PointLight):
-                to_light = np.asarray(own.position) - points
-                to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+                to_light = unit(np.asarray(own.position) - points)
             else:
                 to_light = np.broadcast_to(-np.asarray(own.direction), points.shape)
-            half = to_eye + to_light
-            half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-            cos_half, cos_light = (np.clip(np.einsum("ki,ki->k", normals, way), 0.0, 1.0) for way in (half, to_light))
-            cos_facet = np.clip(np.einsum("ki,ki->k", half, to_eye), 0.0, 1.0)
+            half = unit(to_eye + to_light)
+            cos_half, cos_light = (np.clip(dot(normals, way), 0.0, 1.0) for way in (half, to_light))
+            cos_facet = np.clip(dot(half, to_eye), 0.0, 1.0)
             share = self._mirrored(met.item[rough], cos_facet, met.ior[rough])
             density = ggx_distribution(cos_half, met.alpha[rough])
             visible = ggx_visibility(cos_light, cos_view, met.alpha[rough])

@@ -10,6 +10,7 @@ from translucent.arrays import Array, Integers
 from translucent.cpu.beams import Beams
 from translucent.cpu.caster import Caster
 from translucent.cpu.facets import Spread, visible_normals
+from translucent.cpu.vectors import dot, unit
 from translucent.formulas import optics
 from translucent.formulas.interface import (
     reflected_direction,
@@ -107,7 +108,7 @@ class Interfaces:
         normals, flat = self._normals(places.face, beams)
         alpha = np.where(ior != 1.0, self.alpha[places.item], 0.0)
         facets = normals if spread is None else _facets(beams, normals, alpha, pixel, spread)
-        cosine = np.clip(-np.einsum("ki,ki->k", facets, directions), 0.0, 1.0)
+        cosine = np.clip(-dot(facets, directions), 0.0, 1.0)
         share = optics.fresnel_dielectric(cosine, ior)[:, None] * np.ones(3)
         passed, emitted = 1.0 - share, np.zeros((len(beams), 3))
         refracted = _towards(refracted_direction(directions, facets, ior), -flat)
@@ -158,14 +159,14 @@ class Interfaces:
         weights = caster.barycentric(face, beams.origins)
         smooth = np.einsum("kij,ki->kj", caster.smooth[face], weights)
         flat = caster.faces.outward[face].copy()
-        away = np.einsum("ki,ki->k", flat, directions) > 0
+        away = dot(flat, directions) > 0
         flat[away] *= -1.0
         smooth[away] *= -1.0
-        smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-        facing = np.einsum("ki,ki->k", smooth, directions)
+        smooth = unit(smooth)
+        facing = dot(smooth, directions)
         edge_on = np.flatnonzero(facing > -EDGE_ON)
         smooth[edge_on] -= (facing[edge_on] + EDGE_ON)[:, None] * directions[edge_on]
-        smooth[edge_on] /= np.linalg.norm(smooth[edge_on], axis=1, keepdims=True)
+        smooth[edge_on] = unit(smooth[edge_on])
         return smooth, flat
 
 
@@ -182,5 +183,5 @@ def _facets(beams: Beams, normals: Array, alpha: Array, pixel: Integers, spread:
 
 def _towards(directions: Array, side: Array) -> Array:
     """Directions (k, 3), reflected to the `side` (k, 3) of a face where other normals mislead them."""
-    across = np.minimum(np.einsum("ki,ki->k", directions, side), 0.0)
+    across = np.minimum(dot(directions, side), 0.0)
     return np.asarray(directions - 2.0 * across[:, None] * side)

@@ -22,6 +22,7 @@ from translucent.cpu.legs import LegMedia
 from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, empty_records, enter, has, leave
 from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
+from translucent.cpu.vectors import dot, largest, unit
 from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
@@ -143,7 +144,7 @@ class _Growth:
             np.zeros(count),
         )
         # The eye may be far away, where float32 is coarse.
-        start = np.maximum(-np.einsum("ki,ki->k", origins, rays.directions) - BEFORE, 0.0)
+        start = np.maximum(-dot(origins, rays.directions) - BEFORE, 0.0)
         beams = self._step(beams, start)
         while len(beams):
             beams = self._step(beams)
@@ -179,10 +180,10 @@ class _Growth:
         """Follow beams to the next surfaces; what continues from there."""
         face, distance = self.caster.nearest(beams.origins, beams.directions, beams.last, start)
         self._correct(beams, face, distance)
-        place = distance.min(axis=1)
+        place = -largest(-distance)
         free = np.isinf(place)
         self._look_up(beams.where(free))
-        open_ended = (beams.record[free] != NOTHING).any(axis=1)
+        open_ended = beams.record[free, 0] != NOTHING
         self.found.valid[beams.owner[free][open_ended]] = False
         met = np.flatnonzero(~free)
         face = np.where(distance[met] <= place[met, None] + TOGETHER, face[met], -1)
@@ -192,8 +193,8 @@ class _Growth:
 
     def _correct(self, beams: Beams, face: Integers, distance: Array) -> None:
         """Search in float64 where surfaces do not fit the records: beams leave what they are not in, or never leave."""
-        place = distance.min(axis=1)
-        doubt: Mask = np.isinf(place) & (beams.record != NOTHING).any(axis=1)
+        place = -largest(-distance)
+        doubt: Mask = np.isinf(place) & (beams.record[:, 0] != NOTHING)
         for own, at in zip(face.T, distance.T, strict=True):
             ray = np.flatnonzero((own >= 0) & (at <= place + TOGETHER))
             item = self.caster.faces.item[own[ray]]
@@ -204,7 +205,7 @@ class _Growth:
             face[some], distance[some] = self.caster.nearest_exactly(beams.origins[some], beams.directions[some])
 
     def _enters(self, face: Integers, directions: Array) -> Mask:
-        return np.asarray(np.einsum("ki,ki->k", self.caster.faces.outward[face], directions) < 0)
+        return np.asarray(dot(self.caster.faces.outward[face], directions) < 0)
 
     def _through_media(self, beams: Beams, length: Array) -> Beams:
         """Attenuate beams over the distances (n,) to the next surface, in radii, and add what media emit."""
@@ -274,15 +275,18 @@ class _Growth:
         self._add(beams, self.light.radiance(self._rays(beams), met))
         beams = replace(beams, met=beams.met + 1)
         back, on = self._both(beams, there, met, places.before == places.after)
-        is_back, is_on = back.throughput.any(axis=1), on.throughput.any(axis=1)
+        brightness = largest(back.throughput), largest(on.throughput)
+        is_back, is_on = (bright > 0.0 for bright in brightness)
         stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE
         more = beams.met < self.tree.depth
         forks = beams.forks > 0
         back = replace(back, forks=np.where(stronger, beams.forks, beams.forks - (is_on & forks)))
         on = replace(on, forks=np.where(stronger, beams.forks - (is_back & forks), beams.forks))
         kept = []
-        for branch, exists, first in ((back, is_back, stronger | ~is_on), (on, is_on, ~stronger | ~is_back)):
-            follow = exists & more & (first | forks) & (branch.throughput >= FAINTEST).any(axis=1)
+        firsts = stronger | ~is_on, ~stronger | ~is_back
+        for branch, bright, first in zip((back, on), brightness, firsts, strict=True):
+            exists = bright > 0.0
+            follow = more & (first | forks) & (bright >= FAINTEST)
             self._look_up(branch.where(exists & ~follow))
             kept.append(branch.where(follow))
         return kept
@@ -294,15 +298,15 @@ class _Growth:
         ways = met.reflected.copy()
         # A path that ends under total reflection is taken to leave straight on: of all that it might see, this is
         # nearest to the truth.
-        trapped = (beams.met >= self.tree.depth) & ~met.passed.any(axis=1) & ~sheet
+        trapped = (beams.met >= self.tree.depth) & (largest(met.passed) == 0.0) & ~sheet
         ways[trapped] = beams.directions[trapped]
         mirrored = np.ones(len(beams), dtype=bool)
         reflected = replace(
-            beams, directions=_unit(ways), throughput=back, reflected=mirrored, blur=beams.blur + met.blur_reflected
+            beams, directions=unit(ways), throughput=back, reflected=mirrored, blur=beams.blur + met.blur_reflected
         )
         refracted = replace(
             beams,
-            directions=_unit(met.refracted),
+            directions=unit(met.refracted),
             throughput=on,
             record=np.where(sheet[:, None], beams.record, there),
             blur=beams.blur + met.blur_refracted,
@@ -330,9 +334,3 @@ class _Growth:
             light = beams.throughput * radiance
         for channel in range(3):
             self.found.radiance[:, channel] += np.bincount(beams.owner, light[:, channel], len(self.found.valid))
-
-
-def _unit(directions: Array) -> Array:
-    """Directions (k, 3) with their length made 1, or left at 0."""
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    return np.asarray(directions / np.where(length > 0.0, length, 1.0))
