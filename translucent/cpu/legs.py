@@ -55,16 +55,11 @@ class LegMedia:
         )
         return self._composited(rays, intervals, [_no_hits()] * len(self.films), (None,) * len(self.films))
 
-    def through_films(self, rays: Rays, item: Integers, face: Integers, weights: Array) -> tuple[Array, Array]:
-        """Emitted radiance and transmittance (k, 3) of sheets, item (k,), at the origins of rays.
-
-        `face` (k,) and `weights` (k, 3) are as `Hits` has them.
-        """
+    def through_films(self, rays: Rays, item: Integers, seen: Hits) -> tuple[Array, Array]:
+        """Emitted radiance and transmittance (k, 3) of sheets, item (k,), at the origins of rays; a hit on each."""
         hits = [_no_hits()] * len(self.films)
         for i in np.unique(item):
-            own = np.flatnonzero(item == i)
-            sign = np.ones(len(own), dtype=np.int8)
-            hits[i] = Hits(own, np.zeros(len(own)), sign, face[own], weights[own])
+            hits[i] = seen.where(item == i)
         none = np.empty(0, np.int64)
         return self._composited(rays, Intervals(none, np.empty(0), np.empty(0), none, none), hits, self.films)
 

@@ -51,8 +51,8 @@ class Meetings:
         Whose interfaces these are.
     normals : (k, 3) float64
         For shading, towards where the beams come from.
-    ior, alpha, cosine : (k,) float64
-        Index of the other side relative to this one, width of the microfacets' distribution, and cosine of incidence.
+    ior, alpha : (k,) float64
+        Index of the other side relative to this one, and width of the microfacets' distribution.
     reflected, refracted : (k, 3) float64
         Directions.
     reflectance, passed : (k, 3) float64
@@ -69,7 +69,6 @@ class Meetings:
     normals: Array
     ior: Array
     alpha: Array
-    cosine: Array
     reflected: Array
     refracted: Array
     reflectance: Array
@@ -126,20 +125,10 @@ class Interfaces:
         # outside, turns it by n - 1 times that.
         wide = np.where(ior < 1.0, 1.0 / ior, 1.0)
         narrow = 0.5 * (np.maximum(ior, 1.0 / ior) - 1.0)
+        # Light goes straight on through a sheet: its two interfaces do no more than to blur.
+        shares, narrow_blur = (share, passed, passed * tint, emitted), np.where(sheet, 2.0 * alpha * alpha, blurred)
         return Meetings(
-            places.item,
-            normals,
-            ior,
-            alpha,
-            cosine,
-            reflected,
-            refracted,
-            share,
-            passed,
-            passed * tint,
-            emitted,
-            blurred * wide * wide,
-            blurred * narrow * narrow,
+            places.item, normals, ior, alpha, reflected, refracted, *shares, blurred * wide**2, narrow_blur * narrow**2
         )
 
     def _slabs(self, item: Integers, share: Array, cosine: Array, ior: Array) -> tuple[Array, Array, Array]:

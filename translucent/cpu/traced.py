@@ -106,14 +106,8 @@ class _Growth:
     def __init__(
         self, tree: RayTree, own: Optics, found: TracedLight, backdrop: Array, pixel: Integers, spread: Spread | None
     ) -> None:
-        self.tree, self.own, self.found, self.backdrop, self.pixel, self.spread = (
-            tree,
-            own,
-            found,
-            backdrop,
-            pixel,
-            spread,
-        )
+        self.tree, self.own, self.found = tree, own, found
+        self.backdrop, self.pixel, self.spread = backdrop, pixel, spread
         self.scene, self.caster = tree.scene, tree.caster
         self.media = RecordedMedia(tree.scene, own)
         self.legs = LegMedia(tree.scene, own, self.media)
@@ -257,11 +251,11 @@ class _Growth:
         for column in np.flatnonzero(self.is_film[item].any(axis=0)):
             chosen = np.flatnonzero(self.is_film[item[:, column]])
             own = beams.where(chosen)
-            face = own.last[:, column]
+            face, ray = own.last[:, column], np.arange(len(own))
+            sign = np.where(self._enters(face, own.directions), 1, -1).astype(np.int8)
             weights = self.caster.barycentric(face, own.origins)
-            shown, passed = self.legs.through_films(
-                self._rays(own), item[chosen, column], self.caster.faces.number[face], weights
-            )
+            seen = Hits(ray, np.zeros(len(own)), sign, self.caster.faces.number[face], weights)
+            shown, passed = self.legs.through_films(self._rays(own), item[chosen, column], seen)
             self._add(own, shown)
             throughput = beams.throughput.copy()
             with np.errstate(under="ignore"):
