@@ -20,6 +20,9 @@ from translucent.formulas.interface import (
 )
 from translucent.reference.interfaces import EDGE_ON, Optics
 
+#: Share of light below which a microfacet counts as blocked.
+LEAST_LET_OUT = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -106,15 +109,22 @@ class Interfaces:
         ior = own.iors[np.where(sheet, places.item, places.after)] / own.iors[places.before]
         normals, flat = self._normals(places.face, beams)
         alpha = np.where(ior != 1.0, self.alpha[places.item], 0.0)
-        facets = normals if spread is None else _facets(beams, normals, alpha, pixel, spread)
-        cosine = np.clip(-dot(facets, directions), 0.0, 1.0)
-        share = optics.fresnel_dielectric(cosine, ior)[:, None] * np.ones(3)
+        facets, share = normals, optics.fresnel_dielectric(_facing(directions, normals), ior)
+        rough = np.flatnonzero(alpha > 0)
+        if spread is not None and rough.size:
+            facets, points = normals.copy(), spread.at(pixel[rough], beams.met[rough])
+            sampled = alpha[rough] * np.sqrt(1.0 - spread.blurred)
+            facets[rough] = visible_normals(directions[rough], normals[rough], sampled, points)
+            facets[rough], share[rough] = _at_facets(
+                directions[rough], normals[rough], facets[rough], ior[rough], alpha[rough]
+            )
+        share = share[:, None] * np.ones(3)
         passed, emitted = 1.0 - share, np.zeros((len(beams), 3))
         refracted = _towards(refracted_direction(directions, facets, ior), -flat)
         chosen = np.flatnonzero(sheet)
         if chosen.size:
             share[chosen], passed[chosen], emitted[chosen] = self._slabs(
-                places.item[chosen], share[chosen], cosine[chosen], ior[chosen]
+                places.item[chosen], share[chosen], _facing(directions[chosen], facets[chosen]), ior[chosen]
             )
             refracted[chosen] = directions[chosen]
         enters = sheet | (places.item == places.after)
@@ -159,15 +169,33 @@ class Interfaces:
         return smooth, flat
 
 
-def _facets(beams: Beams, normals: Array, alpha: Array, pixel: Integers, spread: Spread) -> Array:
-    """(k, 3): normals of microfacets where interfaces are rough, else those of the surface."""
-    rough = np.flatnonzero(alpha > 0)
-    facets = normals.copy()
-    if rough.size:
-        points = spread.at(pixel[rough], beams.met[rough])
-        sampled = alpha[rough] * np.sqrt(1.0 - spread.blurred)
-        facets[rough] = visible_normals(beams.directions[rough], normals[rough], sampled, points)
-    return facets
+def _at_facets(directions: Array, normals: Array, facets: Array, ior: Array, alpha: Array) -> tuple[Array, Array]:
+    """Microfacets (k, 3) that light leaves, and the share (k,) that they reflect.
+
+    Light that other microfacets would block leaves by the other branch: each has the part of Fresnel's share that
+    Smith's masking lets out (Heitz 2014, eq. 43), and together they have all. Where nothing is let out, the surface
+    itself takes the place of the microfacet.
+    """
+    share = optics.fresnel_dielectric(_facing(directions, facets), ior)
+    back = _let_out(dot(reflected_direction(directions, facets), normals), alpha) * share
+    on = _let_out(-dot(refracted_direction(directions, facets, ior), normals), alpha) * (1.0 - share)
+    both = back + on
+    blocked = both <= LEAST_LET_OUT
+    smooth = optics.fresnel_dielectric(_facing(directions, normals), ior)
+    share = np.where(blocked, smooth, back / np.where(blocked, 1.0, both))
+    return np.where(blocked[:, None], normals, facets), share
+
+
+def _let_out(cosine: Array, alpha: Array) -> Array:
+    """Smith's masking 2 / (1 + sqrt(1 + alpha^2 tan^2)) of GGX in a direction, by its cosine to the side it goes to."""
+    c = np.maximum(cosine, 0.0)
+    with np.errstate(under="ignore"):
+        root = np.sqrt(c * c + alpha * alpha * (1.0 - c) * (1.0 + c))
+    return np.asarray(2.0 * c / (c + root))
+
+
+def _facing(directions: Array, normals: Array) -> Array:
+    return np.clip(-dot(normals, directions), 0.0, 1.0)
 
 
 def _towards(directions: Array, side: Array) -> Array:
