@@ -314,7 +314,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         }
 #if FORKS > 0
         weaker.forks -= first ? 0 : 1;
-        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > 120.0 * FAINTEST) {
+        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > 12.0 * FAINTEST) {
             waiting[waits++] = weaker;
         } else
 #endif

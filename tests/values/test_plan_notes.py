@@ -72,7 +72,6 @@ def test_every_pass_has_a_name_and_every_note_a_kind(kind: str) -> None:
         (scene(body(MILK), ambient=(1, 1, 1)), None, Capabilities(), NoteKind.DIMMED_AMBIENT),
         (scene(body(WINE), lights=LIT), None, Capabilities(), NoteKind.UNUSED_LIGHTS),
         (scene(body(DIAMOND)), None, Capabilities(), NoteKind.LATER_REFRACTION),
-        (scene(body(DIAMOND)), None, TRACED, NoteKind.REFRACTION),
         (scene(body(), body(None)), None, Capabilities(), NoteKind.SHADOWS),
         (scene(body(tl.Medium())), None, Capabilities(), NoteKind.INVISIBLE),
         (scene(body(), body(x=3, priority=1)), None, Capabilities(), NoteKind.UNUSED_PRIORITIES),

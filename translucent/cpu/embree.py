@@ -50,7 +50,7 @@ class EmbreeMesh:
         self.radius = 0.5 * mesh.diagonal
         with np.errstate(under="ignore"):
             vertices = ((mesh.vertices - self.center) / self.radius).astype(np.float32)
-        self.scene = _embree_scene(vertices, mesh.faces)
+        self.scene = embree_scene(vertices, mesh.faces)
 
     def candidates(
         self, origins: Array, directions: Array, expected: Integers, counted: Mask
@@ -128,7 +128,8 @@ def _import_embreex() -> None:
         ) from None
 
 
-def _embree_scene(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int32]) -> EmbreeScene:
+def embree_scene(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int32]) -> EmbreeScene:
+    """Embree scene of triangles, ready for rays; raises `RenderError` if embreex cannot be imported."""
     _import_embreex()
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene

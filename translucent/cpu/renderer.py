@@ -11,7 +11,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from translucent.cpu.bending import BentLight
+from translucent.cpu.caster import Caster
 from translucent.cpu.embree import embree_versions
+from translucent.cpu.facets import Spread
 from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.shading import Arrays, Shader
@@ -21,9 +24,13 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.geometry.mesh import Mesh
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.reference.refraction import bends
 from translucent.scene.scene import Scene
 
 Seconds = dict[str, float]
+
+#: Meshes of a scene and where they are, as bytes.
+_Shapes = tuple[tuple[Mesh, bytes], ...]
 
 _COLORS = ("radiance", "transmittance", "optical_depth")
 _FLAGS = ("coverage", "valid")
@@ -34,6 +41,8 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 class CpuRenderer:
     """Renderer on the processors: the shading of the reference, on its exact hits, which Embree finds quickly.
+
+    Where interfaces bend rays, radiance is that of `RayTree`, and all else that of the straight rays.
 
     Parameters
     ----------
@@ -50,6 +59,7 @@ class CpuRenderer:
         self._threads = threads or processors()
         self._embree = embree_versions()
         self._meshes: WeakKeyDictionary[Mesh, TracedMesh] = WeakKeyDictionary()
+        self._caster: tuple[_Shapes, Caster] | None = None
         self._closed = False
 
     @property
@@ -94,11 +104,15 @@ class CpuRenderer:
         shader = Shader.of(scene, plan)
         picture = Picture.of(scene.camera, size)
         arrays = _empty(picture.size)
-        seconds = self._draw(shader, picture, partial(_store, arrays))
+        bent = self._bent_light(shader, picture, plan)
+        prepared = time.perf_counter() - started
+        seconds = self._draw(shader, picture, bent, partial(_store, arrays))
+        seconds["prepare"] += prepared
         if samples > 1:
             for number, shift in enumerate(sample_shifts(samples).tolist(), 1):
                 picture = Picture.of(scene.camera, size, tuple(shift))
-                spent = self._draw(shader, picture, partial(_average, arrays, number))
+                spread = Spread(number - 1, samples)
+                spent = self._draw(shader, picture, bent, partial(_average, arrays, number), spread)
                 seconds = {name: seconds[name] + spent[name] for name in seconds}
         seconds["total"] = time.perf_counter() - started
         return Frame(**arrays, plan=plan, seconds=seconds, provenance=self.provenance)
@@ -107,8 +121,26 @@ class CpuRenderer:
         """Free the cached meshes. Closing twice is fine."""
         self._closed = True
         self._meshes.clear()
+        self._caster = None
 
-    def _draw(self, shader: Shader, picture: Picture, keep: Callable[[Band, Arrays], None]) -> Seconds:
+    def _bent_light(self, shader: Shader, picture: Picture, plan: RenderPlan) -> BentLight | None:
+        """Rays that bend in a scene, if its bodies have interfaces; the last scene's shapes are kept."""
+        scene = shader.scene
+        if not bends(scene) or plan.interfaces is None:
+            return None
+        shapes = tuple((body.mesh, body.matrix.tobytes()) for body in scene.objects)
+        if self._caster is None or self._caster[0] != shapes:
+            self._caster = shapes, Caster(scene.objects, scene.bounds)
+        return BentLight.of(shader, self._caster[1], picture.size, *plan.interfaces.tree)
+
+    def _draw(
+        self,
+        shader: Shader,
+        picture: Picture,
+        bent: BentLight | None,
+        keep: Callable[[Band, Arrays], None],
+        spread: Spread | None = None,
+    ) -> Seconds:
         """Shade a picture, and pass each band of it to `keep`; returns the seconds of each part."""
         started = time.perf_counter()
         objects = shader.scene.objects
@@ -122,7 +154,11 @@ class CpuRenderer:
             began = time.perf_counter()
             hits = [tracer.hits(band) for tracer in tracers]
             crossed = time.perf_counter()
-            keep(band, shader.shade(picture.rays(band), hits))
+            rays = picture.rays(band)
+            shaded = shader.shade(rays, hits)
+            if bent is not None:
+                bent.put_into(shaded, rays, hits, band, spread)
+            keep(band, shaded)
             return crossed - began, time.perf_counter() - crossed
 
         intersect, shade = np.sum(in_threads(draw, picture.bands(), self._threads), axis=0) / self._threads

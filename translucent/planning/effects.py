@@ -13,6 +13,11 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Object, Scene, object_names
 
+#: Note of a plan in which interfaces do nothing to light.
+STRAIGHT = Note(
+    NoteKind.REFRACTION, "refraction and reflection: rays go straight, though interfaces bend and mirror them"
+)
+
 
 def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces | None = None) -> tuple[Note, ...]:
     """Notes on effects that the scene asks for and a plan does not render.
@@ -88,8 +93,7 @@ def _refraction_effects(scene: Scene, interfaces: Interfaces | None) -> list[Not
     if not any(body.has_interface for body in scene.bodies):
         return []
     if interfaces is None:
-        text = "refraction and reflection: rays go straight, though interfaces bend and mirror them"
-        return [Note(NoteKind.REFRACTION, text)]
+        return [STRAIGHT]
     return interfaces.unmodelled()
 
 

@@ -8,8 +8,9 @@ from translucent.errors import InputError
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
 from translucent.planning.effects import unmodelled_effects, with_ambient_told
-from translucent.planning.interface_choice import check_interfaces, chosen_interfaces, with_fallback_told
-from translucent.planning.interfaces import Interfaces, ScreenInterfaces
+from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
+from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
+from translucent.planning.interfaces.places import with_interfaces
 from translucent.planning.limits import marching_method, mesh_limits, open_limits
 from translucent.planning.methods import DepthPeeling, FragmentLists, Method, SignedDepth, ThinLayer
 from translucent.planning.notes import Note, NoteKind
@@ -156,6 +157,8 @@ def _plan_traced(
     reason = "no OpenGL: all surfaces on each ray, in float64"
     if method is not None and not sheets:
         reason += f", in place of {method}, which was asked for"
+    if followed is not None and interfaces is not None and not interfaces.traced:
+        reason += f"; and {followed} in place of {interfaces}"
     passes = (
         PassSpec(PassName.INTERSECT, reason, tuple(range(len(scene.objects))), 1),
         PassSpec(PassName.SHADE, "sheets in order" if sheets else "the intervals between them in order, exactly"),
@@ -166,5 +169,7 @@ def _plan_traced(
 
 
 def _followed(scene: Scene, interfaces: Interfaces | None) -> Interfaces | None:
-    """The interfaces that a renderer without OpenGL follows: none yet, whatever is asked for."""
-    return None
+    """The interfaces that a renderer without OpenGL follows: all, whatever is asked for, as far as tracing would."""
+    if not with_interfaces(scene):
+        return None
+    return interfaces if interfaces is not None and interfaces.traced else TracedInterfaces(depth=USUAL_DEPTH)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,11 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
+from translucent.planning.effects import STRAIGHT
 from translucent.planning.methods import Method
+from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
-from translucent.planning.render_plan import Capabilities
+from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.reference.compositing import composite
 from translucent.reference.emission import emission_of_mixtures
 from translucent.reference.hits import Hits, line_hits
@@ -101,11 +103,12 @@ def render(
     size = check_size(size)
     if not 1e-12 <= tolerance <= 1:
         raise InputError(f"tolerance {tolerance}", "not in 1e-12 to 1", f"use for example {TOLERANCE:g}")
+    bent = bends(scene) if refraction is None else refraction
     chosen = plan(scene, method if method is not None and method.makes_sheets else None, TRACED)
+    chosen = _with_own_interfaces(chosen, bent)
     hits = scene_hits(scene, size)
     crossed = time.perf_counter()
     rays, sheets = pixel_rays(scene.camera, size), sheet_thicknesses(scene, method)
-    bent = bends(scene) if refraction is None else refraction
     scatters = scene.lights and not bent and Volume(scene).scatters
     light_paths = LightPaths(scene, sheets) if scatters else None
     found = []
@@ -132,6 +135,14 @@ def render(
         seconds={"intersect": crossed - start, "shade": end - crossed, "total": end - start},
         provenance=provenance,
     )
+
+
+def _with_own_interfaces(chosen: RenderPlan, bent: bool) -> RenderPlan:
+    """The plan with what it says of interfaces as the reference treats them: the whole tree of rays, or none."""
+    notes = [note for note in chosen.unmodelled if note.kind is not NoteKind.CUT_OFF_PATHS]
+    if len(notes) < len(chosen.unmodelled) and not bent:
+        notes.append(STRAIGHT)
+    return replace(chosen, interfaces=None, unmodelled=tuple(notes))
 
 
 def shade_hits(

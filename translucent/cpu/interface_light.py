@@ -1,0 +1,88 @@
+"""Light that interfaces add themselves: that of paint on them, and the highlights of lights in rough ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from translucent.arrays import Array, Integers
+from translucent.cpu.meetings import Meetings
+from translucent.cpu.vectors import dot, unit
+from translucent.formulas import optics
+from translucent.formulas.interface import ggx_distribution, ggx_visibility, slab_reflectance
+from translucent.reference.interfaces import Optics
+from translucent.reference.opaque import irradiance_at, seen_from
+from translucent.reference.rays import Rays
+from translucent.scene.lights import PointLight
+
+
+class InterfaceLight:
+    """Light of the interfaces of a scene.
+
+    Parameters
+    ----------
+    own : Optics
+    """
+
+    def __init__(self, own: Optics) -> None:
+        self.scene = own.scene
+        surfaces = own.surfaces
+        self._paint = np.array([1.0 - surface.transmission for surface in surfaces])
+        self._color = np.array([surface.color for surface in surfaces], dtype=np.float64)
+        self._through = np.array([surface.diffuse_transmission for surface in surfaces])
+        self._through_color = np.array([surface.diffuse_transmission_color for surface in surfaces], dtype=np.float64)
+        media = [body.medium for body in own.scene.objects]
+        # Of sheets, straight through.
+        self._depth = np.array(
+            [
+                (metres or 0.0) * (np.zeros(3) if medium is None else medium.extinction)
+                for metres, medium in zip(own.sheets, media, strict=True)
+            ]
+        )
+        self._is_sheet = np.array([metres is not None for metres in own.sheets])
+
+    def radiance(self, rays: Rays, met: Meetings) -> Array:
+        """(k, 3): radiance at the origins of rays, in metres from the eye, against their directions."""
+        found = met.emitted.copy()
+        if self._paint.any():
+            self._add_paint(found, rays, met)
+        rough = np.flatnonzero(met.alpha > 0) if self.scene.lights else np.empty(0, np.int64)
+        if rough.size:
+            self._add_highlights(found, rays, met, rough)
+        return found
+
+    def _add_paint(self, found: Array, rays: Rays, met: Meetings) -> None:
+        share = met.passed * self._paint[met.item, None]
+        painted = np.flatnonzero((share > 0.0).any(axis=1))
+        item, points, normals = met.item[painted], rays.origins[painted], met.normals[painted]
+        through = self._through[item, None]
+        front, back = (irradiance_at(self.scene, points, side * normals) for side in (1.0, -1.0))
+        with np.errstate(under="ignore"):
+            light = self._color[item] * (1.0 - through) * front + through * self._through_color[item] * back
+            found[painted] += share[painted] / np.pi * light
+
+    def _add_highlights(self, found: Array, rays: Rays, met: Meetings, rough: Integers) -> None:
+        """Add single reflections of lights without shadows."""
+        points, normals, to_eye = rays.origins[rough], met.normals[rough], -rays.directions[rough]
+        cos_view = np.clip(dot(normals, to_eye), 0.0, 1.0)
+        for light in self.scene.lights:
+            own = seen_from(light, self.scene.camera.eye)
+            if isinstance(own, PointLight):
+                to_light = unit(np.asarray(own.position) - points)
+            else:
+                to_light = np.broadcast_to(-np.asarray(own.direction), points.shape)
+            half = unit(to_eye + to_light)
+            cos_half, cos_light = (np.clip(dot(normals, way), 0.0, 1.0) for way in (half, to_light))
+            cos_facet = np.clip(dot(half, to_eye), 0.0, 1.0)
+            share = self._mirrored(met.item[rough], cos_facet, met.ior[rough])
+            density = ggx_distribution(cos_half, met.alpha[rough])
+            visible = ggx_visibility(cos_light, cos_view, met.alpha[rough])
+            with np.errstate(under="ignore"):
+                found[rough] += share * (density * visible)[:, None] * own.irradiance_on(points, normals)
+
+    def _mirrored(self, item: Integers, cosine: Array, ior: Array) -> Array:
+        """(k, 3): share of light that microfacets mirror, those of sheets from both sides."""
+        share = optics.fresnel_dielectric(cosine, ior)[:, None]
+        path = optics.thin_layer_thickness(1.0, cosine, ior)[:, None]
+        with np.errstate(over="ignore"):
+            depth = self._depth[item] * path
+        return np.where(self._is_sheet[item, None], slab_reflectance(share, depth), share)

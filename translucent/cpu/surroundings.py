@@ -1,0 +1,96 @@
+"""What beams see that leave a scene: its environment's light in reflections, else its background."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from translucent.arrays import Array, Mask
+from translucent.cpu.beams import Beams
+from translucent.reference.rays import Rays
+from translucent.reference.refracted import ACROSS
+from translucent.scene.environment import Environment, equirectangular_uv
+from translucent.scene.environment_filter import filtered
+from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.scene import Scene
+
+
+class Surroundings:
+    """Environment of a scene, as beams see it.
+
+    Parameters
+    ----------
+    scene : Scene
+    aspect : float
+        Width of the picture divided by its height.
+    """
+
+    def __init__(self, scene: Scene, aspect: float) -> None:
+        self.scene, self.aspect, self.environment = scene, aspect, scene.environment
+
+    @cached_property
+    def _maps(self) -> tuple[EnvironmentMap, ...]:
+        """Maps of the environment's light, from that of a mirror to that of a surface of roughness 1."""
+        found = filtered(self.environment)
+        return found.sharp, *(EnvironmentMap(level) for level in found.levels)
+
+    def radiance(self, beams: Beams, rays: Rays) -> Array:
+        """(n, 3): radiance along beams that nothing stops, which are `rays` in metres from the eye.
+
+        `Rays.backdrop` is where rays that have met no interface are in the picture.
+        """
+        environment = self.environment
+        if environment.seen is environment and environment.kind != "checkerboard":
+            return self._light(environment, beams)
+        seen = self._background(environment.seen, beams, rays)
+        mirrored = np.flatnonzero(beams.reflected)
+        if mirrored.size:
+            seen[mirrored] = self._light(environment, beams.where(mirrored))
+        return seen
+
+    def _light(self, environment: Environment, beams: Beams) -> Array:
+        blur = beams.blur
+        # A gradient is smooth already.
+        if environment.map is None or environment.map is not self.environment.map or not blur.any():
+            return environment.lighting(beams.directions)
+        return environment.scale * blurred_lookups(
+            self._maps, equirectangular_uv(beams.directions, environment.turn), np.minimum(blur**0.25, 1.0)
+        )
+
+    def _background(self, seen: Environment, beams: Beams, rays: Rays) -> Array:
+        if seen.kind != "checkerboard":
+            return self._light(seen, beams)
+        place, ahead = self._on_backdrop(rays)
+        bent = beams.met > 0
+        found = seen.radiance(rays.directions, np.where(bent[:, None], place, rays.backdrop))
+        found[bent & ~ahead] = seen.mean
+        return found
+
+    def _on_backdrop(self, rays: Rays) -> tuple[Array, Mask]:
+        """Places in the picture at which rays meet a wall across the view behind all objects, and whether they do."""
+        camera = self.scene.camera
+        low, high = self.scene.bounds - camera.eye
+        farthest = float(np.maximum(low * camera.forward, high * camera.forward).sum())
+        towards = rays.directions @ camera.forward
+        ahead = towards > ACROSS
+        path = np.maximum(farthest - rays.origins @ camera.forward, 0.0) / np.where(ahead, towards, 1.0)
+        points = rays.origins + path[:, None] * rays.directions
+        depth = points @ camera.forward if camera.fov_y is not None else np.ones(len(points))
+        ahead &= depth > 0
+        heights = 2.0 * camera.half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
+        across = np.stack([points @ camera.right, -(points @ camera.up)], axis=1) / heights[:, None]
+        return across + (0.5 * self.aspect, 0.5), ahead
+
+
+def blurred_lookups(maps: Sequence[EnvironmentMap], uv: Array, roughness: Array) -> Array:
+    """(n, 3): lookups at places (n, 2) for roughnesses (n,) from 0 to 1, to which equal steps lead from map to map."""
+    level = roughness * (len(maps) - 1)
+    below = np.minimum(level.astype(np.int64), len(maps) - 2)
+    share = (level - below)[:, None]
+    found = np.empty((len(uv), 3))
+    for i in np.unique(below):
+        own = np.flatnonzero(below == i)
+        found[own] = (1.0 - share[own]) * maps[i].at(uv[own]) + share[own] * maps[i + 1].at(uv[own])
+    return found
