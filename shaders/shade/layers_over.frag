@@ -14,7 +14,7 @@ uniform sampler2D straight_transmittance;
 #endif
 #if SUM
 uniform sampler2D shaded_radiance;
-uniform sampler2D shaded_transmittance;  // alpha: whether the pixel can be trusted
+uniform sampler2D shaded_transmittance;  // alpha: share of the light that can be trusted
 #endif
 
 layout(location = 0) out vec4 first;

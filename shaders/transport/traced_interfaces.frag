@@ -48,6 +48,7 @@ const int WAITING = 8;
 // One of the rays that wait to be followed.
 struct Ray {
     vec3 origin;
+    float before;     // metres that it has come already: its origin is a little off the surface that it leaves
     vec3 direction;
     vec3 share;       // of the light at its end that reaches the eye
     uvec4 record;
@@ -56,6 +57,7 @@ struct Ray {
     bool reflected;   // sees the environment as a light
     float blur;       // squared alpha of a mirror with the same blur
     int turns;        // which of its interfaces it was reflected at, a bit each
+    vec3 outwards;    // normal of the body where it starts inside one
 };
 
 vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
@@ -120,9 +122,7 @@ float index_of(int body, int channel) {
 
 struct Sum {
     vec3 light;
-    float length;      // metres of the first segment beyond the first interface
-    vec3 passed;       // transmittance of it
-    bool sound;
+    float lost;        // share of the light whose ray went through a hole, or is in more bodies than a record holds
 };
 
 // Radiance of an opaque object along a ray, lit as where it is seen directly, but in the mean color of its textures.
@@ -133,7 +133,7 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
 }
 
-// The record beyond a surface of a solid. sound: not yet unbalanced, nor beyond what a record holds.
+// The record beyond a surface of a solid. sound: it is balanced, and within what a record holds.
 uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
     bool missing = false;
     uvec4 crossed = enters ? entered_record(record, object) : left_record(record, object, missing);
@@ -141,8 +141,17 @@ uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
     return crossed;
 }
 
+// Ray that goes on from a point of a surface: on the side that its direction goes to, a little off, so that it does not meet
+// the surface again.
+void leave(inout Ray ray, vec3 point, vec3 face_normal) {
+    float offset = SURFACE_OFFSET * surface_reach;
+    float across = dot(face_normal, ray.direction);
+    ray.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
+    ray.before = offset * abs(across);
+}
+
 Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float first_reach, Finish first_finish, int channel) {
-    Sum sum = Sum(vec3(0.0), 0.0, vec3(1.0), true);
+    Sum sum = Sum(vec3(0.0), 0.0);
 #if FORKS > 0
     Ray waiting[WAITING];
 #else
@@ -169,19 +178,20 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         passed = vec3(1.0);
         if (ray.record.x != 0u) {
             Filling filling = filling_of(ray.record, before);
-            float path = min(hit.path, 1e3 * surface_reach);
+            float path = min(hit.path, 1e3 * surface_reach) + ray.before;
 #if EMISSION
             sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
 #endif
             passed = transmittance(filling.extinction * path);
-            if (ray.met == 1 && !ray.reflected && sum.length == 0.0) {
-                sum.length = path;
-                sum.passed = passed;
+#if MUCH_SCATTERED
+            if (before != AIR && surface_table_row(before).scatters_much > 0.5) {
+                sum.light += ray.share * scattered_out(finish_of(vec4(float(before), 0.0, 1.0, 0.0)), ray.origin, ray.outwards, path, passed);
             }
+#endif
             ray.share *= passed;
         }
         if (hit.object < 0) {
-            sum.sound = sum.sound && ray.record.x == 0u;
+            if (ray.record.x != 0u) { sum.lost += strength(ray.share) / 3.0; }
             sum.light += ray.share * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
             ends = true;
             continue;
@@ -199,8 +209,10 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         if (first && hit.object == first_object && abs(hit.path - first_path) < 1e-3 * surface_reach) { smooth_normal = first_normal; }
         float facing = dot(smooth_normal, ray.direction);
         if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
-        if (kind == KIND_UNSEEN || (kind == KIND_OPAQUE && !outside && body.one_sided == 1.0)) {
-            ray.origin = point - SURFACE_OFFSET * surface_reach * face_normal;
+        // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
+        bool early = first && kind == KIND_SOLID && !outside && ray.record.x == 0u;
+        if (early || kind == KIND_UNSEEN || (kind == KIND_OPAQUE && !outside && body.one_sided == 1.0)) {
+            leave(ray, point, face_normal);
             continue;
         }
         if (kind == KIND_OPAQUE) {
@@ -208,20 +220,19 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ends = true;
             continue;
         }
-        float offset = SURFACE_OFFSET * surface_reach;
-        vec3 beyond = point - offset * face_normal;
         uvec4 after_record = ray.record;
-        if (kind == KIND_SOLID) { after_record = crossed_record(ray.record, hit.object, outside, sum.sound); }
+        bool sound = true;
+        if (kind == KIND_SOLID) { after_record = crossed_record(ray.record, hit.object, outside, sound); }
         int after = dominant_body(after_record);
         #if !ONE_OBJECT
         // Surfaces of two bodies in one place are one interface.
-        float within = offset / max(-dot(face_normal, ray.direction), 1e-2);
+        float within = SURFACE_OFFSET * surface_reach / max(-dot(face_normal, ray.direction), 1e-2);
         Hit other = kind == KIND_SOLID ? nearest_hit(ray.origin, ray.direction, max(hit.path - 0.5 * within, 0.0), hit.path + within, hit.object) : Hit(NOTHING, AIR, 0, vec2(0.0));
         if (other.object >= 0 && int(traced_body(other.object).kind) == KIND_SOLID) {
             vec3 other_smooth, other_face;
             hit_normals(other, other_smooth, other_face);
             bool other_outside = dot(other_face, ray.direction) < 0.0;
-            after_record = crossed_record(after_record, other.object, other_outside, sum.sound);
+            after_record = crossed_record(after_record, other.object, other_outside, sound);
             after = dominant_body(after_record);
             if (after == other.object || (before == other.object && after != hit.object)) {
                 face_normal = other_outside ? other_face : -other_face;
@@ -232,9 +243,9 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
                 hit.object = other.object;
                 outside = other_outside;
             }
-            beyond = ray.origin + (other.path) * ray.direction - offset * face_normal;
         }
 #endif
+        if (!sound) { sum.lost += strength(ray.share) / 3.0; }
         int owner = kind == KIND_SHEET || outside ? hit.object : before;
         float ior = kind == KIND_SHEET ? index_of(hit.object, channel) / index_of(before, channel)
                                        : index_of(after, channel) / index_of(before, channel);
@@ -242,7 +253,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             : before != after && (ior != 1.0 || (before != AIR && traced_body(before).plain == 0.0)
                 || (after != AIR && traced_body(after).plain == 0.0));
         if (!matters) {
-            ray.origin = beyond;
+            leave(ray, point, face_normal);
             ray.record = after_record;
             continue;
         }
@@ -295,25 +306,30 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         if (kind == KIND_SHEET || owner == after) { share_on *= transmission * tint; }
         float ior_inside = max(ior, 1.0 / ior);
         float occlusion = first ? first_finish.unoccluded : 1.0;
-        Ray back = Ray(point + SURFACE_OFFSET * surface_reach * face_normal, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
-            first ? 0 : ray.forks, true,
-            ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
-            ray.turns * 2 + 1);
-        Ray on = Ray(beyond, on_way, ray.share * share_on, after_record, ray.met + 1, ray.forks, ray.reflected,
-            ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2);
+        Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record,
+            ray.met + 1, ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
+            ray.turns * 2 + 1, -smooth_normal);
+        Ray on = Ray(point, 0.0, on_way, ray.share * share_on, after_record, ray.met + 1, ray.forks,
+            ray.reflected, ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal);
+        leave(back, point, face_normal);
+        leave(on, point, face_normal);
         bool on_stronger = strength(on.share) >= strength(back.share);
         bool last = ray.met + 1 >= most_interfaces;
         Ray weaker = back;
         vec3 arrival = ray.direction;
         bool arrived_reflected = ray.reflected;
         vec3 again = outside ? vec3(1.0) : passed;
+#if MUCH_SCATTERED
+        // Light that scatters on the way comes out all the same where media give it back.
+        if (before != AIR && surface_table_row(before).scatters_much > 0.5) { again = vec3(1.0); }
+#endif
         ray = on;
         if (!on_stronger) {
             weaker = on;
             ray = back;
         }
 #if FORKS > 0
-        weaker.forks -= first ? 0 : 1;
+        weaker.forks -= first ? 0 : 1;  // the mirror of the first interface is free
         if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > 12.0 * FAINTEST) {
             waiting[waits++] = weaker;
         } else
@@ -343,7 +359,7 @@ void main() {
     vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
     vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
     vec4 front = texelFetch(entered, texel, 0);
-    out_transmittance = vec4(through, 1.0);  // alpha: whether the pixel can be trusted
+    out_transmittance = vec4(through, 1.0);  // alpha: share of the light that can be trusted
     bool starts_inside = start_record.x != 0u;
     if (front.w >= NOTHING && !starts_inside) {
         out_radiance = vec4(background(pixel, direction, texel) * through + emitted, 1.0);
@@ -364,7 +380,7 @@ void main() {
         path = front.w < NOTHING ? length(point - origin) : NOTHING;
         reach = NOTHING;
     }
-    Ray ray = Ray(origin, direction, vec3(1.0), start_record, 0, FORKS, false, 0.0, 0);
+    Ray ray = Ray(origin, 0.0, direction, vec3(1.0), start_record, 0, FORKS, false, 0.0, 0, -direction);
     int object = int(surface.x + 0.5);
 #if DISPERSION
     Sum sum = follow(ray, object, path, front.xyz, reach, finish, 1);
@@ -378,11 +394,10 @@ void main() {
         float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
         vec3 share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
         light += highlights(point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
-        if (finish.scatters_much) { light += share * scattered_out(finish, point, front.xyz, sum.length, sum.passed); }
 #if !EMISSION
         light += share * emitted;
 #endif
     }
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
-    out_transmittance.a = sum.sound ? 1.0 : 0.0;
+    out_transmittance.a = 1.0 - min(sum.lost, 1.0);
 }

@@ -29,6 +29,9 @@ from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
 
+#: Largest share of a pixel's light that may come along rays that went astray.
+MOST_LOST = 0.02
+
 #: First OpenGL version in which shaders write to buffers.
 SHADER_STORAGE = 430
 
@@ -176,7 +179,7 @@ class GpuRenderer:
         if job.features.traced:
             # Rays that end inside a body, or in more of them than they can remember, have no right color.
             picture, whole = (job.targets.average(), samples) if samples > 1 else (job.targets.surfaced(), 1)
-            sound = _read_floats(picture, 1, 4)[..., 3] == np.float32(whole)
+            sound = _read_floats(picture, 1, 4)[..., 3] >= np.float32(whole * (1.0 - MOST_LOST))
         layers = truncated = None
         if job.plan.ordered:
             counts = _read_floats(job.targets.ordered(), 2, 4)[::-1]

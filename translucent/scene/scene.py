@@ -128,7 +128,7 @@ class Object(Frozen):
         return (
             self.medium is not None
             and not self.covers
-            and (self.medium.ior != 1.0 or (self.surface is not None and not self._plain))
+            and (self.medium.ior != 1.0 or not self.plain)
         )
 
     @property
@@ -147,10 +147,9 @@ class Object(Frozen):
         return self.surface is not None and self.surface.opacity is not None
 
     @property
-    def _plain(self) -> bool:
+    def plain(self) -> bool:
         """Whether neither its surface nor its vertex colors change light that passes."""
-        assert self.surface is not None
-        return self.surface.plain and self.mesh.colors is None
+        return self.surface is None or (self.surface.plain and self.mesh.colors is None)
 
     @property
     def matrix(self) -> Array:

@@ -94,6 +94,7 @@ class TracedInterfacesPass:
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
             EMISSION=job.features.emits and not job.features.scatters,
+            MUCH_SCATTERED=any(surface.multiple_scattering for surface in surfaces),
             MICROFACETS=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
