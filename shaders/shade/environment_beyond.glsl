@@ -45,3 +45,38 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
     return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
 #endif
 }
+
+// The nearest texel: samples aside from the centers of pixels reach past the last ones, where nothing may be fetched.
+ivec2 texel_of(vec2 pixel) {
+    return ivec2(clamp(floor(pixel - frame_size.zw), vec2(0.0), frame_size.xy - 1.0));
+}
+
+bool in_picture(vec2 pixel) {
+    return all(greaterThanEqual(pixel, vec2(0.0))) && all(lessThan(pixel, frame_size.xy));
+}
+
+// Texel of textures that are stored with row 0 at the bottom.
+ivec2 stored(ivec2 texel) {
+    return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
+}
+
+#if OPAQUE
+// Opaque surfaces around a point of the picture, and how much of it they fill. width: of the blur, in pixels.
+vec4 blurred_opaque(vec2 pixel, float width) {
+    vec2 at = (pixel - frame_size.zw) / frame_size.xy;
+    at.y = 1.0 - at.y;  // stored with row 0 at the bottom
+    // Four squares of half the width, so that the steps between the texels of a coarse level do not show.
+    vec2 aside = 0.25 * width / frame_size.xy;
+    float level = max(log2(0.5 * width), 0.0);
+    return 0.25 * (textureLod(opaque_radiance, at + aside, level) + textureLod(opaque_radiance, at - aside, level)
+        + textureLod(opaque_radiance, at + vec2(aside.x, -aside.y), level)
+        + textureLod(opaque_radiance, at + vec2(-aside.x, aside.y), level));
+}
+
+// Width in pixels of the blur of what a ray meets at a point, some metres behind a mirror with microfacets of this alpha.
+float blur_width(float alpha, float path, vec3 point) {
+    float spread = surface_right.w == 1.0 ? dot(point, ray_forward.xyz) + surface_ahead.z : 1.0;
+    float pixel = 2.0 * length(surface_up.xyz) * spread / frame_size.y;
+    return 4.0 * alpha * path / max(pixel, 1e-30);
+}
+#endif

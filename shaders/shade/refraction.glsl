@@ -15,20 +15,6 @@ const int EXIT_HALVINGS = 6;
 const int OPAQUE_STEPS = 16;
 const int OPAQUE_HALVINGS = 5;
 
-// The nearest texel: samples aside from the centers of pixels reach past the last ones, where nothing may be fetched.
-ivec2 texel_of(vec2 pixel) {
-    return ivec2(clamp(floor(pixel - frame_size.zw), vec2(0.0), frame_size.xy - 1.0));
-}
-
-bool in_picture(vec2 pixel) {
-    return all(greaterThanEqual(pixel, vec2(0.0))) && all(lessThan(pixel, frame_size.xy));
-}
-
-// Texel of textures that are stored with row 0 at the bottom.
-ivec2 stored(ivec2 texel) {
-    return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
-}
-
 #if !ONE_INTERFACE
 // Axial depth where the first interval of a pixel ends: on the far interface, or on an opaque surface inside.
 float end_of_interval(ivec2 texel) {
@@ -96,18 +82,6 @@ Exit find_exit(vec3 origin, vec3 direction, float longest, vec3 fallback_normal)
 #endif
 
 #if OPAQUE
-// Opaque surfaces around a point of the picture, and how much of it they fill. width: of the blur, in pixels.
-vec4 blurred_opaque(vec2 pixel, float width) {
-    vec2 at = (pixel - frame_size.zw) / frame_size.xy;
-    at.y = 1.0 - at.y;  // stored with row 0 at the bottom
-    // Four squares of half the width, so that the steps between the texels of a coarse level do not show.
-    vec2 aside = 0.25 * width / frame_size.xy;
-    float level = max(log2(0.5 * width), 0.0);
-    return 0.25 * (textureLod(opaque_radiance, at + aside, level) + textureLod(opaque_radiance, at - aside, level)
-        + textureLod(opaque_radiance, at + vec2(aside.x, -aside.y), level)
-        + textureLod(opaque_radiance, at + vec2(-aside.x, aside.y), level));
-}
-
 bool is_behind_opaque(vec3 seen) {
     float axial_depth = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
     return axial_depth < NOTHING && seen.z >= axial_depth;
@@ -133,9 +107,7 @@ vec3 radiance_beyond(vec3 point, vec3 direction, float roughness) {
             seen = seen_at(point + path * direction);
             if (roughness == 0.0) { return texelFetch(opaque_radiance, stored(texel_of(seen.xy)), 0).rgb; }
             // Half of the light is within twice the angle of a microfacet, whose tangent is the roughness squared.
-            float spread = surface_right.w == 1.0 ? dot(point + path * direction, ray_forward.xyz) + surface_ahead.z : 1.0;
-            float pixel = 2.0 * length(surface_up.xyz) * spread / frame_size.y;
-            vec4 blurred = blurred_opaque(seen.xy, 4.0 * roughness * roughness * path / max(pixel, 1e-30));
+            vec4 blurred = blurred_opaque(seen.xy, blur_width(roughness * roughness, path, point + path * direction));
             return blurred.rgb + (1.0 - blurred.a) * environment_beyond(point, direction, roughness);
         }
         before = path;

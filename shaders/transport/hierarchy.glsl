@@ -9,9 +9,11 @@ uniform int object_nodes;                // nodes of the hierarchy of objects
 uniform vec4 objects_frame;              // center and scale of its coordinates
 
 #if ONE_OBJECT
-TracedBody only_body;
+TracedBody only_body;  // read once for all rays of a pixel
+void read_bodies() { only_body = traced_bodies_row(0); }
 TracedBody traced_body(int object) { return only_body; }
 #else
+void read_bodies() {}
 TracedBody traced_body(int object) { return traced_bodies_row(object); }
 #endif
 

@@ -133,6 +133,21 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
 }
 
+// The same through rough interfaces: blurred as far as the picture shows what is there.
+vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
+#if MICROFACETS && OPAQUE
+    vec3 seen = seen_at(point);
+    if (ray.blur > 0.0 && in_picture(seen.xy)) {
+        float there = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
+        if (abs(there - seen.z) * surface_ahead.y < 1e-2 * surface_reach) {
+            vec4 blurred = blurred_opaque(seen.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
+            return blurred.rgb + (1.0 - blurred.a) * environment_beyond(ray.origin, ray.direction, sqrt(sqrt(min(ray.blur, 1.0))));
+        }
+    }
+#endif
+    return opaque_light(body, normal, ray.direction, point);
+}
+
 // The record beyond a surface of a solid. sound: it is balanced, and within what a record holds.
 uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
     bool missing = false;
@@ -206,7 +221,9 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             smooth_normal = -smooth_normal;
         }
         vec3 point = ray.origin + hit.path * ray.direction;
-        if (first && hit.object == first_object && abs(hit.path - first_path) < 1e-3 * surface_reach) { smooth_normal = first_normal; }
+        // The interface that has been drawn, with its textures.
+        bool drawn = first && hit.object == first_object && abs(hit.path - first_path) < 1e-3 * surface_reach;
+        if (drawn) { smooth_normal = first_normal; }
         float facing = dot(smooth_normal, ray.direction);
         if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
         // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
@@ -216,7 +233,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             continue;
         }
         if (kind == KIND_OPAQUE) {
-            sum.light += ray.share * opaque_light(body, smooth_normal, ray.direction, point);
+            sum.light += ray.share * opaque_seen(body, smooth_normal, ray, point);
             ends = true;
             continue;
         }
@@ -257,9 +274,9 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ray.record = after_record;
             continue;
         }
-        float roughness = first ? first_finish.roughness : body.roughness;
-        float transmission = first ? first_finish.transmission : body.transmission;
-        vec3 tint = first ? first_finish.color : body.color;
+        float roughness = drawn ? first_finish.roughness : body.roughness;
+        float transmission = drawn ? first_finish.transmission : body.transmission;
+        vec3 tint = drawn ? first_finish.color : body.color;
         float alpha = roughness * roughness;
 #if MICROFACETS
         vec3 facet, facet_normal;
@@ -297,7 +314,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
         if (transmission < 1.0 && outside) {
             Finish finish = first_finish;
-            if (!first) {
+            if (!drawn) {
                 finish = finish_of(vec4(float(owner), roughness, transmission, 0.0));
                 finish.color = tint;
             }
@@ -305,7 +322,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         }
         if (kind == KIND_SHEET || owner == after) { share_on *= transmission * tint; }
         float ior_inside = max(ior, 1.0 / ior);
-        float occlusion = first ? first_finish.unoccluded : 1.0;
+        float occlusion = drawn ? first_finish.unoccluded : 1.0;
         Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record,
             ray.met + 1, ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
             ray.turns * 2 + 1, -smooth_normal);
@@ -349,9 +366,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
 }
 
 void main() {
-#if ONE_OBJECT
-    only_body = traced_bodies_row(0);
-#endif
+    read_bodies();
     vec2 pixel = gl_FragCoord.xy + frame_size.zw;
     ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
     ivec2 here = ivec2(gl_FragCoord.xy);
@@ -396,6 +411,8 @@ void main() {
         light += highlights(point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
 #if !EMISSION
         light += share * emitted;
+    } else {
+        light += emitted;
 #endif
     }
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);

@@ -9,8 +9,8 @@ import numpy as np
 
 from translucent.arrays import Array, Mask
 from translucent.cpu.beams import Beams
-from translucent.reference.rays import Rays
 from translucent.reference.ray_ends import ACROSS
+from translucent.reference.rays import Rays
 from translucent.scene.environment import Environment, equirectangular_uv
 from translucent.scene.environment_filter import filtered
 from translucent.scene.environment_map import EnvironmentMap

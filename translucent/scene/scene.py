@@ -125,11 +125,7 @@ class Object(Frozen):
     @property
     def has_interface(self) -> bool:
         """Whether its interface changes light: refracts, reflects, tints or scatters it."""
-        return (
-            self.medium is not None
-            and not self.covers
-            and (self.medium.ior != 1.0 or not self.plain)
-        )
+        return self.medium is not None and not self.covers and (self.medium.ior != 1.0 or not self.plain)
 
     @property
     def has_holes(self) -> bool:

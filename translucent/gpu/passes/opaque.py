@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.scene_view import SceneView
 from translucent.gpu.shaders import set_uniform
@@ -80,6 +81,16 @@ class FinishMaps:
         if "opaque_passed_share" in program:  # not where an object only glows
             set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
             set_uniform(program, "opaque_passed_share", surface.diffuse_transmission)
+
+
+def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
+    """Axial depth and radiance of the opaque objects; the latter with its blurs, if a rough body may show them."""
+    axial_depth, radiance = job.targets.opaque().color_attachments
+    if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
+        radiance.build_mipmaps()
+        radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+        radiance.repeat_x = radiance.repeat_y = False
+    return axial_depth, radiance
 
 
 def _clear(framebuffer: moderngl.Framebuffer) -> None:

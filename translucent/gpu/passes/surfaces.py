@@ -7,6 +7,7 @@ import moderngl
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
+from translucent.gpu.passes.opaque import blurred_opaque
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import surface_table
@@ -79,11 +80,7 @@ class SurfacesPass:
         for unit, texture in enumerate(textures):
             texture.use(unit)
         if job.features.has_opaque:
-            axial_depth, radiance = job.targets.opaque().color_attachments
-            if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
-                radiance.build_mipmaps()  # rough refraction blurs what is behind
-                radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
-                radiance.repeat_x = radiance.repeat_y = False
+            axial_depth, radiance = blurred_opaque(job)
             axial_depth.use(_SAMPLERS.index("opaque_axial_depth"))
             radiance.use(_SAMPLERS.index("opaque_radiance"))
 

@@ -10,6 +10,7 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
+from translucent.gpu.passes.opaque import blurred_opaque
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
@@ -37,6 +38,10 @@ _SAMPLERS = (
 )
 _ENTERED = ("entered", "surface_finish", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
+
+
+#: Samples of a pixel below which microfacets would be mere noise.
+FEW_SAMPLES = 4
 
 
 class TracedInterfacesPass:
@@ -128,7 +133,7 @@ class TracedInterfacesPass:
             "light_irradiance": maps.irradiance,
         }
         if job.features.has_opaque:
-            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
+            textures["opaque_axial_depth"], textures["opaque_radiance"] = blurred_opaque(job)
         if environment.seen.kind == "image":
             textures["seen_map"] = environments.sharp(environment.seen)
         for name, texture in textures.items():
@@ -136,11 +141,11 @@ class TracedInterfacesPass:
 
 
 def blurred_share(samples: int) -> float:
-    """Share of the variance of microfacets that blurs what is seen in them, 1 for a single sample of a pixel.
+    """Share of the variance of microfacets that blurs what is seen in them; 1 with few samples.
 
     The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
     """
-    return float(samples**-0.2)
+    return 1.0 if samples < FEW_SAMPLES else float(samples**-0.2)
 
 
 def media_center(scene: Scene) -> Array:
