@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.errors import RenderError
 from translucent.geometry.bvh import Floats, Hierarchy, build_hierarchy
 from translucent.geometry.mesh import Mesh
@@ -47,6 +47,8 @@ class PackedMesh:
     nodes : (8, n, 4) uint32
         Of `packed_nodes`; triangles count from the first of the mesh.
     triangles : (3 m, 4) uint32
+    faces : (m,) int32
+        Faces of the mesh in the order of the triangles.
     center : (3,) float64
     scale : float
         Of coordinates of the mesh, less the center.
@@ -54,6 +56,7 @@ class PackedMesh:
 
     nodes: Words
     triangles: Words
+    faces: npt.NDArray[np.int32]
     center: Array
     scale: float
 
@@ -72,7 +75,7 @@ def packed_mesh(mesh: Mesh) -> PackedMesh:
         triangles = np.empty((*mesh.faces.shape, 4), np.uint32)
         triangles[..., :3] = corners[tree.faces].view(np.uint32)
         triangles[..., 3] = packed_normals(drawn_normals(mesh)[tree.faces])
-        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), center, scale)
+        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), tree.faces, center, scale)
     return found
 
 
@@ -105,10 +108,11 @@ def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """Nodes of one mesh in the texture: the first, and how many there are in each of eight orders."""
+    """One mesh in the textures: its first node, how many there are in each of eight orders, and its first triangle."""
 
     first: int
     count: int
+    triangle: int
 
 
 class SceneHierarchies:
@@ -129,7 +133,7 @@ class SceneHierarchies:
         start = self._rows * _WIDTH
         parts, triangles, first = [np.zeros((start, 4), np.uint32)], 0, start
         for mesh, packed in zip(meshes, self._packed, strict=True):
-            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1])
+            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1], triangles)
             for order in packed.nodes:
                 nodes = order.copy()
                 nodes[:, 3] += np.where(nodes[:, 3] >= 1 << 31, triangles, first).astype(np.uint32)
@@ -170,6 +174,14 @@ class SceneHierarchies:
             own = {"rank": ranks[i] if _decides(scene, body) else 0.0, "slot": media[i]}
             rows.append({**self._row(scene, body, center), **own})
         return TRACED_BODY.pack(rows), (*middle, scale)
+
+    def faces(self, scene: Scene, objects: Integers, triangles: npt.NDArray[np.integer]) -> Integers:
+        """(n,): faces of the meshes of objects (n,), by the numbers of their triangles; -1 where the object is -1."""
+        found = np.full(len(objects), -1, np.int64)
+        for number, body in enumerate(scene.objects):
+            own = objects == number
+            found[own] = packed_mesh(body.mesh).faces[triangles[own] - self._spans[id(body.mesh)].triangle]
+        return found
 
     def _row(self, scene: Scene, body: Object, center: Array) -> Mapping[str, npt.ArrayLike]:
         packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
