@@ -67,16 +67,20 @@ _packed: WeakKeyDictionary[Mesh, PackedMesh] = WeakKeyDictionary()
 def packed_mesh(mesh: Mesh) -> PackedMesh:
     """The hierarchy of a mesh as texels, made once for each mesh."""
     if (found := _packed.get(mesh)) is None:
-        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        center = 0.5 * low + 0.5 * high
-        scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
-        corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
+        center, scale = _frame(*mesh.bounds)
+        with np.errstate(under="ignore", over="ignore"):  # vertices that no face uses may be anywhere
+            corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
         tree = build_hierarchy(corners.min(axis=1), corners.max(axis=1))
         triangles = np.empty((*mesh.faces.shape, 4), np.uint32)
         triangles[..., :3] = corners[tree.faces].view(np.uint32)
         triangles[..., 3] = packed_normals(drawn_normals(mesh)[tree.faces])
         found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), tree.faces, center, scale)
     return found
+
+
+def _frame(low: Array, high: Array) -> tuple[Array, float]:
+    """Middle of bounds, and the scale by which their longest side reaches from -1 to 1."""
+    return 0.5 * low + 0.5 * high, 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
 
 
 def packed_nodes(tree: Hierarchy) -> Words:
@@ -156,9 +160,9 @@ class SceneHierarchies:
         """
         boxes = np.stack([body.bounds - center for body in scene.objects])
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-        middle = 0.5 * low + 0.5 * high
-        scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
-        local: Floats = ((boxes - middle) * scale).astype(np.float32)
+        middle, scale = _frame(low, high)
+        with np.errstate(under="ignore"):
+            local: Floats = ((boxes - middle) * scale).astype(np.float32)
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
         nodes = packed_nodes(tree)[0]
         leaf = nodes[:, 3] >= 1 << 31
@@ -185,9 +189,9 @@ class SceneHierarchies:
 
     def _row(self, scene: Scene, body: Object, center: Array) -> Mapping[str, npt.ArrayLike]:
         packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
-        local = packed.scale * np.linalg.inv(body.matrix[:3, :3])
-        offset = local @ (center - body.matrix[:3, 3]) - packed.scale * packed.center
-        rows = np.column_stack([local, offset])
+        linear = body.matrix[:3, :3]
+        middle = linear @ packed.center + (body.matrix[:3, 3] - center)
+        rows = np.column_stack([packed.scale * np.linalg.inv(linear), middle])
         medium, surface = body.medium or Medium(), body.surface or Surface()
         opaque = body.medium is None
         return {
