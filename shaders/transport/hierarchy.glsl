@@ -17,6 +17,10 @@ void read_bodies() {}
 TracedBody traced_body(int object) { return traced_bodies_row(object); }
 #endif
 
+// Half sides of a mesh beyond which a ray starts where it is nearest to the middle instead: farther off, its start is rounded
+// to more than the steps by which bounds are larger, and to more than small triangles.
+const float FAR_AWAY = 4.0;
+
 struct Hit {
     float path;      // metres; NOTHING where there is none
     int object;
@@ -35,9 +39,14 @@ struct LocalRay {
     vec3 inverse;   // of the direction, in steps
 };
 
+float largest(vec3 v) {
+    return max(v.x, max(v.y, v.z));
+}
+
 LocalRay local_ray(vec3 origin, vec3 direction) {
     vec3 away = vec3(direction.x < 0.0 ? -1.0 : 1.0, direction.y < 0.0 ? -1.0 : 1.0, direction.z < 0.0 ? -1.0 : 1.0);
-    vec3 inverse = away / max(abs(direction), vec3(1e-18));
+    // As a share of the largest: in the coordinates of a huge mesh all are small.
+    vec3 inverse = away / max(abs(direction), vec3(1e-12 * largest(abs(direction))));
     return LocalRay(origin, (origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
 }
 
@@ -78,8 +87,19 @@ void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, 
 void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit hit) {
     TracedBody place = traced_body(object);
     vec3 along = vec3(dot(place.local_x.xyz, direction), dot(place.local_y.xyz, direction), dot(place.local_z.xyz, direction));
-    vec4 point = vec4(origin, 1.0);
-    LocalRay ray = local_ray(vec3(dot(place.local_x, point), dot(place.local_y, point), dot(place.local_z, point)), along);
+    // From the middle of the mesh before anything is multiplied: near a tiny body far from the center little is rounded.
+    vec3 offset = origin - vec3(place.local_x.w, place.local_y.w, place.local_z.w);
+    vec3 local = vec3(dot(place.local_x.xyz, offset), dot(place.local_y.xyz, offset), dot(place.local_z.xyz, offset));
+    float ahead = 0.0;
+    if (largest(abs(local)) > FAR_AWAY) {
+        float most = largest(abs(along));
+        vec3 way = along / most;
+        ahead = max(-dot(local, way) / (dot(way, way) * most), 0.0);
+        local += ahead * along;
+    }
+    LocalRay ray = local_ray(local, along);
+    start -= ahead;
+    Hit own = Hit(hit.path - ahead, -1, -1, vec2(0.0));
     vec3 size = abs(along);
     int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     vec3 turned = along_last(along, axis);
@@ -93,7 +113,7 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
         uint held = 0u;
         while (node < end && held == 0u) {
             uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
-            bool met = meets_bounds(found, ray, start, hit.path);
+            bool met = meets_bounds(found, ray, start, own.path);
             bool leaf = found.w >= 0x80000000u;
             held = leaf && met ? found.w : 0u;
             node = leaf || met ? node + 1 : int(found.w);
@@ -101,9 +121,10 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
         int triangle = int(held & 0x0fffffffu);
         int last = held == 0u ? triangle - 1 : triangle + int(held >> 28 & 7u);
         for (; triangle <= last; ++triangle) {
-            meet_triangle(triangle, object, ray.origin, shear, axis, start, hit);
+            meet_triangle(triangle, object, ray.origin, shear, axis, start, own);
         }
     }
+    if (own.object >= 0) { hit = Hit(own.path + ahead, own.object, own.triangle, own.weights); }
 }
 
 // The nearest surface between two distances on a ray, of all objects but `left_out`. Positions count from the center of the

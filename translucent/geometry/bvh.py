@@ -75,13 +75,14 @@ def build_hierarchy(low: Floats, high: Floats, leaf_size: int = LEAF_SIZE) -> Hi
     Parameters
     ----------
     low, high : (m, 3) float32
-        Bounds of each, finite; m >= 1.
+        Bounds of each, about as large as 1 together, so that areas are finite; m >= 1.
     leaf_size : int
         Largest number of boxes in a leaf.
     """
-    order = _curve_order(0.5 * low + 0.5 * high)
-    tree = _Tree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
-    return _laid_out(tree, order, leaf_size)
+    with np.errstate(under="ignore"):  # areas of the smallest boxes count as 0
+        order = _curve_order(0.5 * low + 0.5 * high)
+        tree = _Tree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
+        return _laid_out(tree, order, leaf_size)
 
 
 def _curve_order(centers: Floats) -> Integers:

@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.errors import RenderError
 from translucent.geometry.bvh import Floats, Hierarchy, build_hierarchy
 from translucent.geometry.mesh import Mesh
@@ -47,6 +47,8 @@ class PackedMesh:
     nodes : (8, n, 4) uint32
         Of `packed_nodes`; triangles count from the first of the mesh.
     triangles : (3 m, 4) uint32
+    faces : (m,) int32
+        Faces of the mesh in the order of the triangles.
     center : (3,) float64
     scale : float
         Of coordinates of the mesh, less the center.
@@ -54,6 +56,7 @@ class PackedMesh:
 
     nodes: Words
     triangles: Words
+    faces: npt.NDArray[np.int32]
     center: Array
     scale: float
 
@@ -64,16 +67,20 @@ _packed: WeakKeyDictionary[Mesh, PackedMesh] = WeakKeyDictionary()
 def packed_mesh(mesh: Mesh) -> PackedMesh:
     """The hierarchy of a mesh as texels, made once for each mesh."""
     if (found := _packed.get(mesh)) is None:
-        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        center = 0.5 * low + 0.5 * high
-        scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
-        corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
+        center, scale = _frame(*mesh.bounds)
+        with np.errstate(under="ignore", over="ignore"):  # vertices that no face uses may be anywhere
+            corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
         tree = build_hierarchy(corners.min(axis=1), corners.max(axis=1))
         triangles = np.empty((*mesh.faces.shape, 4), np.uint32)
         triangles[..., :3] = corners[tree.faces].view(np.uint32)
         triangles[..., 3] = packed_normals(drawn_normals(mesh)[tree.faces])
-        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), center, scale)
+        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), tree.faces, center, scale)
     return found
+
+
+def _frame(low: Array, high: Array) -> tuple[Array, float]:
+    """Middle of bounds, and the scale by which their longest side reaches from -1 to 1."""
+    return 0.5 * low + 0.5 * high, 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
 
 
 def packed_nodes(tree: Hierarchy) -> Words:
@@ -105,10 +112,11 @@ def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """Nodes of one mesh in the texture: the first, and how many there are in each of eight orders."""
+    """One mesh in the textures: its first node, how many there are in each of eight orders, and its first triangle."""
 
     first: int
     count: int
+    triangle: int
 
 
 class SceneHierarchies:
@@ -129,7 +137,7 @@ class SceneHierarchies:
         start = self._rows * _WIDTH
         parts, triangles, first = [np.zeros((start, 4), np.uint32)], 0, start
         for mesh, packed in zip(meshes, self._packed, strict=True):
-            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1])
+            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1], triangles)
             for order in packed.nodes:
                 nodes = order.copy()
                 nodes[:, 3] += np.where(nodes[:, 3] >= 1 << 31, triangles, first).astype(np.uint32)
@@ -152,9 +160,9 @@ class SceneHierarchies:
         """
         boxes = np.stack([body.bounds - center for body in scene.objects])
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-        middle = 0.5 * low + 0.5 * high
-        scale = 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
-        local: Floats = ((boxes - middle) * scale).astype(np.float32)
+        middle, scale = _frame(low, high)
+        with np.errstate(under="ignore"):
+            local: Floats = ((boxes - middle) * scale).astype(np.float32)
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
         nodes = packed_nodes(tree)[0]
         leaf = nodes[:, 3] >= 1 << 31
@@ -171,11 +179,19 @@ class SceneHierarchies:
             rows.append({**self._row(scene, body, center), **own})
         return TRACED_BODY.pack(rows), (*middle, scale)
 
+    def faces(self, scene: Scene, objects: Integers, triangles: npt.NDArray[np.integer]) -> Integers:
+        """(n,): faces of the meshes of objects (n,), by the numbers of their triangles; -1 where the object is -1."""
+        found = np.full(len(objects), -1, np.int64)
+        for number, body in enumerate(scene.objects):
+            own = objects == number
+            found[own] = packed_mesh(body.mesh).faces[triangles[own] - self._spans[id(body.mesh)].triangle]
+        return found
+
     def _row(self, scene: Scene, body: Object, center: Array) -> Mapping[str, npt.ArrayLike]:
         packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
-        local = packed.scale * np.linalg.inv(body.matrix[:3, :3])
-        offset = local @ (center - body.matrix[:3, 3]) - packed.scale * packed.center
-        rows = np.column_stack([local, offset])
+        linear = body.matrix[:3, :3]
+        middle = linear @ packed.center + (body.matrix[:3, 3] - center)
+        rows = np.column_stack([packed.scale * np.linalg.inv(linear), middle])
         medium, surface = body.medium or Medium(), body.surface or Surface()
         opaque = body.medium is None
         return {

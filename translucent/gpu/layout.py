@@ -332,10 +332,10 @@ TRACED_BODY = PackedTable(
     "TracedBody",
     "traced_bodies",
     (
-        ("local_x", "f4", (4,)),  # rows of the transform from a position to the coordinates of the hierarchy
+        ("local_x", "f4", (4,)),  # rows of the transform from a position, less that in w, to coordinates of the hierarchy
         ("local_y", "f4", (4,)),
         ("local_z", "f4", (4,)),
-        ("first_node", "f4", (2,)),  # of its hierarchy, and how many in each order, in two parts of 12 bits
+        ("first_node", "f4", (2,)),  # of its hierarchy, and how many in each order: multiples of 4096, and the rest
         ("node_count", "f4", (2,)),
         ("extinction", "f4", (3,)),
         ("outwards", "f4", ()),  # 1, or -1 where the normals of its faces point inwards
