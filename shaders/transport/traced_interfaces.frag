@@ -274,9 +274,11 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ray.record = after_record;
             continue;
         }
-        float roughness = drawn ? first_finish.roughness : body.roughness;
-        float transmission = drawn ? first_finish.transmission : body.transmission;
-        vec3 tint = drawn ? first_finish.color : body.color;
+        // Textures are read where a ray first meets an object; farther on it counts as the same all over.
+        bool as_first = owner == first_object && first_path < NOTHING;
+        float roughness = as_first ? first_finish.roughness : body.roughness;
+        float transmission = as_first ? first_finish.transmission : body.transmission;
+        vec3 tint = as_first ? first_finish.color : body.color;
         float alpha = roughness * roughness;
 #if MICROFACETS
         vec3 facet, facet_normal;
@@ -314,7 +316,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
         if (transmission < 1.0 && outside) {
             Finish finish = first_finish;
-            if (!drawn) {
+            if (!as_first) {
                 finish = finish_of(vec4(float(owner), roughness, transmission, 0.0));
                 finish.color = tint;
             }
