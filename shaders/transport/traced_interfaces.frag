@@ -133,15 +133,21 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
 }
 
-// The same through rough interfaces: blurred as far as the picture shows what is there.
+// The same where the picture shows it: with its textures, and blurred behind rough interfaces.
 vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
-#if MICROFACETS && OPAQUE
+#if OPAQUE
     vec3 seen = seen_at(point);
-    if (ray.blur > 0.0 && in_picture(seen.xy)) {
-        float there = texelFetch(opaque_axial_depth, stored(texel_of(seen.xy)), 0).r;
+    if (in_picture(seen.xy)) {
+        ivec2 texel = stored(texel_of(seen.xy));
+        float there = texelFetch(opaque_axial_depth, texel, 0).r;
         if (abs(there - seen.z) * surface_ahead.y < 1e-2 * surface_reach) {
-            vec4 blurred = blurred_opaque(seen.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
-            return blurred.rgb + (1.0 - blurred.a) * environment_beyond(ray.origin, ray.direction, sqrt(sqrt(min(ray.blur, 1.0))));
+#if MICROFACETS
+            if (ray.blur > 0.0) {
+                vec4 blurred = blurred_opaque(seen.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
+                return blurred.rgb + (1.0 - blurred.a) * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
+            }
+#endif
+            return texelFetch(opaque_radiance, texel, 0).rgb;
         }
     }
 #endif
