@@ -55,6 +55,14 @@ def _unit_vectors() -> np.ndarray:
     return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
 
 
+def _facet_arguments() -> list[np.ndarray]:
+    rng = np.random.default_rng(6)
+    towards = _unit_vectors()
+    towards[:, 2] = np.abs(towards[:, 2])
+    shares = rng.random((len(towards), 2)).astype(np.float32)
+    return [towards, np.resize([1e-3, 0.09, 0.5, 1.0], len(towards)).astype(np.float32), shares]
+
+
 def _emission_arguments() -> list[np.ndarray]:
     sigma, distance = _mixed(
         np.concatenate([[0.0], np.geomspace(1e-12, 1e6, 60)]), np.concatenate([[0.0], np.geomspace(1e-6, 1e3, 25)])
@@ -150,6 +158,8 @@ ARGUMENTS = {
     "channel_iors": _mixed(np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.0, 0.1, 0.36, 1.0, 20.0, 100.0])),
     "ggx_distribution": _mixed(UNIT, np.array([1e-4, 1e-2, 0.25, 1.0])),
     "ggx_visibility": _mixed(UNIT[::3], UNIT[::2], np.array([1e-4, 1e-2, 0.25, 1.0])),
+    "smith_lambda": _mixed(UNIT, np.array([0.0, 1e-4, 1e-2, 0.25, 1.0])),
+    "ggx_visible_normal": _facet_arguments(),
     "slab_transmittance": _slab_arguments(),
     "slab_reflectance": _slab_arguments(),
     "two_stream_absorption": [_triples(DEPTHS)],
@@ -204,6 +214,7 @@ FLOOR = {
     "agx_sigmoid": 4e-7,
     "tone_agx": 1e-6,
     "multiple_reflectance": 5e-7,
+    "ggx_visible_normal": 1e-6,  # of a unit vector; sine and cosine are as good as that
 }
 
 

@@ -95,7 +95,7 @@ def rays(camera: tl.Camera) -> Array:
 
 
 def ball_radiance(scene: tl.Scene, sigma: Array, ior: float, inner: int) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Radiance of a ball of radius 1 with the first `inner` reflections inside; the rest is seen where it is mirrored to.
+    """Radiance of a ball of radius 1 with the first `inner` reflections inside; the rest is seen where it is mirrored.
 
     All interfaces on a ray are met at one angle. What is mirrored one last time is absorbed on one more chord.
     """

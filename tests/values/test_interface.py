@@ -195,3 +195,21 @@ def test_limits_of_walls() -> None:
     # Near grazing incidence nothing cancels: T = (1 - r) / (1 + r).
     r = 1 - 1e-12
     assert interface.slab_transmittance(r, 0.0) == pytest.approx((1 - r) / (1 + r), rel=8 * EPS)
+
+
+def test_visible_normals_are_as_often_as_they_are_seen() -> None:
+    """The mean of a function over them is its integral over D times the seen area, G1 (v.m) / (v.n)."""
+    rng = np.random.default_rng(3)
+    alpha, view = 0.5, np.array((0.8, 0.0, 0.6))
+    normals = interface.ggx_visible_normal(
+        np.tile(view, (200_000, 1)), np.full(200_000, alpha), rng.random((200_000, 2))
+    )
+    cos, phi = np.meshgrid((np.arange(800) + 0.5) / 800, (np.arange(400) + 0.5) / 400 * 2 * np.pi, indexing="ij")
+    sin = np.sqrt(1 - cos * cos)
+    grid = np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], axis=-1)
+    seen = np.maximum(grid @ view, 0.0) / 0.6 / (1 + interface.smith_lambda(0.6, alpha))
+    density = interface.ggx_distribution(cos, alpha) * seen * 2 * np.pi / cos.size
+    assert density.sum() == pytest.approx(1.0, abs=2e-3)
+    for axis in range(3):
+        expected = (density * grid[..., axis]).sum()
+        assert normals[:, axis].mean() == pytest.approx(expected, abs=4e-3)

@@ -110,6 +110,63 @@ def _smith_root(cosine: Array, alpha: Array) -> Array:
 
 
 @np.errstate(under="ignore")
+def smith_lambda(cosine: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """Smith's Lambda of GGX, (sqrt(1 + alpha^2 tan^2) - 1) / 2 (Heitz 2014, eq. 72).
+
+    Of the microfacets that face a direction the share 1 / (1 + Lambda) is seen from there; of those seen from one
+    direction, (1 + Lambda_1) / (1 + Lambda_1 + Lambda_2) is seen from another on the same side, too.
+
+    Parameters
+    ----------
+    cosine : array_like
+        Cosine between the surface's normal and the direction, 0..1; below 1e-6 it counts as that.
+    alpha : array_like
+        As for `ggx_distribution`; 0 is a polished surface.
+    """
+    up, a = np.maximum(np.asarray(cosine, np.float64), 1e-6), np.asarray(alpha, np.float64)
+    slope = a * a * (1.0 - up) * (1.0 + up)
+    # Multiplied out, so that nothing cancels where the surface is smooth.
+    return np.asarray(0.5 * slope / (up * (np.sqrt(up * up + slope) + up)))
+
+
+@np.errstate(under="ignore")
+def ggx_visible_normal(towards: npt.ArrayLike, alpha: npt.ArrayLike, shares: npt.ArrayLike) -> Array:
+    """Random normal of a GGX microfacet as it is seen from a direction (Heitz 2018, listing 1).
+
+    Parameters
+    ----------
+    towards : array_like (..., 3)
+        Unit vector to the viewer, in a frame whose z axis is the surface's normal; z >= 0.
+    alpha : array_like (...)
+        As for `ggx_distribution`.
+    shares : array_like (..., 2)
+        Two random numbers, 0..1.
+
+    Returns
+    -------
+    normal : (..., 3) float64
+        Unit vector in the same frame.
+    """
+    view, a, u = (np.asarray(x, np.float64) for x in (towards, alpha, shares))
+    stretched = _unit(np.stack([a * view[..., 0], a * view[..., 1], np.maximum(view[..., 2], 1e-6)], axis=-1))
+    across = np.hypot(stretched[..., 0], stretched[..., 1])
+    tilted = (across > 1e-6)[..., None]
+    level = np.stack([-stretched[..., 1], stretched[..., 0], np.zeros_like(across)], axis=-1)
+    first = np.where(tilted, level / np.where(tilted, across[..., None], 1.0), (1.0, 0.0, 0.0))
+    second = np.cross(stretched, first)
+    radius, angle = np.sqrt(u[..., 0]), 2.0 * np.pi * u[..., 1]
+    x, seen = radius * np.cos(angle), 0.5 * (1.0 + stretched[..., 2])
+    y = (1.0 - seen) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + seen * radius * np.sin(angle)
+    z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    facet = x[..., None] * first + y[..., None] * second + z[..., None] * stretched
+    return _unit(np.stack([a * facet[..., 0], a * facet[..., 1], np.maximum(facet[..., 2], 1e-6)], axis=-1))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+@np.errstate(under="ignore")
 def slab_transmittance(reflectance: npt.ArrayLike, optical_depth: npt.ArrayLike) -> Array:
     """Transmittance of a thin wall: (1 - r)^2 a / (1 - r^2 a^2), a = exp(-tau) (Stokes 1862).
 

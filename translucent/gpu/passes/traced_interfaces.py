@@ -145,7 +145,7 @@ def blurred_share(samples: int) -> float:
 
     The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
     """
-    return 1.0 if samples < FEW_SAMPLES else float(samples**-0.2)
+    return 1.0 if samples < FEW_SAMPLES else float(samples**-0.15)
 
 
 def media_center(scene: Scene) -> Array:
