@@ -28,17 +28,20 @@ def test_only_the_driver_at_fault_is_refused(other: dict[str, str]) -> None:
     require_interfaces(LAVAPIPE | other)
 
 
-def test_a_renderer_that_refuses_interfaces_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    from translucent.gpu.passes import surfaces
+@pytest.mark.parametrize("interfaces", [None, tl.ScreenInterfaces()], ids=str)
+def test_a_renderer_that_refuses_interfaces_goes_on(
+    monkeypatch: pytest.MonkeyPatch, interfaces: tl.ScreenInterfaces | None
+) -> None:
+    from translucent.gpu.passes import surfaces, traced_interfaces
 
     def refuse(_: Any) -> None:
         require_interfaces(LAVAPIPE)
 
-    monkeypatch.setattr(surfaces, "require_interfaces", refuse)
+    monkeypatch.setattr(surfaces if interfaces else traced_interfaces, "require_interfaces", refuse)
     ball, camera = Sphere().tessellate(16), tl.Camera.look_at((1, 2, 3), (0, 0, 0))
     glass, dye = (tl.Scene([tl.Object(ball, tl.Medium(absorption=1.0, ior=ior))], camera) for ior in (1.5, 1.0))
     with tl.Renderer() as renderer:
         for _ in range(2):
             with pytest.raises(RenderError, match="ends the process"):
-                renderer.render(glass, (32, 24))
-            assert renderer.render(dye, (32, 24)).valid.all()
+                renderer.render(glass, (32, 24), interfaces=interfaces)
+            assert renderer.render(dye, (32, 24), interfaces=interfaces).valid.all()

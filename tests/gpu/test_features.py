@@ -30,6 +30,7 @@ FLAGS = (
 )
 LIGHT = tl.DirectionalLight((0, 0, -1), (1, 1, 1))
 LAYER = tl.Object(OPEN, tl.Medium(), sheet_thickness=1e-5, surface=tl.Surface(opacity=0.5, ior=1.0, roughness=1.0))
+SCREEN = tl.ScreenInterfaces()
 VARYING = body(density=tl.LinearDensity(1, 0.1, 2.0))
 
 
@@ -53,23 +54,42 @@ CASES: dict[str, tuple[FrameFeatures, set[str], str]] = {
     "emitters": (features(scene(body(FIRE), body(EMBER))), {"emits"}, "transmittance"),
     "with a sheet": (features(scene(body(FIRE), body(EMBER), sheet(x=3.0))), {"accumulates", "emits"}, "transmittance"),
     "open": (features(scene(body(mesh=OPEN))), {"accumulates", "has_fallback"}, "transmittance"),
-    "interfaces": (features(scene(body(DIAMOND))), {"accumulates", "has_surfaces"}, "surfaces"),
+    "interfaces": (
+        features(scene(body(DIAMOND))),
+        {"accumulates", "has_surfaces", "one_interface", "traced"},
+        "traced_interfaces",
+    ),
+    "interfaces of sheets": (features(scene(sheet(DIAMOND))), {"accumulates", "has_surfaces"}, "surfaces"),
+    "interfaces on the screen": (
+        features(scene(body(DIAMOND)), interfaces=SCREEN),
+        {"accumulates", "has_surfaces"},
+        "surfaces",
+    ),
     "one interface": (
         features(scene(body(DIAMOND)), interfaces=tl.FrontInterface()),
         {"accumulates", "has_surfaces", "one_interface"},
         "surfaces",
     ),
-    "traced interfaces": (
-        features(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces()),
-        {"accumulates", "has_surfaces", "one_interface", "traced"},
-        "traced_interfaces",
-    ),
     "interfaces in order": (
-        features(scene(body(DIAMOND)), tl.FragmentLists()),
+        features(scene(body(DIAMOND)), tl.FragmentLists(), interfaces=SCREEN),
         {"has_surfaces", "finds_exits"},
         "surfaces",
     ),
-    "interfaces peeled": (features(scene(body(DIAMOND)), tl.DepthPeeling()), {"has_surfaces"}, "surfaces"),
+    "interfaces peeled": (
+        features(scene(body(DIAMOND)), tl.DepthPeeling(), interfaces=SCREEN),
+        {"has_surfaces"},
+        "surfaces",
+    ),
+    "traced in order": (
+        features(scene(body(DIAMOND)), tl.FragmentLists()),
+        {"has_surfaces", "one_interface", "traced", "finds_exits"},
+        "traced_interfaces",
+    ),
+    "traced and peeled": (
+        features(scene(body(DIAMOND)), tl.DepthPeeling()),
+        {"has_surfaces", "one_interface", "traced"},
+        "traced_interfaces",
+    ),
     "lit": (features(scene(body(MILK), lights=[LIGHT])), {"scatters"}, "transmittance"),
     "unlit": (
         features(scene(body(MILK), lights=[LIGHT]), capabilities=NO_STORAGE),

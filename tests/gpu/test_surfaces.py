@@ -212,14 +212,15 @@ def test_one_interface_without_a_step_in_index_is_not_there(renderer: tl.Rendere
 
 def test_one_interface_leaves_out_the_draw_of_the_other(renderer: tl.Renderer) -> None:
     scene = shown(BALL, tl.Medium(absorption=1.0, ior=1.5), SKY)
-    both, front = renderer.render(scene, SIZE), renderer.render(scene, SIZE, interfaces=tl.FrontInterface())
+    on_screen = tl.ScreenInterfaces()
+    both, front = (renderer.render(scene, SIZE, interfaces=one) for one in (on_screen, tl.FrontInterface()))
     assert both.plan.geometry_passes == front.plan.geometry_passes + 1
-    assert (both.plan.interfaces, front.plan.interfaces) == (tl.ScreenInterfaces(), tl.FrontInterface())
+    assert (both.plan.interfaces, front.plan.interfaces) == (on_screen, tl.FrontInterface())
     for name in ("thickness", "optical_depth", "transmittance", "coverage", "valid", "normals"):
         np.testing.assert_array_equal(getattr(both, name), getattr(front, name))
     assert np.abs(both.radiance - front.radiance).max() > 0.1
     # What has been drawn with one interface leaves nothing behind.
-    np.testing.assert_array_equal(renderer.render(scene, SIZE).radiance, both.radiance)
+    np.testing.assert_array_equal(renderer.render(scene, SIZE, interfaces=on_screen).radiance, both.radiance)
     # Averages and frames with alpha have it, too.
     averaged = renderer.render(scene, SIZE, samples=2, transparent=True, interfaces=tl.FrontInterface())
     assert averaged.plan == front.plan
@@ -291,8 +292,10 @@ def test_wine_in_a_glass_is_left_at_the_outside_of_the_glass(renderer: tl.Render
 def test_matched_interfaces_add_no_pass() -> None:
     scene = shown(BALL, tl.Medium(absorption=1.0), SKY, surface=tl.Surface(roughness=0.7))
     assert tl.plan(scene).passes == tl.plan(shown(BALL, tl.Medium(absorption=1.0), SKY)).passes
-    assert "surfaces" not in {step.name for step in tl.plan(scene).passes}
-    assert "surfaces" in {step.name for step in tl.plan(shown(BALL, tl.Medium(ior=1.2), SKY)).passes}
+    bending = shown(BALL, tl.Medium(ior=1.2), SKY)
+    for interfaces, name in ((None, "traced_interfaces"), (tl.ScreenInterfaces(), "surfaces")):
+        assert not {"interfaces", name} & {step.name for step in tl.plan(scene, interfaces=interfaces).passes}
+        assert {"interfaces", name} <= {step.name for step in tl.plan(bending, interfaces=interfaces).passes}
 
 
 def test_normals_are_those_of_the_interfaces(renderer: tl.Renderer) -> None:

@@ -1,4 +1,4 @@
-"""Plans with one interface: what they save, what they cost, and where they are refused."""
+"""Plans of how interfaces are found: what the planner takes, what the others save and cost, and where they are refused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pytest
 import translucent as tl
 from tests.values.plan_scenes import DIAMOND, NO_STORAGE, OPEN, ORDERED, SCENES, TORUS, WINE, body, scene, sheet
 from translucent.commands.common import INTERFACE_NAMES
-from translucent.planning import interface_choice
 from translucent.planning.interfaces import INTERFACES, Interfaces
 from translucent.planning.interfaces.front import ONE_INTERFACE
 from translucent.planning.interfaces.traced import TRACE_COST
@@ -22,14 +21,28 @@ from translucent.planning.render_plan import Capabilities
 
 TRACED, SCREEN, FRONT = tl.TracedInterfaces(), tl.ScreenInterfaces(), tl.FrontInterface()
 CHOICES: list[Interfaces] = [TRACED, SCREEN, FRONT]
+#: What the planner takes where light bends.
+USUAL = tl.TracedInterfaces(depth=12)
 ALWAYS: list[Any] = [None, tl.SignedDepth(), *ORDERED]
+
+
+@pytest.mark.parametrize("method", ALWAYS)
+@pytest.mark.parametrize("capabilities", [Capabilities(), NO_STORAGE], ids=["storage", "no storage"])
+def test_interfaces_of_solid_bodies_are_traced_if_nobody_asks(method: Any, capabilities: Capabilities) -> None:
+    if method is not None and method.needs_storage and not capabilities.shader_storage:
+        return
+    for objects in ([body(DIAMOND)], [body(DIAMOND), sheet(DIAMOND, x=3)], [body(), body(DIAMOND, OPEN, x=3)]):
+        found = plan(scene(*objects), method, capabilities)
+        assert found.interfaces == USUAL
+        assert found == plan(scene(*objects), method, capabilities, interfaces=USUAL)
+        assert found.has(PassName.TRACED)
+        assert not found.has(PassName.SURFACES)
 
 
 @pytest.mark.parametrize("method", ALWAYS)
 def test_one_interface_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
     asked = scene(body(DIAMOND), body(None, TORUS))
-    both, front = plan(asked, method), plan(asked, method, interfaces=FRONT)
-    assert plan(asked, method, interfaces=SCREEN) == both
+    both, front = plan(asked, method, interfaces=SCREEN), plan(asked, method, interfaces=FRONT)
     assert (both.interfaces, front.interfaces) == (SCREEN, FRONT)
     assert [step.name for step in both.passes] == [step.name for step in front.passes]
     assert front.geometry_passes == both.geometry_passes - 1
@@ -61,13 +74,15 @@ def test_one_interface_changes_nothing_where_nothing_bends(objects: list[tl.Obje
 def test_a_method_that_misses_where_rays_leave_touching_bodies_is_told(
     method: Any, capabilities: Capabilities, told: bool
 ) -> None:
-    found = plan(scene(body(DIAMOND), body(WINE, x=0.5)), method, capabilities)
+    touching = scene(body(DIAMOND), body(WINE, x=0.5))
+    found = plan(touching, method, capabilities, interfaces=SCREEN)
     assert found.says(NoteKind.TOUCHING_INTERFACES) is told
+    assert not plan(touching, method, capabilities).says(NoteKind.TOUCHING_INTERFACES)
 
 
 def test_one_interface_needs_no_order_where_bodies_touch() -> None:
     touching = scene(body(DIAMOND), body(WINE, x=0.5))
-    assert plan(touching).ordered
+    assert plan(touching, interfaces=SCREEN).ordered
     assert not plan(touching, interfaces=FRONT).ordered
 
 
@@ -89,7 +104,7 @@ def test_one_interface_cannot_be_entered_from_inside(camera: tl.Camera, inside: 
     message = r"^FrontInterface\(\); rays start inside .*; use ScreenInterfaces\(\), or move the camera outside$"
     with pytest.raises(tl.InputError, match=message):
         plan(asked, interfaces=FRONT)
-    assert plan(asked).interfaces == SCREEN
+    assert plan(asked).interfaces == (USUAL if camera.fov_y is not None else SCREEN)
 
 
 def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
@@ -125,13 +140,16 @@ def planned_on_the_cpu(asked: tl.Scene, *, interfaces: Any) -> tl.RenderPlan:
     [([sheet(DIAMOND)], None), ([sheet(DIAMOND), body()], None), ([body(DIAMOND)], tl.ThinLayer())],
 )
 def test_sheets_have_one_interface_and_bend_no_ray(objects: list[tl.Object], method: Any) -> None:
-    found = {step.name: step for step in plan(scene(*objects), method).passes}
+    chosen = plan(scene(*objects), method)
+    assert chosen.interfaces == SCREEN
+    assert chosen == plan(scene(*objects), method, interfaces=SCREEN)
+    found = {step.name: step for step in chosen.passes}
     assert found["interfaces"].reason.endswith("normal and place of the sheet that a ray meets first")
     assert found["interfaces"].geometry_passes == 1
     assert (
         found["surfaces"].reason == "interfaces mirror the environment (ior above 1); rays go straight through sheets"
     )
-    solid = {step.name: step for step in plan(scene(body(DIAMOND))).passes}
+    solid = {step.name: step for step in plan(scene(body(DIAMOND)), interfaces=SCREEN).passes}
     assert solid["interfaces"].geometry_passes == 2
     assert 0 < found["interfaces"].cost < solid["interfaces"].cost
 
@@ -187,21 +205,24 @@ def test_traced_interfaces_draw_the_first_and_trace_the_others(method: Any) -> N
     assert (steps[PassName.INTERFACES].geometry_passes, steps[PassName.INTERFACES].objects) == (1, (0,))
     assert steps[PassName.INTERFACES].cost == front[PassName.INTERFACES].cost
     assert steps[PassName.TRACED].cost == TRACE_COST
-    assert "at most 8 interfaces, and both ways at the first 2" in steps[PassName.TRACED].reason
+    assert "at most 8 interfaces, twice as the weaker of reflected and refracted light" in steps[PassName.TRACED].reason
     assert traced.interfaces == TRACED
     assert traced.limits == drawn.limits
     assert traced.summary()["interfaces"] == "TracedInterfaces(depth=8, forks=2)"
 
 
-def test_traced_interfaces_tell_what_they_cut_off_and_no_more() -> None:
-    found = plan(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces(3, 1))
-    (note,) = found.unmodelled
+@pytest.mark.parametrize(
+    ("depth", "forks", "told"),
+    [
+        (3, 1, "more than 3 interfaces, or is the weaker of reflected and refracted light more often than once: "),
+        (12, 3, "more than 12 interfaces, or is the weaker of reflected and refracted light more often than 3 times: "),
+        (1, 0, "more than 1 interface, or is the weaker of reflected and refracted light: "),
+    ],
+)
+def test_traced_interfaces_tell_what_they_cut_off_and_no_more(depth: int, forks: int, told: str) -> None:
+    (note,) = plan(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces(depth, forks)).unmodelled
     assert note.kind is NoteKind.CUT_OFF_PATHS
-    assert note.startswith(
-        "light that meets more than 3 interfaces, and the weaker of reflected and refracted light after 1 fork: "
-    )
-    (note,) = plan(scene(body(DIAMOND)), interfaces=tl.TracedInterfaces(1, 0)).unmodelled
-    assert note.startswith("light that meets more than 1 interface, and the weaker of reflected and refracted light: ")
+    assert note.startswith(f"light that meets {told}")
 
 
 def test_traced_interfaces_need_no_order_where_bodies_touch() -> None:
@@ -210,6 +231,25 @@ def test_traced_interfaces_need_no_order_where_bodies_touch() -> None:
         found = plan(touching, method, interfaces=TRACED)
         assert found.ordered is (method == tl.DepthPeeling())
         assert not found.says(NoteKind.TOUCHING_INTERFACES)
+
+
+CRYSTAL, RED = tl.Medium(absorption=0.1, ior=1.5), tl.Medium(absorption=(1, 2, 3), ior=1.33)
+
+
+@pytest.mark.parametrize("capabilities", [Capabilities(), NO_STORAGE], ids=["storage", "no storage"])
+def test_wine_in_a_glass_is_a_sum_unless_bodies_take_each_others_place(capabilities: Capabilities) -> None:
+    """The rays find where they leave; thickness needs the order only where overlaps do not add up."""
+    glass, wine = body(CRYSTAL, priority=1), body(RED, x=0.5)
+    added = plan(scene(glass, wine, overlap="add"), None, capabilities)
+    assert (added.method, added.interfaces) == (tl.SignedDepth(), USUAL)
+    for overlap in ("union", "priority"):
+        found = plan(scene(glass, wine, overlap=overlap), None, capabilities)
+        assert isinstance(found.method, tl.FragmentLists if capabilities.shader_storage else tl.DepthPeeling)
+        assert found.interfaces == USUAL
+        assert found.unmodelled[0].kind is NoteKind.CUT_OFF_PATHS
+        assert not found.says(NoteKind.TOUCHING_INTERFACES)
+    emitting = scene(glass, body(tl.Medium(1.0, emission=1.0, ior=1.33), x=0.5))
+    assert plan(emitting, None, capabilities).ordered
 
 
 INSIDE = tl.Scene([body(DIAMOND)], tl.Camera.look_at((0, 0, 0.2), (0, 0, -1)))
@@ -226,14 +266,10 @@ def test_traced_rays_may_start_inside_a_body() -> None:
 
 
 @pytest.mark.parametrize(("asked", "why"), UNTRACED.values(), ids=UNTRACED)
-def test_what_rays_cannot_be_traced_through_is_refused_or_drawn(
-    asked: tl.Scene, why: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_rays_cannot_be_traced_through_is_refused_or_drawn(asked: tl.Scene, why: str) -> None:
     with pytest.raises(tl.InputError, match=rf"^{re.escape(f'{TRACED}; {why}; use {SCREEN}')}"):
         plan(asked, interfaces=TRACED)
     drawn = plan(asked, interfaces=SCREEN)
-    monkeypatch.setattr(interface_choice, "default_interfaces", lambda *_: TRACED)
-    assert plan(scene(body(DIAMOND))).interfaces == TRACED
     found = plan(asked)
     assert found.interfaces == SCREEN
     assert [step.name for step in found.passes] == [step.name for step in drawn.passes]
@@ -246,17 +282,23 @@ def test_bodies_that_a_picture_cuts_do_not_matter_as_sheets_or_without_interface
     assert plan(tl.Scene([body()], CUT.camera), interfaces=TRACED).interfaces is None
 
 
-def test_nothing_is_traced_before_a_backdrop(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_traced_before_a_backdrop() -> None:
     asked = scene(body(DIAMOND))
     with pytest.raises(tl.InputError, match=r"has no mesh that a ray could meet; use ScreenInterfaces\(\)$"):
         plan_over_backdrop(asked, interfaces=TRACED)
-    monkeypatch.setattr(interface_choice, "default_interfaces", lambda *_: TRACED)
     assert plan_over_backdrop(asked).interfaces == SCREEN
     assert plan_over_backdrop(asked, interfaces=FRONT).interfaces == FRONT
 
 
-def test_interfaces_are_those_of_the_plan_without_opengl() -> None:
-    without = Capabilities(opengl=False)
-    for one in (None, *CHOICES):
-        found = plan(scene(body(DIAMOND)), None, without, interfaces=one)
-        assert (found.interfaces, found.says(NoteKind.REFRACTION)) == (None, True)
+def test_rays_without_opengl_follow_interfaces_whatever_is_asked_for() -> None:
+    """Traced ones as asked; the others do not exist there, and the plan says what it does in their place."""
+    without, deep = Capabilities(opengl=False), tl.TracedInterfaces(depth=20, forks=3)
+    for asked, followed in ((None, USUAL), (deep, deep), (SCREEN, USUAL), (FRONT, USUAL)):
+        found = plan(scene(body(DIAMOND)), None, without, interfaces=asked)
+        assert found.interfaces == followed
+        assert {note.kind for note in found.unmodelled} == {NoteKind.CUT_OFF_PATHS}
+        assert f"more than {followed.depth} interfaces" in found.unmodelled[0]
+        instead = f"{followed} in place of {asked}"
+        assert any(instead in step.reason for step in found.passes) is (asked in (SCREEN, FRONT))
+    assert plan(scene(sheet(DIAMOND)), None, without).interfaces == USUAL
+    assert plan(scene(body()), None, without, interfaces=deep).interfaces is None

@@ -23,6 +23,7 @@ from tests.values.plan_scenes import (
     scene,
     sheet,
 )
+from translucent.planning.interfaces.front import ONE_INTERFACE
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.plan import plan
@@ -71,7 +72,10 @@ def test_every_pass_has_a_name_and_every_note_a_kind(kind: str) -> None:
         (scene(body(MILK)), None, Capabilities(), NoteKind.ONLY_REMOVES),
         (scene(body(MILK), ambient=(1, 1, 1)), None, Capabilities(), NoteKind.DIMMED_AMBIENT),
         (scene(body(WINE), lights=LIT), None, Capabilities(), NoteKind.UNUSED_LIGHTS),
-        (scene(body(DIAMOND)), None, Capabilities(), NoteKind.LATER_REFRACTION),
+        (scene(body(DIAMOND)), None, Capabilities(), NoteKind.CUT_OFF_PATHS),
+        (scene(body(DIAMOND)), None, TRACED, NoteKind.CUT_OFF_PATHS),
+        (scene(sheet(DIAMOND)), None, Capabilities(), NoteKind.LATER_REFRACTION),
+        (scene(body(DIAMOND)), tl.ThinLayer(), Capabilities(), NoteKind.LATER_REFRACTION),
         (scene(body(), body(None)), None, Capabilities(), NoteKind.SHADOWS),
         (scene(body(tl.Medium())), None, Capabilities(), NoteKind.INVISIBLE),
         (scene(body(), body(x=3, priority=1)), None, Capabilities(), NoteKind.UNUSED_PRIORITIES),
@@ -84,6 +88,17 @@ def test_a_plan_says_what_kind_of_thing_it_leaves_out(
     assert plan(asked, method, machine).says(kind)
     clean = plan(scene(sheet()), None, Capabilities())
     assert not clean.says(kind)
+
+
+def test_each_way_of_finding_interfaces_tells_what_it_leaves_out() -> None:
+    asked = scene(body(DIAMOND))
+    left_out = {
+        tl.TracedInterfaces(): {NoteKind.CUT_OFF_PATHS},
+        tl.ScreenInterfaces(): {NoteKind.LATER_REFRACTION},
+        tl.FrontInterface(): {NoteKind.LATER_REFRACTION, ONE_INTERFACE.kind},
+    }
+    for interfaces, kinds in left_out.items():
+        assert {note.kind for note in plan(asked, interfaces=interfaces).unmodelled} == kinds
 
 
 def test_ambient_light_takes_the_place_of_light_that_is_only_removed() -> None:

@@ -8,20 +8,18 @@ from translucent.errors import InputError
 from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
 from translucent.planning.passes import PassName
-from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Scene
 
 #: Names that configurations had, and what to write instead.
 _OLD_NAMES = {"both": ScreenInterfaces(), "front": FrontInterface()}
 
-
 #: Interfaces that rays may meet if nobody asks for a number: wine in a glass needs them, and few rays go as far.
 USUAL_DEPTH = 12
 
 
-def default_interfaces(scene: Scene, capabilities: Capabilities) -> Interfaces:
-    """The way that the planner takes, if nobody asks for one, in a scene with interfaces."""
-    solid = any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
+def _default_interfaces(*, solid: bool) -> Interfaces:
+    """The way that the planner takes, if nobody asks for one: sheets, which bend no ray, need no tracing."""
     return TracedInterfaces(depth=USUAL_DEPTH) if solid else ScreenInterfaces()
 
 
@@ -35,16 +33,13 @@ def check_interfaces(interfaces: object) -> None:
     raise InputError(f"interfaces {interfaces!r}", "not a choice of interfaces", do)
 
 
-def chosen_interfaces(
-    scene: Scene, asked: Interfaces | None, capabilities: Capabilities, *, sheets: bool
-) -> tuple[Interfaces, str]:
+def chosen_interfaces(scene: Scene, asked: Interfaces | None, *, sheets: bool) -> tuple[Interfaces, str]:
     """The way in which interfaces are found, and why it is not the one that the planner would rather take.
 
     Parameters
     ----------
     scene : Scene
     asked : Interfaces, optional
-    capabilities : Capabilities
     sheets : bool
         All bodies are drawn as sheets.
 
@@ -53,8 +48,8 @@ def chosen_interfaces(
     InputError
         If what is asked for cannot be done in the scene.
     """
-    wanted = default_interfaces(scene, capabilities) if asked is None else asked
     solid = not sheets and any(scene.objects[i].sheet_thickness is None for i in with_interfaces(scene))
+    wanted = _default_interfaces(solid=solid) if asked is None else asked
     if wanted.one_interface and not solid:
         return ScreenInterfaces(), ""  # sheets have one interface, whatever is asked for
     if sheets or not with_interfaces(scene) or (refusal := wanted.refusal(scene)) is None:

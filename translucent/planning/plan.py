@@ -62,7 +62,7 @@ def plan(
     if not capabilities.opengl:
         return _plan_traced(scene, method, interfaces, capabilities)
     sheets = method is not None and method.makes_sheets
-    bending, instead = chosen_interfaces(scene, interfaces, capabilities, sheets=sheets)
+    bending, instead = chosen_interfaces(scene, interfaces, sheets=sheets)
     chosen = assembled(scene, *_choice(scene, method, capabilities, bending), bending, capabilities)
     if scatters(scene) and not capabilities.shader_storage:
         chosen = with_unlit_marked(scene, chosen)
