@@ -6,6 +6,7 @@ each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -15,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
-from translucent.errors import RenderError
-from translucent.geometry.bvh import Floats, Hierarchy, build_hierarchy
+from translucent.errors import RenderError, TranslucentWarning
+from translucent.files.reading import size_text
+from translucent.geometry.bvh import LEAF_SIZE, Floats, Hierarchy, build_hierarchy
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.body_uniforms import bounded_extinction
@@ -36,6 +38,16 @@ _WIDTH = 1 << HIERARCHY_WIDTH_BITS
 
 #: Bits of a leaf's link that hold its first triangle; three others hold how many follow it, the highest tells a leaf.
 _FIRST_BITS = 28
+
+#: Rows of texels up to which the numbers of nodes and triangles fit into links.
+_MOST_ROWS = 1 << (_FIRST_BITS - HIERARCHY_WIDTH_BITS)
+
+#: Bytes for each triangle that are kept, with the copy in OpenGL, and those that building takes for a while.
+_PACKED_BYTES = 300
+_BUILD_BYTES = 650
+
+#: Bytes of memory that nobody expects a picture to take.
+MUCH_MEMORY = 4 << 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +114,10 @@ def packed_nodes(tree: Hierarchy) -> Words:
 
 
 def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
-    """(...,): unit vectors (..., 3) as 2 x 16 bits on an octahedron; 4e-5 rad off at most."""
+    """(...,): unit vectors (..., 3) as 2 x 16 bits on an octahedron; 6.5e-5 rad off at most.
+
+    Half a step in each coordinate moves a point of the octahedron by sqrt(6) / 65535, at a distance of 1 / sqrt(3).
+    """
     size = np.abs(normals).sum(axis=-1, keepdims=True)
     at = normals / np.where(size > 0, size, 1.0)
     folded = (1 - np.abs(at[..., 1::-1])) * np.where(at[..., :2] >= 0, 1.0, -1.0)
@@ -131,21 +146,24 @@ class SceneHierarchies:
 
     def __init__(self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int) -> None:
         before_making(gl)
-        self._packed = [packed_mesh(mesh) for mesh in meshes]
+        _require_room(gl, meshes)
         self._rows = -(-2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
-        start = self._rows * _WIDTH
-        parts, triangles, first = [np.zeros((start, 4), np.uint32)], 0, start
-        for mesh, packed in zip(meshes, self._packed, strict=True):
-            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1], triangles)
-            for order in packed.nodes:
-                nodes = order.copy()
-                nodes[:, 3] += np.where(nodes[:, 3] >= 1 << 31, triangles, first).astype(np.uint32)
-                parts.append(nodes)
-                first += len(nodes)
-            triangles += len(packed.triangles) // 3
-        self.nodes = _texture(gl, np.concatenate(parts))
-        self.triangles = _texture(gl, np.concatenate([packed.triangles for packed in self._packed]))
+        packed = [packed_mesh(mesh) for mesh in meshes]
+        nodes = _texels(gl, self._rows * _WIDTH + sum(8 * part.nodes.shape[1] for part in packed))
+        triangles = _texels(gl, sum(len(part.triangles) for part in packed))
+        first, triangle = self._rows * _WIDTH, 0
+        for mesh, part in zip(meshes, packed, strict=True):
+            count, texels = part.nodes.shape[1], len(part.triangles)
+            self._spans[id(mesh)] = _Span(first, count, triangle)
+            triangles[3 * triangle : 3 * triangle + texels] = part.triangles
+            for order in part.nodes:
+                own = nodes[first : first + count]
+                own[:] = order
+                own[:, 3] += np.where(order[:, 3] >= 1 << 31, triangle, first).astype(np.uint32)
+                first += count
+            triangle += texels // 3
+        self.nodes, self.triangles = _texture(gl, nodes), _texture(gl, triangles)
         self.object_nodes = 0
 
     def place(self, scene: Scene, center: Array) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
@@ -267,16 +285,50 @@ def _media_numbers(scene: Scene) -> list[float]:
     return [float(numbers.setdefault(body.medium, len(numbers))) for body in scene.objects]
 
 
+def _require_room(gl: moderngl.Context, meshes: Sequence[Mesh]) -> None:
+    """Raise `RenderError` before anything is built if the textures cannot fit; warn if much memory is needed."""
+    faces = [len(mesh.faces) for mesh in meshes]
+    least_nodes = sum(8 * (2 * -(-count // LEAF_SIZE) - 1) for count in faces)
+    for texels in (least_nodes, 3 * sum(faces)):
+        _check_texels(gl, texels)
+    new = [len(mesh.faces) for mesh in meshes if mesh not in _packed]
+    needed = _PACKED_BYTES * sum(faces) + _BUILD_BYTES * max(new, default=0)
+    if needed > MUCH_MEMORY:
+        warnings.warn(
+            TranslucentWarning(
+                f"tracing rays through {sum(faces):,} triangles takes up to {size_text(needed)} of memory; "
+                "use interfaces=tl.ScreenInterfaces(), or coarser meshes, for less"
+            ),
+            stacklevel=2,
+        )
+
+
+def _check_texels(gl: moderngl.Context, texels: int) -> None:
+    """Raise `RenderError` if a texture of this OpenGL does not hold so many texels."""
+    limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
+    if limit < _WIDTH:
+        found, do = f"this OpenGL's textures end at {limit} texels a side, and hierarchies take {_WIDTH}", ""
+    elif texels > (room := min(limit, _MOST_ROWS) * _WIDTH):
+        found, do = f"at least {texels:,} texels, and this OpenGL holds {room:,}", ", or coarser meshes"
+    else:
+        return
+    raise RenderError("tracing rays through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
+
+
+def _texels(gl: moderngl.Context, count: int) -> Words:
+    """Whole rows of texels, 0 yet, for so many."""
+    _check_texels(gl, count)
+    return np.zeros((-(-count // _WIDTH) * _WIDTH, 4), np.uint32)
+
+
 def _texture(gl: moderngl.Context, texels: Words) -> moderngl.Texture:
-    rows = -(-len(texels) // _WIDTH)
-    if rows > (limit := int(gl.info["GL_MAX_TEXTURE_SIZE"])):
+    try:
+        texture = gl.texture((_WIDTH, len(texels) // _WIDTH), 4, texels, dtype="u4")
+    except moderngl.Error as error:
         raise RenderError(
             "tracing rays through the meshes",
-            f"{len(texels):,} texels, and this OpenGL holds {limit * _WIDTH:,}",
+            f"OpenGL has no room for {size_text(texels.nbytes)} of them ({error})",
             "use interfaces=tl.ScreenInterfaces(), or coarser meshes",
-        )
-    padded = np.zeros((rows * _WIDTH, 4), np.uint32)
-    padded[: len(texels)] = texels
-    texture = gl.texture((_WIDTH, rows), 4, padded, dtype="u4")
+        ) from error
     texture.filter = moderngl.NEAREST, moderngl.NEAREST
     return texture
