@@ -9,7 +9,7 @@ import trimesh
 import translucent as tl
 from translucent.arrays import Array
 from translucent.geometry import bvh
-from translucent.geometry.bvh import Hierarchy, build_hierarchy, sah_cost
+from translucent.geometry.bvh import Hierarchy, build_hierarchy, parents, sah_cost
 from translucent.gpu.hierarchies import STEPS, packed_mesh, packed_nodes, packed_normals
 
 OCTANTS = [tuple(bool(octant >> axis & 1) for axis in range(3)) for octant in range(8)]
@@ -62,7 +62,7 @@ def check(tree: Hierarchy, corners: Array, leaf_size: int = bvh.LEAF_SIZE) -> No
     assert sorted(held) == list(range(count))
     assert tree.count.max() <= leaf_size
     assert (tree.size[leaf] == 1).all()
-    assert tree.size[0] == len(tree.size) == 2 * leaf.sum() - 1
+    assert tree.size[0] == len(tree.size) < 2 * leaf.sum()
     rounded = corners.astype(np.float32)[tree.faces]
     for node in np.flatnonzero(leaf):
         own = rounded[tree.first[node] : tree.first[node] + tree.count[node]]
@@ -73,17 +73,21 @@ def check(tree: Hierarchy, corners: Array, leaf_size: int = bvh.LEAF_SIZE) -> No
 
 
 def check_order(tree: Hierarchy, order: np.ndarray) -> None:
-    """A permutation, depth-first: behind each inner node its two children, whose bounds make up its own."""
+    """A permutation, depth-first: behind each inner node its children, whose bounds make up its own."""
     assert sorted(order) == list(range(len(order)))
-    at = np.argsort(order)
+    at, above = np.argsort(order), parents(tree)
     for place, node in enumerate(at):
         if tree.count[node]:
             continue
-        one = at[place + 1]
-        other = at[place + 1 + tree.size[one]]
-        assert tree.size[node] == 1 + tree.size[one] + tree.size[other]
-        np.testing.assert_array_equal(tree.low[node], np.minimum(tree.low[one], tree.low[other]))
-        np.testing.assert_array_equal(tree.high[node], np.maximum(tree.high[one], tree.high[other]))
+        children, behind = [], place + 1
+        while behind < place + tree.size[node]:
+            children.append(at[behind])
+            behind += tree.size[at[behind]]
+        assert behind == place + tree.size[node]
+        assert 2 <= len(children) <= bvh.MOST_CHILDREN
+        assert (above[children] == node).all()
+        np.testing.assert_array_equal(tree.low[node], tree.low[children].min(axis=0))
+        np.testing.assert_array_equal(tree.high[node], tree.high[children].max(axis=0))
 
 
 @pytest.mark.parametrize("leaf_size", [1, 4, 8])
@@ -213,10 +217,11 @@ def test_packed_bounds_hold_those_of_all_nodes(kind: str, rng: np.random.Generat
     corners = corners / np.abs(corners).max()
     tree = tree_of(corners)
     step = 2 / STEPS
-    for order, nodes in zip(tree.orders, packed_nodes(tree), strict=True):
+    for signs, order, nodes in zip(OCTANTS, tree.orders, packed_nodes(tree), strict=True):
         x, y, z, link = nodes[order].T.astype(np.int64)
-        low = np.stack([x & 0xFFFF, x >> 16, y & 0xFFFF], axis=1) * step - 1
-        high = np.stack([y >> 16, z & 0xFFFF, z >> 16], axis=1) * step - 1
+        near = np.stack([x & 0xFFFF, x >> 16, y & 0xFFFF], axis=1) * step - 1
+        far = np.stack([y >> 16, z & 0xFFFF, z >> 16], axis=1) * step - 1
+        low, high = np.where(signs, far, near), np.where(signs, near, far)
         # At least a step outwards, but for the walls of the grid, beyond which there is nothing.
         assert (np.minimum(tree.low - step, 1) >= low)[low > -1].all()
         assert (tree.high + step <= high)[high < 1].all()

@@ -98,16 +98,19 @@ def _frame(low: Array, high: Array) -> tuple[Array, float]:
 def packed_nodes(tree: Hierarchy) -> Words:
     """(8, n, 4): nodes of a hierarchy within -1 to 1, in the orders of all octants.
 
-    Bounds are rounded outwards by one to two steps; links count from the first node of their order.
+    Bounds are rounded outwards by one to two steps: first those that rays of the octant come to first, x, y and z, then
+    the others. Links count from the first node of their order.
     """
     half = STEPS / 2
     low = np.clip(np.floor((tree.low.astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
     high = np.clip(np.ceil((tree.high.astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
     leaf = tree.count > 0
     held = np.uint32(1 << 31) | (tree.count - 1).astype(np.uint32) << _FIRST_BITS | tree.first.astype(np.uint32)
-    bounds = [low[:, 0] | low[:, 1] << 16, low[:, 2] | high[:, 0] << 16, high[:, 1] | high[:, 2] << 16]
     nodes = np.empty((8, len(leaf), 4), np.uint32)
-    for order, found in zip(tree.orders, nodes, strict=True):
+    for octant, (order, found) in enumerate(zip(tree.orders, nodes, strict=True)):
+        turned = (octant >> np.arange(3) & 1).astype(bool)
+        near, far = np.where(turned, high, low).T, np.where(turned, low, high).T
+        bounds = [near[0] | near[1] << 16, near[2] | far[0] << 16, far[1] | far[2] << 16]
         link = np.where(leaf, held, (order + tree.size).astype(np.uint32))
         found[order] = np.stack([*bounds, link], axis=1)
     return nodes
@@ -141,13 +144,13 @@ class SceneHierarchies:
     ----------
     nodes, triangles : moderngl.Texture
     object_nodes : int
-        Nodes of the hierarchy of objects.
+        Nodes of the hierarchy of objects, in each of eight orders.
     """
 
     def __init__(self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int) -> None:
         before_making(gl)
         _require_room(gl, meshes)
-        self._rows = -(-2 * objects // _WIDTH)
+        self._rows = -(-8 * 2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
         packed = [packed_mesh(mesh) for mesh in meshes]
         nodes = _texels(gl, self._rows * _WIDTH + sum(8 * part.nodes.shape[1] for part in packed))
@@ -182,13 +185,15 @@ class SceneHierarchies:
         with np.errstate(under="ignore"):
             local: Floats = ((boxes - middle) * scale).astype(np.float32)
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
-        nodes = packed_nodes(tree)[0]
+        nodes = packed_nodes(tree)
+        self.object_nodes = nodes.shape[1]
+        nodes[..., 3] += (np.arange(8)[:, None] * self.object_nodes * (nodes[..., 3] < 1 << 31)).astype(np.uint32)
+        nodes = nodes.reshape(-1, 4)
         leaf = nodes[:, 3] >= 1 << 31
         nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[nodes[leaf, 3] & 0x0FFFFFFF].astype(np.uint32)
         reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
-        self.object_nodes = len(nodes)
         ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1] + 1.0
         media = _media_numbers(scene)
         rows = []
