@@ -5,7 +5,7 @@
 
 uniform usampler2D hierarchy_nodes;      // bounds, and link: where to go on, or the triangles of a leaf
 uniform usampler2D hierarchy_triangles;  // three texels each: corners, and their normals packed
-uniform int object_nodes;                // nodes of the hierarchy of objects
+uniform int object_nodes;                // nodes of the hierarchy of objects, in each order
 uniform vec4 objects_frame;              // center and scale of its coordinates
 
 #if ONE_OBJECT
@@ -50,14 +50,15 @@ LocalRay local_ray(vec3 origin, vec3 direction) {
     return LocalRay(origin, (origin + 1.0) * HIERARCHY_STEPS, inverse / HIERARCHY_STEPS);
 }
 
+// Which of the eight orders of nodes a ray goes through: those that it comes to first are first, and so are their bounds.
+int octant_of(vec3 direction) {
+    return (direction.x < 0.0 ? 1 : 0) + (direction.y < 0.0 ? 2 : 0) + (direction.z < 0.0 ? 4 : 0);
+}
+
 // Whether a ray meets the bounds of a node between two distances.
 bool meets_bounds(uvec4 node, LocalRay ray, float start, float path) {
-    vec3 low = vec3(node.x & 0xffffu, node.x >> 16, node.y & 0xffffu);
-    vec3 high = vec3(node.y >> 16, node.z & 0xffffu, node.z >> 16);
-    vec3 one = (low - ray.start) * ray.inverse;
-    vec3 other = (high - ray.start) * ray.inverse;
-    vec3 near = min(one, other);
-    vec3 far = max(one, other);
+    vec3 near = (vec3(node.x & 0xffffu, node.x >> 16, node.y & 0xffffu) - ray.start) * ray.inverse;
+    vec3 far = (vec3(node.y >> 16, node.z & 0xffffu, node.z >> 16) - ray.start) * ray.inverse;
     return max(max(near.x, near.y), max(near.z, start)) <= min(min(far.x, far.y), min(far.z, path));
 }
 
@@ -104,9 +105,8 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
     int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     vec3 turned = along_last(along, axis);
     vec3 shear = vec3(turned.xy, 1.0) / turned.z;
-    int octant = (along.x < 0.0 ? 1 : 0) + (along.y < 0.0 ? 2 : 0) + (along.z < 0.0 ? 4 : 0);
     int count = int(place.node_count.x) << 12 | int(place.node_count.y);
-    int node = (int(place.first_node.x) << 12 | int(place.first_node.y)) + octant * count;
+    int node = (int(place.first_node.x) << 12 | int(place.first_node.y)) + octant_of(along) * count;
     int end = node + count;
     while (node < end) {
         // All rays of a group look for their next leaf, and then test triangles together.
@@ -135,8 +135,9 @@ Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, int left_ou
     meet_object(0, origin, direction, start, hit);
 #else
     LocalRay ray = local_ray((origin - objects_frame.xyz) * objects_frame.w, direction * objects_frame.w);
-    int node = 0;
-    while (node < object_nodes) {
+    int node = octant_of(direction) * object_nodes;
+    int last = node + object_nodes;
+    while (node < last) {
         uvec4 found = texelFetch(hierarchy_nodes, hierarchy_texel(node), 0);
         bool leaf = found.w >= 0x80000000u;
         if (!meets_bounds(found, ray, start, hit.path)) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ import translucent as tl
 from tests.rays import Found, agreeing, embree_nearest, inside_points, random_rays, through
 from translucent.assets import mesh_path
 from translucent.gpu import hierarchies as module
-from translucent.gpu.hierarchies import HierarchyCache, SceneHierarchies
+from translucent.gpu.hierarchies import HierarchyCache, SceneHierarchies, packed_mesh
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.ray_probe import RayProbe
 from translucent.reference.hits import camera_hits
@@ -184,7 +185,7 @@ def test_rays_from_afar_do_not_pass_between_triangles(trace: Tracing, rng: np.ra
         origins = (distance * random_directions(rng, 20_000)).astype(np.float32).astype(np.float64)
         found = trace(scene, *through(origins, targets))
         assert (found.face < 0).sum() == 0
-        # A float32 direction misses its aim by 6e-8 of the distance, on a ball that the ray may graze at 0.44 in cosine.
+        # A direction in float32 misses its aim by 6e-8 of the distance, on a ball that it meets at a cosine above 0.4.
         assert np.abs(found.path - (distance - 0.7)).max() < 1.0 + 1e-5 * distance
 
 
@@ -234,12 +235,43 @@ def test_a_body_that_moves_keeps_the_textures(trace: Tracing, monkeypatch: pytes
 
 
 def fake(limit: int) -> Any:
+    """An OpenGL in which nothing can be made."""
     return SimpleNamespace(info={"GL_MAX_TEXTURE_SIZE": limit}, extra=None)
 
 
-def test_textures_that_do_not_fit_are_refused_before_they_are_made() -> None:
-    with pytest.raises(tl.RenderError, match=r"texture size ends at 2048; use interfaces=tl.ScreenInterfaces\(\)"):
+def test_textures_that_do_not_fit_are_refused_before_they_are_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "build_hierarchy", None)
+    with pytest.raises(tl.RenderError, match=r"end at 2048 texels a side, .* use interfaces=tl.ScreenInterfaces\(\)$"):
         SceneHierarchies(fake(2048), [ball()], 1)
+    # Thirty million triangles, of which only the number is asked for.
+    crowd: Any = SimpleNamespace(faces=np.broadcast_to(np.int32(0), (30_000_000, 3)))
+    with pytest.raises(tl.RenderError, match=r"at least 119,999,992 texels, .* holds 67,108,864; .* coarser meshes"):
+        SceneHierarchies(fake(16384), [crowd], 1)
+
+
+def test_textures_that_turn_out_not_to_fit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_require_room", lambda gl, meshes: None)
+    monkeypatch.setattr(module, "_MOST_ROWS", 2)
+    with pytest.raises(tl.RenderError, match="texels, and this OpenGL holds 8,192"):
+        SceneHierarchies(fake(16384), [ball()], 1)
+
+
+def test_much_memory_is_told_before_it_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "build_hierarchy", None)
+    monkeypatch.setattr(module, "MUCH_MEMORY", 1 << 20)
+    with pytest.warns(tl.TranslucentWarning, match=r"20,480 triangles takes up to 18.6 MiB of memory; use"):
+        module._require_room(fake(16384), [ball(5)])
+
+
+def test_memory_is_not_underestimated() -> None:
+    mesh = ball(5)
+    tracemalloc.start()
+    packed = packed_mesh(mesh)
+    kept, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 2 * (packed.nodes.nbytes + packed.triangles.nbytes) < module._PACKED_BYTES * len(mesh.faces)
+    assert peak < (module._PACKED_BYTES + module._BUILD_BYTES) * len(mesh.faces) < 2 * peak
+    assert kept < peak
 
 
 def test_numbers_of_nodes_survive_float32() -> None:

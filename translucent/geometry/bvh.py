@@ -29,6 +29,9 @@ REACH = 8
 #: Largest number of triangles in a leaf.
 LEAF_SIZE = 4
 
+#: Largest number of children of a node.
+MOST_CHILDREN = 4
+
 #: Cost of testing a box, relative to that of a triangle.
 BOX_COST = 1.0
 
@@ -171,46 +174,84 @@ def _partners(low: Floats, high: Floats) -> Integers:
 
 
 def _laid_out(tree: _Tree, order: Integers, leaf_size: int) -> Hierarchy:
-    """Depth-first layout of a tree, with leaves where the surface area heuristic wants them."""
-    leaves = len(order)
-    total = 2 * leaves - 1
-    size = tree.high - tree.low
-    area = size[0] * size[1] + (size[0] + size[1]) * size[2]
+    """Depth-first layout of the nodes of a tree that are worth a test."""
+    leaves, total = len(order), len(tree.low[0])
     counts = np.ones(total, np.int32)
-    nodes = np.ones(total, np.int32)
-    cost = area.copy()
-    is_leaf = np.ones(total, bool)
     for begin, end in tree.rounds:
         left, right = tree.children[:, begin:end]
         counts[begin:end] = counts[left] + counts[right]
-        split = BOX_COST * 2.0 * area[begin:end] + cost[left] + cost[right]
-        whole = area[begin:end] * counts[begin:end]
-        is_leaf[begin:end] = (counts[begin:end] <= leaf_size) & (whole <= split)
-        cost[begin:end] = np.where(is_leaf[begin:end], whole, split)
-        nodes[begin:end] = np.where(is_leaf[begin:end], 1, 1 + nodes[left] + nodes[right])
-    first, shown = np.zeros(total, np.int32), np.ones(total, bool)
+    shares = _shares(tree, counts, leaf_size)
+    shown = shares == 1
+    nodes = shown.astype(np.int32)
+    for begin, end in tree.rounds:
+        left, right = tree.children[:, begin:end]
+        nodes[begin:end] += nodes[left] + nodes[right]
+    first = np.zeros(total, np.int32)
     for begin, end in reversed(tree.rounds):
         left, right = tree.children[:, begin:end]
         first[left] = first[begin:end]
         first[right] = first[begin:end] + counts[left]
-        shown[left] = shown[right] = shown[begin:end] & ~is_leaf[begin:end]
     faces = np.empty(leaves, np.int32)
     faces[first[:leaves]] = order
     chosen = np.flatnonzero(shown)[::-1]  # the root was made last
-    leaf = is_leaf[chosen]
+    leaf = nodes[chosen] == 1
     return Hierarchy(
         np.ascontiguousarray(tree.low[:, chosen].T),
         np.ascontiguousarray(tree.high[:, chosen].T),
         nodes[chosen],
         np.where(leaf, first[chosen], 0).astype(np.int32),
         np.where(leaf, counts[chosen], 0).astype(np.int32),
-        _depth_first(tree, nodes)[:, chosen],
+        _depth_first(tree, nodes, shown)[:, chosen],
         faces,
     )
 
 
-def _depth_first(tree: _Tree, nodes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """(8, n): place of each node in the order for each octant; `nodes` counts those of subtrees."""
+def _shares(tree: _Tree, counts: npt.NDArray[np.int32], leaf_size: int) -> npt.NDArray[np.int8]:
+    """(n,): 1 for the nodes of a tree that are kept, 0 for those within leaves; others are replaced by that many.
+
+    Skip links let a node have any number of children. One whose bounds are hardly smaller than those of the node above
+    it costs every ray a test and spares few of them the others, so its children take its place. Dynamic programming
+    finds the choice of least cost, as Ylitie et al. (2017, "Efficient Incoherent Ray Traversal on GPUs Through
+    Compressed Wide BVHs", section 3.1) do for wide nodes: ``best[k - 1]`` is the least cost below a node that is
+    replaced by k others, ``best[0]`` that of the node itself, and tests of those k are paid for above.
+    """
+    size = tree.high - tree.low
+    area = size[0] * size[1] + (size[0] + size[1]) * size[2]
+    total = len(area)
+    best = np.full((MOST_CHILDREN, total), np.inf, np.float32)
+    best[0] = area
+    taken = np.zeros((MOST_CHILDREN, total), np.int8)  # of k, those that come from the left child
+    children = np.zeros(total, np.int8)  # 0 for leaves
+    for begin, end in tree.rounds:
+        left, right = tree.children[:, begin:end]
+        below_left, below_right = best[:, left], best[:, right]
+        own, own_taken = best[:, begin:end], taken[:, begin:end]
+        cost = area[begin:end] * counts[begin:end]
+        cost[counts[begin:end] > leaf_size] = np.inf
+        for k in range(2, MOST_CHILDREN + 1):
+            for i in range(1, k):
+                below = below_left[i - 1] + below_right[k - i - 1]
+                less = below < own[k - 1]
+                np.copyto(own[k - 1], below, where=less)
+                np.copyto(own_taken[k - 1], i, where=less)
+            with_tests = own[k - 1] + BOX_COST * k * area[begin:end]
+            less = with_tests < cost
+            np.copyto(cost, with_tests, where=less)
+            np.copyto(children[begin:end], k, where=less)
+        own[0] = cost
+    shares = np.zeros(total, np.int8)
+    shares[-1] = 1
+    for begin, end in reversed(tree.rounds):
+        left, right = tree.children[:, begin:end]
+        share = shares[begin:end]
+        split = np.where(share == 1, children[begin:end], share)
+        from_left = np.take_along_axis(taken[:, begin:end], np.maximum(split, 1)[None].astype(np.int64) - 1, axis=0)[0]
+        shares[left], shares[right] = from_left, split - from_left
+    return shares
+
+
+def _depth_first(tree: _Tree, nodes: npt.NDArray[np.int32], shown: npt.NDArray[np.bool_]) -> npt.NDArray[np.int32]:
+    """(8, n): place of each node in the order for each octant; `nodes` counts those that are shown in subtrees."""
     center = tree.low + tree.high
     orders = np.zeros((8, len(nodes)), np.int32)
     octants = np.arange(8)
@@ -220,7 +261,7 @@ def _depth_first(tree: _Tree, nodes: npt.NDArray[np.int32]) -> npt.NDArray[np.in
         axis = np.abs(apart).argmax(axis=0)
         swapped = np.take_along_axis(apart, axis[None], axis=0)[0] < 0
         swap = swapped ^ (octants[:, None] >> axis & 1).astype(bool)
-        place = orders[:, begin:end] + 1
+        place = orders[:, begin:end] + shown[begin:end]
         orders[:, left] = place + np.where(swap, nodes[right], 0)
         orders[:, right] = place + np.where(swap, 0, nodes[left])
     return orders
@@ -230,5 +271,16 @@ def sah_cost(hierarchy: Hierarchy) -> float:
     """Expected box and triangle tests of a long ray that meets the root, by the surface area heuristic."""
     size = np.asarray(hierarchy.high, np.float64) - hierarchy.low
     area: Array = size[:, 0] * size[:, 1] + (size[:, 0] + size[:, 1]) * size[:, 2]
-    inner = hierarchy.count == 0
-    return float((2.0 * BOX_COST * area[inner].sum() + (area * hierarchy.count).sum()) / area[0])
+    tests = BOX_COST * area[parents(hierarchy)[1:]].sum() + (area * hierarchy.count).sum()
+    return float(tests / area[0])
+
+
+def parents(hierarchy: Hierarchy) -> Integers:
+    """(n,): the node above each; the root has itself."""
+    place, count = hierarchy.orders[0].astype(np.int64), len(hierarchy.size)
+    steps = np.bincount(place + 1, minlength=count + 2) - np.bincount(place + hierarchy.size, minlength=count + 2)
+    depth = np.cumsum(steps)[place]
+    key = depth * count + place
+    order = np.argsort(key)
+    above = order[np.maximum(np.searchsorted(key[order], key - count) - 1, 0)]
+    return np.where(depth > 0, above, 0)

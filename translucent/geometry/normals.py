@@ -63,7 +63,8 @@ def drawn_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
 
 def keep_drawn_normals(mesh: Mesh, normals: npt.NDArray[np.floating]) -> None:
     """Cache these `drawn_normals`, which have been made elsewhere."""
-    _drawn[mesh] = normals.astype(np.float32, copy=False)
+    with np.errstate(under="ignore"):
+        _drawn[mesh] = normals.astype(np.float32, copy=False)
 
 
 def has_drawn_normals(mesh: Mesh) -> bool:

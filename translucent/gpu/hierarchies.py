@@ -6,6 +6,7 @@ each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -15,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
-from translucent.errors import RenderError
-from translucent.geometry.bvh import Floats, Hierarchy, build_hierarchy
+from translucent.errors import RenderError, TranslucentWarning
+from translucent.files.reading import size_text
+from translucent.geometry.bvh import LEAF_SIZE, Floats, Hierarchy, build_hierarchy
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.body_uniforms import bounded_extinction
@@ -36,6 +38,16 @@ _WIDTH = 1 << HIERARCHY_WIDTH_BITS
 
 #: Bits of a leaf's link that hold its first triangle; three others hold how many follow it, the highest tells a leaf.
 _FIRST_BITS = 28
+
+#: Rows of texels up to which the numbers of nodes and triangles fit into links.
+_MOST_ROWS = 1 << (_FIRST_BITS - HIERARCHY_WIDTH_BITS)
+
+#: Bytes for each triangle that are kept, with the copy in OpenGL, and those that building takes for a while.
+_PACKED_BYTES = 300
+_BUILD_BYTES = 650
+
+#: Bytes of memory that nobody expects a picture to take.
+MUCH_MEMORY = 4 << 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,23 +98,29 @@ def _frame(low: Array, high: Array) -> tuple[Array, float]:
 def packed_nodes(tree: Hierarchy) -> Words:
     """(8, n, 4): nodes of a hierarchy within -1 to 1, in the orders of all octants.
 
-    Bounds are rounded outwards by one to two steps; links count from the first node of their order.
+    Bounds are rounded outwards by one to two steps: first those that rays of the octant come to first, x, y and z, then
+    the others. Links count from the first node of their order.
     """
     half = STEPS / 2
     low = np.clip(np.floor((tree.low.astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
     high = np.clip(np.ceil((tree.high.astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
     leaf = tree.count > 0
     held = np.uint32(1 << 31) | (tree.count - 1).astype(np.uint32) << _FIRST_BITS | tree.first.astype(np.uint32)
-    bounds = [low[:, 0] | low[:, 1] << 16, low[:, 2] | high[:, 0] << 16, high[:, 1] | high[:, 2] << 16]
     nodes = np.empty((8, len(leaf), 4), np.uint32)
-    for order, found in zip(tree.orders, nodes, strict=True):
+    for octant, (order, found) in enumerate(zip(tree.orders, nodes, strict=True)):
+        turned = (octant >> np.arange(3) & 1).astype(bool)
+        near, far = np.where(turned, high, low).T, np.where(turned, low, high).T
+        bounds = [near[0] | near[1] << 16, near[2] | far[0] << 16, far[1] | far[2] << 16]
         link = np.where(leaf, held, (order + tree.size).astype(np.uint32))
         found[order] = np.stack([*bounds, link], axis=1)
     return nodes
 
 
 def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
-    """(...,): unit vectors (..., 3) as 2 x 16 bits on an octahedron; 4e-5 rad off at most."""
+    """(...,): unit vectors (..., 3) as 2 x 16 bits on an octahedron; 6.5e-5 rad off at most.
+
+    Half a step in each coordinate moves a point of the octahedron by sqrt(6) / 65535, at a distance of 1 / sqrt(3).
+    """
     size = np.abs(normals).sum(axis=-1, keepdims=True)
     at = normals / np.where(size > 0, size, 1.0)
     folded = (1 - np.abs(at[..., 1::-1])) * np.where(at[..., :2] >= 0, 1.0, -1.0)
@@ -126,26 +144,29 @@ class SceneHierarchies:
     ----------
     nodes, triangles : moderngl.Texture
     object_nodes : int
-        Nodes of the hierarchy of objects.
+        Nodes of the hierarchy of objects, in each of eight orders.
     """
 
     def __init__(self, gl: moderngl.Context, meshes: Sequence[Mesh], objects: int) -> None:
         before_making(gl)
-        self._packed = [packed_mesh(mesh) for mesh in meshes]
-        self._rows = -(-2 * objects // _WIDTH)
+        _require_room(gl, meshes)
+        self._rows = -(-8 * 2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
-        start = self._rows * _WIDTH
-        parts, triangles, first = [np.zeros((start, 4), np.uint32)], 0, start
-        for mesh, packed in zip(meshes, self._packed, strict=True):
-            self._spans[id(mesh)] = _Span(first, packed.nodes.shape[1], triangles)
-            for order in packed.nodes:
-                nodes = order.copy()
-                nodes[:, 3] += np.where(nodes[:, 3] >= 1 << 31, triangles, first).astype(np.uint32)
-                parts.append(nodes)
-                first += len(nodes)
-            triangles += len(packed.triangles) // 3
-        self.nodes = _texture(gl, np.concatenate(parts))
-        self.triangles = _texture(gl, np.concatenate([packed.triangles for packed in self._packed]))
+        packed = [packed_mesh(mesh) for mesh in meshes]
+        nodes = _texels(gl, self._rows * _WIDTH + sum(8 * part.nodes.shape[1] for part in packed))
+        triangles = _texels(gl, sum(len(part.triangles) for part in packed))
+        first, triangle = self._rows * _WIDTH, 0
+        for mesh, part in zip(meshes, packed, strict=True):
+            count, texels = part.nodes.shape[1], len(part.triangles)
+            self._spans[id(mesh)] = _Span(first, count, triangle)
+            triangles[3 * triangle : 3 * triangle + texels] = part.triangles
+            for order in part.nodes:
+                own = nodes[first : first + count]
+                own[:] = order
+                own[:, 3] += np.where(order[:, 3] >= 1 << 31, triangle, first).astype(np.uint32)
+                first += count
+            triangle += texels // 3
+        self.nodes, self.triangles = _texture(gl, nodes), _texture(gl, triangles)
         self.object_nodes = 0
 
     def place(self, scene: Scene, center: Array) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
@@ -164,13 +185,15 @@ class SceneHierarchies:
         with np.errstate(under="ignore"):
             local: Floats = ((boxes - middle) * scale).astype(np.float32)
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
-        nodes = packed_nodes(tree)[0]
+        nodes = packed_nodes(tree)
+        self.object_nodes = nodes.shape[1]
+        nodes[..., 3] += (np.arange(8)[:, None] * self.object_nodes * (nodes[..., 3] < 1 << 31)).astype(np.uint32)
+        nodes = nodes.reshape(-1, 4)
         leaf = nodes[:, 3] >= 1 << 31
         nodes[leaf, 3] = np.uint32(1 << 31) | tree.faces[nodes[leaf, 3] & 0x0FFFFFFF].astype(np.uint32)
         reserved = np.zeros((self._rows * _WIDTH, 4), np.uint32)
         reserved[: len(nodes)] = nodes
         self.nodes.write(reserved, viewport=(0, 0, _WIDTH, self._rows))
-        self.object_nodes = len(nodes)
         ranks = np.unique([body.priority for body in scene.objects], return_inverse=True)[1] + 1.0
         media = _media_numbers(scene)
         rows = []
@@ -267,16 +290,50 @@ def _media_numbers(scene: Scene) -> list[float]:
     return [float(numbers.setdefault(body.medium, len(numbers))) for body in scene.objects]
 
 
+def _require_room(gl: moderngl.Context, meshes: Sequence[Mesh]) -> None:
+    """Raise `RenderError` before anything is built if the textures cannot fit; warn if much memory is needed."""
+    faces = [len(mesh.faces) for mesh in meshes]
+    least_nodes = sum(8 * (2 * -(-count // LEAF_SIZE) - 1) for count in faces)
+    for texels in (least_nodes, 3 * sum(faces)):
+        _check_texels(gl, texels)
+    new = [len(mesh.faces) for mesh in meshes if mesh not in _packed]
+    needed = _PACKED_BYTES * sum(faces) + _BUILD_BYTES * max(new, default=0)
+    if needed > MUCH_MEMORY:
+        warnings.warn(
+            TranslucentWarning(
+                f"tracing rays through {sum(faces):,} triangles takes up to {size_text(needed)} of memory; "
+                "use interfaces=tl.ScreenInterfaces(), or coarser meshes, for less"
+            ),
+            stacklevel=2,
+        )
+
+
+def _check_texels(gl: moderngl.Context, texels: int) -> None:
+    """Raise `RenderError` if a texture of this OpenGL does not hold so many texels."""
+    limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
+    if limit < _WIDTH:
+        found, do = f"this OpenGL's textures end at {limit} texels a side, and hierarchies take {_WIDTH}", ""
+    elif texels > (room := min(limit, _MOST_ROWS) * _WIDTH):
+        found, do = f"at least {texels:,} texels, and this OpenGL holds {room:,}", ", or coarser meshes"
+    else:
+        return
+    raise RenderError("tracing rays through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
+
+
+def _texels(gl: moderngl.Context, count: int) -> Words:
+    """Whole rows of texels, 0 yet, for so many."""
+    _check_texels(gl, count)
+    return np.zeros((-(-count // _WIDTH) * _WIDTH, 4), np.uint32)
+
+
 def _texture(gl: moderngl.Context, texels: Words) -> moderngl.Texture:
-    rows = -(-len(texels) // _WIDTH)
-    if rows > (limit := int(gl.info["GL_MAX_TEXTURE_SIZE"])):
+    try:
+        texture = gl.texture((_WIDTH, len(texels) // _WIDTH), 4, texels, dtype="u4")
+    except moderngl.Error as error:
         raise RenderError(
             "tracing rays through the meshes",
-            f"{len(texels):,} texels, and this OpenGL holds {limit * _WIDTH:,}",
+            f"OpenGL has no room for {size_text(texels.nbytes)} of them ({error})",
             "use interfaces=tl.ScreenInterfaces(), or coarser meshes",
-        )
-    padded = np.zeros((rows * _WIDTH, 4), np.uint32)
-    padded[: len(texels)] = texels
-    texture = gl.texture((_WIDTH, rows), 4, padded, dtype="u4")
+        ) from error
     texture.filter = moderngl.NEAREST, moderngl.NEAREST
     return texture

@@ -1,5 +1,6 @@
-"""Nearest surfaces on rays anywhere in a scene, found on the GPU as the traced interfaces find them: to check hierarchies
-and to measure them.
+"""Nearest surfaces on rays anywhere in a scene, found on the GPU as the traced interfaces find them.
+
+To check hierarchies, and to measure them.
 """
 
 from __future__ import annotations
