@@ -58,7 +58,7 @@ class TracedInterfacesPass:
         emitted, through, *_ = job.targets.result().color_attachments
         maps = job.resources.environments.light(environment)
         hierarchies = job.resources.hierarchies.of(scene)
-        rows, frame = hierarchies.place(scene, media_center(scene))
+        rows, frame = hierarchies.place(scene, media_center(scene), job.features.sheets)
         contents = surface_table(scene, job.features.sheets), rows
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
@@ -81,9 +81,11 @@ class TracedInterfacesPass:
             textures["seen_map"] = job.resources.environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
+        inside = job.placed.starts_inside
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._variants.program(
             FORKS=forks,
+            FROM_EYE=inside or any(not body.has_interface for body in scene.bodies),
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
@@ -99,7 +101,8 @@ class TracedInterfacesPass:
         if "sample_number" in program:
             set_uniform(program, "sample_number", job.sample)
             set_uniform(program, "blurred_share", blurred_share(job.samples))
-        set_uniform(program, "start_record", _record_at_eye(job))
+        if "start_record" in program:
+            set_uniform(program, "start_record", _record_at_eye(job))
         if "object_nodes" in program:
             set_uniform(program, "object_nodes", hierarchies.object_nodes)
             set_uniform(program, "objects_frame", frame)
@@ -127,7 +130,7 @@ def _record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
     entries = [
         number + 1
         for number, placement in enumerate(job.placed.placements)
-        if job.scene.objects[number].sheet_thickness is None
+        if number not in job.features.sheets
         for _ in range(round(placement.expected_count[1]))
     ][::-1][:8]
     entries += [0] * (8 - len(entries))
