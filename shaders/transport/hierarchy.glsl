@@ -127,9 +127,15 @@ void meet_object(int object, vec3 origin, vec3 direction, float start, inout Hit
     if (own.object >= 0) { hit = Hit(own.path + ahead, own.object, own.triangle, own.weights); }
 }
 
-// The nearest surface between two distances on a ray, of all objects but `left_out`. Positions count from the center of the
-// media.
-Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, int left_out) {
+// Whether an object stands in a record (see record.glsl).
+bool is_listed(uvec4 record, int object) {
+    uvec4 id = uvec4(uint(object + 1));
+    return any(equal(record & 0xffffu, id)) || any(equal(record >> 16, id));
+}
+
+// The nearest surface between two distances on a ray, of all objects but those in the record `left_out`. Positions count
+// from the center of the media.
+Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, uvec4 left_out) {
     Hit hit = Hit(end, -1, -1, vec2(0.0));
 #if ONE_OBJECT
     meet_object(0, origin, direction, start, hit);
@@ -145,7 +151,7 @@ Hit nearest_hit(vec3 origin, vec3 direction, float start, float end, int left_ou
             continue;
         }
         int object = int(found.w & 0x0fffffffu);
-        if (leaf && object != left_out) { meet_object(object, origin, direction, start, hit); }
+        if (leaf && !is_listed(left_out, object)) { meet_object(object, origin, direction, start, hit); }
         ++node;
     }
 #endif

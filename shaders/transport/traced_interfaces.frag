@@ -31,7 +31,9 @@ uniform int most_interfaces;
 uniform int sample_number;           // of a pixel
 uniform float blurred_share;         // of the variance of microfacets, that blurs what is seen in them; the rest is sampled
 #endif
-uniform uvec4 start_record;          // of rays that start inside bodies
+#if FROM_EYE
+uniform uvec4 start_record;          // the bodies that the eye is in
+#endif
 
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
@@ -40,15 +42,15 @@ const int KIND_SOLID = 0;
 const int KIND_SHEET = 1;
 const int KIND_OPAQUE = 2;
 const int KIND_UNSEEN = 3;  // drawn over the picture, or from its back
+const int KIND_FILM = 4;    // a sheet that only dims and glows
 const float EDGE_ON = 1e-3;
-const float FAINTEST = 1.0 / 1024.0;
 const int MOST_STEPS = 512;
 const int WAITING = 8;
 
 // One of the rays that wait to be followed.
 struct Ray {
     vec3 origin;
-    float before;     // metres that it has come already: its origin is a little off the surface that it leaves
+    float skipped;    // metres of its path that lie before its origin: from the surface, which it must not meet again
     vec3 direction;
     vec3 share;       // of the light at its end that reaches the eye
     uvec4 record;
@@ -73,6 +75,15 @@ vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
 
 float strength(vec3 share) {
     return dot(share, vec3(1.0));
+}
+
+// Ray that goes on from a point of a surface: on the side that its direction goes to, a little off, so that it does not meet
+// the surface again.
+void leave(inout Ray ray, vec3 point, vec3 face_normal) {
+    float offset = SURFACE_OFFSET * surface_reach;
+    float across = dot(face_normal, ray.direction);
+    ray.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
+    ray.skipped = offset * abs(across);
 }
 
 // Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
@@ -136,14 +147,14 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
 // The same where the picture shows it: with its textures, and blurred behind rough interfaces.
 vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
 #if OPAQUE
-    vec3 seen = seen_at(point);
-    if (in_picture(seen.xy)) {
-        ivec2 texel = stored(texel_of(seen.xy));
+    vec3 shown = seen_at(point);
+    if (in_picture(shown.xy)) {
+        ivec2 texel = stored(texel_of(shown.xy));
         float there = texelFetch(opaque_axial_depth, texel, 0).r;
-        if (abs(there - seen.z) * surface_ahead.y < 1e-2 * surface_reach) {
+        if (abs(there - shown.z) * surface_ahead.y < 1e-2 * surface_reach) {
 #if MICROFACETS
             if (ray.blur > 0.0) {
-                vec4 blurred = blurred_opaque(seen.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
+                vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
                 return blurred.rgb + (1.0 - blurred.a) * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
             }
 #endif
@@ -154,7 +165,27 @@ vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
     return opaque_light(body, normal, ray.direction, point);
 }
 
-// The record beyond a surface of a solid. sound: it is balanced, and within what a record holds.
+// The first interface, as the rasterizer has found it.
+struct Seen {
+    int object;
+    vec3 point;
+    vec3 normal;
+    Finish finish;
+};
+
+// All surfaces that a ray meets in one place; solids are crossed together, and their interface is one.
+struct Place {
+    int object;          // whose interface it is: of the solid that is entered, else of that left, else of a sheet; or opaque
+    bool outside;        // its outer side is met
+    vec3 smooth_normal;  // towards the ray, as is face_normal
+    vec3 face_normal;
+    uvec4 record;        // beyond
+    float path;          // to the last of its surfaces
+    vec3 coat;           // transmittance of sheets that lie there, and of films
+    vec3 glow;           // that these add
+};
+
+// The record beyond a surface of a solid. sound: not yet unbalanced, nor beyond what a record holds.
 uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
     bool missing = false;
     uvec4 crossed = enters ? entered_record(record, object) : left_record(record, object, missing);
@@ -162,16 +193,119 @@ uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
     return crossed;
 }
 
-// Ray that goes on from a point of a surface: on the side that its direction goes to, a little off, so that it does not meet
-// the surface again.
-void leave(inout Ray ray, vec3 point, vec3 face_normal) {
-    float offset = SURFACE_OFFSET * surface_reach;
-    float across = dot(face_normal, ray.direction);
-    ray.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
-    ray.before = offset * abs(across);
+float slant(float cosine, float ior) {
+    return 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
 }
 
-Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float first_reach, Finish first_finish, int channel) {
+// Sides of a surface as a ray meets it, turned to face it.
+void met_sides(Hit hit, vec3 direction, out vec3 smooth_normal, out vec3 face_normal, out bool outside) {
+    hit_normals(hit, smooth_normal, face_normal);
+    outside = dot(face_normal, direction) < 0.0;
+    if (!outside) {
+        face_normal = -face_normal;
+        smooth_normal = -smooth_normal;
+    }
+}
+
+// Whether the step from one medium to another does anything to light.
+bool alters_light(int before, int after, int channel) {
+    if (before == after) { return false; }
+    return index_of(before, channel) != index_of(after, channel) || (before != AIR && traced_body(before).plain == 0.0)
+        || (after != AIR && traced_body(after).plain == 0.0);
+}
+
+// Light that passes a sheet which only dims and glows.
+void pass_film(TracedBody film, float cosine, inout vec3 light, inout vec3 share) {
+    float through = 1.0 / max(refracted_cosine(cosine, film.ior), MIN_THIN_LAYER_COSINE);
+#if EMISSION
+    light += share * emitted_radiance(film.emission, film.extinction, through);
+#endif
+    share *= transmittance(film.extinction * through);
+}
+
+// What a ray meets where it has hit a surface first. A sheet that lies on the interface of a solid only dims.
+Place place_at(Ray ray, Hit hit, int before, int channel, inout bool sound) {
+    Place place = Place(AIR, false, vec3(0.0), vec3(0.0), ray.record, hit.path, vec3(1.0), vec3(0.0));
+    float start = 0.0, end = 0.0;
+    int rank = -1;  // of what decides: 0 a sheet, 1 a solid, 2 what is opaque
+    uvec4 met = uvec4(0u);
+    for (int surface = 0; surface < RECORD_SIZE && hit.object >= 0; ++surface) {
+        TracedBody body = traced_body(hit.object);
+        int kind = int(body.kind);
+        vec3 smooth_normal, face_normal;
+        bool outside;
+        met_sides(hit, ray.direction, smooth_normal, face_normal, outside);
+        float across = -dot(face_normal, ray.direction);
+        bool decides = surface == 0;
+        if (kind == KIND_SOLID) {
+            place.record = crossed_record(place.record, hit.object, outside, sound);
+            int now = dominant_body(place.record);
+            if (rank == 0 && alters_light(before, now, channel)) {
+                pass_film(traced_body(place.object), -dot(place.face_normal, ray.direction), place.glow, place.coat);
+                rank = -1;
+            }
+            decides = decides || rank < 0 || (rank == 1 && (now == hit.object || (before == hit.object && now != place.object)));
+            rank = rank == 0 ? 0 : 1;
+        } else if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
+            decides = true;
+            rank = 2;
+        } else if (kind == KIND_SHEET && (rank < 0 || (rank == 1 && !alters_light(before, dominant_body(place.record), channel)))) {
+            decides = true;
+            rank = 0;
+        } else if (kind == KIND_SHEET || kind == KIND_FILM) {
+            pass_film(body, across, place.glow, place.coat);
+        }
+        if (decides) {
+            place.object = hit.object;
+            place.outside = outside;
+            place.smooth_normal = smooth_normal;
+            place.face_normal = face_normal;
+        }
+        place.path = max(place.path, hit.path);
+#if ONE_OBJECT
+        break;
+#else
+        if (rank == 2) { break; }
+        if (surface == 0) {
+            float within = SURFACE_OFFSET * surface_reach / max(across, 1e-2);
+            start = max(hit.path - 0.5 * within, 0.0);
+            end = hit.path + within;
+        }
+        met = entered_record(met, hit.object);
+        hit = nearest_hit(ray.origin, ray.direction, start, end, met);
+#endif
+    }
+    return place;
+}
+
+#if FROM_EYE
+// The record of a ray of the eye where it starts in several bodies, in the order in which it has entered them.
+uvec4 record_at_eye(vec3 eye, vec3 direction) {
+#if !ONE_OBJECT
+    if (start_record.x >> 16 == 0u) { return start_record; }
+    vec3 behind = eye - surface_reach * direction;
+    float path = 0.0, within = SURFACE_OFFSET * surface_reach;
+    uvec4 record = uvec4(0u), met = uvec4(0u);
+    bool sound = true;
+    for (int surface = 0; surface < MOST_STEPS; ++surface) {
+        Hit hit = nearest_hit(behind, direction, max(path - within, 0.0), surface_reach, met);
+        if (hit.object < 0) { break; }
+        if (int(traced_body(hit.object).kind) == KIND_SOLID) {
+            vec3 smooth_normal, face_normal;
+            bool outside;
+            met_sides(hit, direction, smooth_normal, face_normal, outside);
+            record = crossed_record(record, hit.object, outside, sound);
+        }
+        met = entered_record(hit.path > path + within ? uvec4(0u) : met, hit.object);
+        path = max(path, hit.path);
+    }
+    if (sound && record.x != 0u) { return record; }
+#endif
+    return start_record;
+}
+#endif
+
+Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
     Sum sum = Sum(vec3(0.0), 0.0);
 #if FORKS > 0
     Ray waiting[WAITING];
@@ -182,31 +316,32 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
     bool ends = false;
     vec3 passed = vec3(1.0);  // transmittance of the last segment
     float reach = first_reach;
-    for (int step = 0; step < MOST_STEPS; ++step) {
+    int step = 0;
+    for (; step < MOST_STEPS; ++step) {
         if (ends) {
             if (waits == 0) { break; }
             ray = waiting[--waits];
             ends = false;
         }
-        Hit hit = nearest_hit(ray.origin, ray.direction, 0.0, reach, AIR);
+        Hit hit = nearest_hit(ray.origin, ray.direction, 0.0, reach, uvec4(0u));
         if (hit.object < 0 && reach < NOTHING) {
             reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
             continue;
         }
-        bool first = ray.met == 0;
         reach = NOTHING;
         int before = dominant_body(ray.record);
         passed = vec3(1.0);
         if (ray.record.x != 0u) {
             Filling filling = filling_of(ray.record, before);
-            float path = min(hit.path, 1e3 * surface_reach) + ray.before;
+            float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
 #if EMISSION
             sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
 #endif
             passed = transmittance(filling.extinction * path);
 #if MUCH_SCATTERED
             if (before != AIR && surface_table_row(before).scatters_much > 0.5) {
-                sum.light += ray.share * scattered_out(finish_of(vec4(float(before), 0.0, 1.0, 0.0)), ray.origin, ray.outwards, path, passed);
+                Finish layer = finish_of(vec4(float(before), 0.0, 1.0, 0.0));
+                sum.light += ray.share * scattered_out(layer, ray.origin, ray.outwards, path, passed);
             }
 #endif
             ray.share *= passed;
@@ -217,74 +352,46 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ends = true;
             continue;
         }
-        TracedBody body = traced_body(hit.object);
-        int kind = int(body.kind);
-        vec3 smooth_normal, face_normal;
-        hit_normals(hit, smooth_normal, face_normal);
-        bool outside = dot(face_normal, ray.direction) < 0.0;
-        if (!outside) {
-            face_normal = -face_normal;
-            smooth_normal = -smooth_normal;
-        }
         vec3 point = ray.origin + hit.path * ray.direction;
-        // The interface that has been drawn, with its textures.
-        bool drawn = first && hit.object == first_object && abs(hit.path - first_path) < 1e-3 * surface_reach;
-        if (drawn) { smooth_normal = first_normal; }
-        float facing = dot(smooth_normal, ray.direction);
-        if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
+        bool sound = true;
+        Place place = place_at(ray, hit, before, channel, sound);
+        TracedBody body = traced_body(place.object);
+        int kind = int(body.kind);
+        bool outside = place.outside;
+        vec3 face_normal = place.face_normal;
+#if !FROM_EYE
         // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
-        bool early = first && kind == KIND_SOLID && !outside && ray.record.x == 0u;
-        if (early || kind == KIND_UNSEEN || (kind == KIND_OPAQUE && !outside && body.one_sided == 1.0)) {
+        if (ray.met == 0 && kind == KIND_SOLID && !outside && ray.record.x == 0u) {
             leave(ray, point, face_normal);
             continue;
         }
-        if (kind == KIND_OPAQUE) {
+#endif
+        if (!sound) { sum.lost += strength(ray.share) / 3.0; }
+        vec3 smooth_normal = place.smooth_normal;
+        bool first = ray.met == 0 && place.object == seen.object && distance(point, seen.point) < 1e-3 * surface_reach;
+        if (first) { smooth_normal = seen.normal; }
+        float facing = dot(smooth_normal, ray.direction);
+        if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
+        sum.light += ray.share * place.glow;
+        ray.share *= place.coat;
+        if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
             sum.light += ray.share * opaque_seen(body, smooth_normal, ray, point);
             ends = true;
             continue;
         }
-        uvec4 after_record = ray.record;
-        bool sound = true;
-        if (kind == KIND_SOLID) { after_record = crossed_record(ray.record, hit.object, outside, sound); }
-        int after = dominant_body(after_record);
-        #if !ONE_OBJECT
-        // Surfaces of two bodies in one place are one interface.
-        float within = SURFACE_OFFSET * surface_reach / max(-dot(face_normal, ray.direction), 1e-2);
-        Hit other = kind == KIND_SOLID ? nearest_hit(ray.origin, ray.direction, max(hit.path - 0.5 * within, 0.0), hit.path + within, hit.object) : Hit(NOTHING, AIR, 0, vec2(0.0));
-        if (other.object >= 0 && int(traced_body(other.object).kind) == KIND_SOLID) {
-            vec3 other_smooth, other_face;
-            hit_normals(other, other_smooth, other_face);
-            bool other_outside = dot(other_face, ray.direction) < 0.0;
-            after_record = crossed_record(after_record, other.object, other_outside, sound);
-            after = dominant_body(after_record);
-            if (after == other.object || (before == other.object && after != hit.object)) {
-                face_normal = other_outside ? other_face : -other_face;
-                smooth_normal = other_outside ? other_smooth : -other_smooth;
-                facing = dot(smooth_normal, ray.direction);
-                if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
-                body = traced_body(other.object);
-                hit.object = other.object;
-                outside = other_outside;
-            }
-        }
-#endif
-        if (!sound) { sum.lost += strength(ray.share) / 3.0; }
-        int owner = kind == KIND_SHEET || outside ? hit.object : before;
-        float ior = kind == KIND_SHEET ? index_of(hit.object, channel) / index_of(before, channel)
-                                       : index_of(after, channel) / index_of(before, channel);
-        bool matters = kind == KIND_SHEET ? true
-            : before != after && (ior != 1.0 || (before != AIR && traced_body(before).plain == 0.0)
-                || (after != AIR && traced_body(after).plain == 0.0));
-        if (!matters) {
-            leave(ray, point, face_normal);
-            ray.record = after_record;
+        int after = dominant_body(place.record);
+        if (kind != KIND_SHEET && !alters_light(before, after, channel)) {
+            leave(ray, ray.origin + place.path * ray.direction, face_normal);
+            ray.record = place.record;
             continue;
         }
+        float ior = index_of(kind == KIND_SHEET ? place.object : after, channel) / index_of(before, channel);
+        bool enters = kind == KIND_SHEET || place.object == after;
         // Textures are read where a ray first meets an object; farther on it counts as the same all over.
-        bool as_first = owner == first_object && first_path < NOTHING;
-        float roughness = as_first ? first_finish.roughness : body.roughness;
-        float transmission = as_first ? first_finish.transmission : body.transmission;
-        vec3 tint = as_first ? first_finish.color : body.color;
+        bool as_first = place.object == seen.object;
+        float roughness = as_first ? seen.finish.roughness : body.roughness;
+        float transmission = as_first ? seen.finish.transmission : body.transmission;
+        vec3 tint = as_first ? seen.finish.color : body.color;
         float alpha = roughness * roughness;
 #if MICROFACETS
         vec3 facet, facet_normal;
@@ -305,7 +412,13 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         vec3 share_on = vec3(1.0 - reflectance);
         vec3 on_way = ray.direction;
         if (kind == KIND_SHEET) {
-            vec3 depth = finish_of(vec4(float(hit.object), 0.0, 0.0, 0.0)).sheet_depth / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
+            float through = 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
+            vec3 depth = body.extinction * through;
+#if EMISSION
+            // What a sheet emits goes back and forth in it, too.
+            vec3 leaving = (1.0 - reflectance) / max(1.0 - reflectance * transmittance(depth), vec3(1e-6));
+            sum.light += ray.share * leaving * emitted_radiance(body.emission, body.extinction, through);
+#endif
             share_back = slab_reflectance(reflectance, depth);
             share_on = slab_transmittance(reflectance, depth);
         } else {
@@ -320,26 +433,26 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
         }
 #endif
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
-        if (transmission < 1.0 && outside) {
-            Finish finish = first_finish;
+        if (transmission < 1.0 && enters) {
+            Finish finish = seen.finish;
             if (!as_first) {
-                finish = finish_of(vec4(float(owner), roughness, transmission, 0.0));
+                finish = finish_of(vec4(float(place.object), roughness, transmission, 0.0));
                 finish.color = tint;
             }
             sum.light += ray.share * share_on * (1.0 - transmission) * paint(finish, point, smooth_normal);
         }
-        if (kind == KIND_SHEET || owner == after) { share_on *= transmission * tint; }
+        if (enters) { share_on *= transmission * tint; }
         float ior_inside = max(ior, 1.0 / ior);
-        float occlusion = drawn ? first_finish.unoccluded : 1.0;
-        Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record,
-            ray.met + 1, ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
+        float occlusion = first ? seen.finish.unoccluded : 1.0;
+        Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
+            ray.met == 0 ? 0 : ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
             ray.turns * 2 + 1, -smooth_normal);
-        Ray on = Ray(point, 0.0, on_way, ray.share * share_on, after_record, ray.met + 1, ray.forks,
-            ray.reflected, ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal);
+        Ray on = Ray(point, 0.0, on_way, ray.share * share_on, place.record, ray.met + 1, ray.forks, ray.reflected,
+            ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal);
         leave(back, point, face_normal);
-        leave(on, point, face_normal);
+        leave(on, ray.origin + place.path * ray.direction, face_normal);
         bool on_stronger = strength(on.share) >= strength(back.share);
-        bool last = ray.met + 1 >= most_interfaces;
+        bool last = ray.met + 1 >= most_interfaces || step > 3 * MOST_STEPS / 4;
         Ray weaker = back;
         vec3 arrival = ray.direction;
         bool arrived_reflected = ray.reflected;
@@ -354,15 +467,15 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ray = back;
         }
 #if FORKS > 0
-        weaker.forks -= first ? 0 : 1;  // the mirror of the first interface is free
-        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > 12.0 * FAINTEST) {
+        weaker.forks -= ray.met == 1 ? 0 : 1;
+        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > FAINTEST_SHARE) {
             waiting[waits++] = weaker;
         } else
 #endif
         if (strength(weaker.share) > 0.0) {
             sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * environment_seen(weaker.origin, weaker.direction, weaker.reflected, weaker.blur);
         }
-        if (last || strength(ray.share) < 12.0 * FAINTEST) {
+        if (last || strength(ray.share) < FAINTEST_SHARE) {
             // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
             bool total = reflectance == 1.0;
             sum.light += (on_stronger ? vec3(1.0) : again) * ray.share
@@ -370,6 +483,7 @@ Sum follow(Ray ray, int first_object, float first_path, vec3 first_normal, float
             ends = true;
         }
     }
+    if (step == MOST_STEPS && !(ends && waits == 0)) { sum.lost = 1.0; }
     return sum;
 }
 
@@ -383,7 +497,11 @@ void main() {
     vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
     vec4 front = texelFetch(entered, texel, 0);
     out_transmittance = vec4(through, 1.0);  // alpha: share of the light that can be trusted
+#if FROM_EYE
     bool starts_inside = start_record.x != 0u;
+#else
+    const bool starts_inside = false;
+#endif
     if (front.w >= NOTHING && !starts_inside) {
         out_radiance = vec4(background(pixel, direction, texel) * through + emitted, 1.0);
         return;
@@ -393,36 +511,34 @@ void main() {
     Finish finish = finish_of(surface);
     finish.color = tint.rgb;
     finish.unoccluded = tint.a;
-    vec3 point = point_at(pixel, front.w);
-    float margin = 1e-3 * surface_reach;
-    vec3 origin = point - margin * direction;
-    float path = margin;
-    float reach = 2.0 * margin;
-    if (starts_inside) {
-        origin = point_at(pixel, surface_eye_axial_depth);
-        path = front.w < NOTHING ? length(point - origin) : NOTHING;
-        reach = NOTHING;
-    }
-    Ray ray = Ray(origin, 0.0, direction, vec3(1.0), start_record, 0, FORKS, false, 0.0, 0, -direction);
-    int object = int(surface.x + 0.5);
+    Seen seen = Seen(int(min(surface.x, 65535.0) + 0.5), point_at(pixel, front.w), front.xyz, finish);
+    vec3 eye = point_at(pixel, surface_eye_axial_depth);
+    float margin = min(1e-3 * surface_reach, distance(seen.point, eye));
+    Ray ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction);
+    float reach = margin + 1e-3 * surface_reach;
+#if FROM_EYE
+    // Something may lie before the first interface.
+    ray.origin = starts_inside ? eye : point_at(pixel, 0.0);
+    ray.record = starts_inside ? record_at_eye(eye, direction) : uvec4(0u);
+    reach = NOTHING;
+#endif
+    Sum sum = follow(ray, seen, reach, 1);
 #if DISPERSION
-    Sum sum = follow(ray, object, path, front.xyz, reach, finish, 1);
-    sum.light.r = follow(ray, object, path, front.xyz, reach, finish, 0).light.r;
-    sum.light.b = follow(ray, object, path, front.xyz, reach, finish, 2).light.b;
-#else
-    Sum sum = follow(ray, object, path, front.xyz, reach, finish, 1);
+    Sum red = follow(ray, seen, reach, 0);
+    Sum blue = follow(ray, seen, reach, 2);
+    sum.light.rb = vec2(red.light.r, blue.light.b);
+    sum.lost = (sum.lost + red.lost + blue.lost) / 3.0;
 #endif
     vec3 light = sum.light;
-    if (front.w < NOTHING) {
+    vec3 share = vec3(1.0);
+    if (front.w < NOTHING && !starts_inside) {
         float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
-        vec3 share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
-        light += highlights(point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
-#if !EMISSION
-        light += share * emitted;
-    } else {
-        light += emitted;
-#endif
+        share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
+        light += highlights(seen.point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
     }
+#if !EMISSION
+    light += share * emitted;
+#endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
     out_transmittance.a = 1.0 - min(sum.lost, 1.0);
 }

@@ -169,8 +169,12 @@ class SceneHierarchies:
         self.nodes, self.triangles = _texture(gl, nodes), _texture(gl, triangles)
         self.object_nodes = 0
 
-    def place(self, scene: Scene, center: Array) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
+    def place(
+        self, scene: Scene, center: Array, sheets: Mapping[int, float]
+    ) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
         """Write the hierarchy of objects where they are.
+
+        `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers.
 
         Returns
         -------
@@ -198,8 +202,9 @@ class SceneHierarchies:
         media = _media_numbers(scene)
         rows = []
         for i, body in enumerate(scene.objects):
-            own = {"rank": ranks[i] if _decides(scene, body) else 0.0, "slot": media[i]}
-            rows.append({**self._row(scene, body, center), **own})
+            decides = i not in sheets and _decides(scene, body)
+            own = {"rank": ranks[i] if decides else 0.0, "slot": media[i]}
+            rows.append({**self._row(scene, body, center, sheets.get(i)), **own})
         return TRACED_BODY.pack(rows), (*middle, scale)
 
     def faces(self, scene: Scene, objects: Integers, triangles: npt.NDArray[np.integer]) -> Integers:
@@ -210,12 +215,13 @@ class SceneHierarchies:
             found[own] = packed_mesh(body.mesh).faces[triangles[own] - self._spans[id(body.mesh)].triangle]
         return found
 
-    def _row(self, scene: Scene, body: Object, center: Array) -> Mapping[str, npt.ArrayLike]:
+    def _row(self, scene: Scene, body: Object, center: Array, sheet: float | None) -> Mapping[str, npt.ArrayLike]:
         packed, span = packed_mesh(body.mesh), self._spans[id(body.mesh)]
         linear = body.matrix[:3, :3]
         middle = linear @ packed.center + (body.matrix[:3, 3] - center)
         rows = np.column_stack([packed.scale * np.linalg.inv(linear), middle])
         medium, surface = body.medium or Medium(), body.surface or Surface()
+        metres = 1.0 if sheet is None else sheet
         opaque = body.medium is None
         return {
             "local_x": rows[0],
@@ -223,10 +229,10 @@ class SceneHierarchies:
             "local_z": rows[2],
             "first_node": divmod(span.first, 1 << 12),
             "node_count": divmod(span.count, 1 << 12),
-            "extinction": bounded_extinction(medium, scene.diagonal),
+            "extinction": metres * bounded_extinction(medium, scene.diagonal),
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
-            "emission": np.asarray(medium.emission),
-            "kind": _kind(body),
+            "emission": metres * np.asarray(medium.emission),
+            "kind": _kind(body, sheet),
             "color": body.base_color if opaque else np.asarray(surface.color),
             "transmission": surface.transmission,
             "ior": surface.ior if opaque else medium.ior,
@@ -271,17 +277,18 @@ class HierarchyCache:
             self._held = None
 
 
-def _kind(body: Object) -> float:
+def _kind(body: Object, sheet: float | None) -> float:
     """Kind of an object, as ``shaders/transport/traced_interfaces.frag`` numbers them."""
     if body.medium is None:
         return 2.0
-    return 3.0 if body.covers else 0.0 if body.sheet_thickness is None else 1.0
+    if body.covers:
+        return 3.0
+    return 0.0 if sheet is None else 1.0 if body.has_interface else 4.0
 
 
 def _decides(scene: Scene, body: Object) -> bool:
     """Whether a body determines the index of refraction of the rays in it."""
-    solid = body.medium is not None and body.sheet_thickness is None
-    return solid and (body.has_interface or scene.overlap == "priority")
+    return body.medium is not None and (body.has_interface or scene.overlap == "priority")
 
 
 def _media_numbers(scene: Scene) -> list[float]:

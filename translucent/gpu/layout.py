@@ -341,7 +341,7 @@ TRACED_BODY = PackedTable(
         ("local_z", "f4", (4,)),
         ("first_node", "f4", (2,)),  # of its hierarchy, and how many in each order: multiples of 4096, and the rest
         ("node_count", "f4", (2,)),
-        ("extinction", "f4", (3,)),
+        ("extinction", "f4", (3,)),  # of a sheet: times its thickness, as is its emission
         ("outwards", "f4", ()),  # 1, or -1 where the normals of its faces point inwards
         ("emission", "f4", (3,)),
         ("kind", "f4", ()),

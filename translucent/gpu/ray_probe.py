@@ -90,7 +90,7 @@ class RayProbe:
             rays = np.zeros((2, size[0] * size[1], 4), np.float32)
             rays[0, :count, :3], rays[1, :count, :3] = origins - center, directions
             rays[0, :count, 3], rays[1, :count, 3] = start, end
-            rows, frame = hierarchies.place(scene, center)
+            rows, frame = hierarchies.place(scene, center, {})
         made = [self._gl.texture(size, 4, part, dtype="f4") for part in rays]
         made.append(self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4"))
         found = self._gl.texture(size, 4, dtype="i4")

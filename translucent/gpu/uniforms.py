@@ -209,11 +209,13 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     center = 0.5 * low + 0.5 * high - camera.eye
     ahead = float(center @ camera.forward)
+    ends = scene.bounds - camera.eye
+    farthest = float(np.maximum(ends[0] * camera.forward, ends[1] * camera.forward).sum())
     return SURFACES.pack(
         surface_right=[*(camera.right * half_width), float(camera.fov_y is not None)],
         surface_up=[*(camera.up * half_height), 0.0],
         surface_off_axis=[*(center - ahead * camera.forward), 0.0],
-        surface_ahead=[media.near - ahead, media.length, ahead, float(np.linalg.norm(high - low))],
+        surface_ahead=[media.near - ahead, media.length, ahead, farthest - ahead],
         surface_reach=scene.diagonal,
         surface_eye_axial_depth=-media.near / media.length,
     )

@@ -68,7 +68,7 @@ class TracedInterfacesPass:
             if not job.covered:
                 return
         hierarchies = job.resources.hierarchies.of(job.scene)
-        rows, frame = hierarchies.place(job.scene, media_center(job.scene))
+        rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
         contents = surface_table(job.scene, job.features.sheets), rows
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
         self._bind(job, hierarchies, *tables)
@@ -95,6 +95,7 @@ class TracedInterfacesPass:
         seen_map = environment.seen.kind == "image"
         return self._variants.program(
             FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
+            FROM_EYE=job.placed.starts_inside or any(not body.has_interface for body in scene.bodies),
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
@@ -159,7 +160,7 @@ def _record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
     entries = [
         number + 1
         for number, placement in enumerate(job.placed.placements)
-        if job.scene.objects[number].sheet_thickness is None
+        if number not in job.features.sheets
         for _ in range(round(placement.expected_count[1]))
     ][::-1][:8]
     entries += [0] * (8 - len(entries))
