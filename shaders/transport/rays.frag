@@ -11,7 +11,7 @@ layout(location = 0) out ivec4 out_hit;  // bits of the path; object, -1 where t
 
 void main() {
 #if ONE_OBJECT
-    only_body = traced_bodies_row(0);
+    hold_only_body();
 #endif
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec4 origin = texelFetch(ray_origins, texel, 0);
