@@ -78,7 +78,8 @@ void meet_triangle(int triangle, int object, vec3 origin, vec3 shear, int axis, 
     a.xy -= shear.xy * a.z;
     b.xy -= shear.xy * b.z;
     c.xy -= shear.xy * c.z;
-    vec3 weights = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
+    // Of an edge both its triangles must find the same weight but for the sign, so no product may stay unrounded in a sum.
+    precise vec3 weights = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     float sum = weights.x + weights.y + weights.z;
     if ((any(lessThan(weights, vec3(0.0))) && any(greaterThan(weights, vec3(0.0)))) || sum == 0.0) { return; }
     float path = shear.z * dot(weights, vec3(a.z, b.z, c.z)) / sum;

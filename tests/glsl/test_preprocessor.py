@@ -50,6 +50,18 @@ def test_circles_and_missing_includes_are_named(files: Path) -> None:
         preprocess("a.glsl")
 
 
+def test_precise_values_are_asked_for_where_they_are_used(files: Path, renderer: tl.Renderer) -> None:
+    (files / "plain.frag").write_text("out vec4 color;\nvoid main() { color = vec4(1.0); }\n")
+    (files / "exact.frag").write_text(
+        "out vec4 color;\nvoid main() {\n    precise vec4 sum = gl_FragCoord * 3.0 - 1.0;\n    color = sum;\n}\n"
+    )
+    assert "gpu_shader5" not in preprocess("plain.frag").text
+    exact = preprocess("exact.frag").text
+    assert exact.index("#extension GL_ARB_gpu_shader5") < exact.index("out vec4")
+    with renderer.gpu.context.current() as gl:
+        build_program(gl, "full.vert", "exact.frag").release()
+
+
 def test_switches_must_match_in_both_directions(files: Path) -> None:
     (files / "a.glsl").write_text("#if FAST && !EXACT\nfloat a;\n#endif\n")
     with pytest.raises(tl.RenderError, match=r"\['EXACT'\], which are not defined"):

@@ -19,6 +19,9 @@ _CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")
 # "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (others)
 _LOCATION = re.compile(r"\b(\d+)(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+):)")
 
+#: What makes a driver compute values declared ``precise`` as they are written, where it can be told so before OpenGL 4.
+_PRECISE = ("#extension GL_ARB_gpu_shader5 : enable", "#ifndef GL_ARB_gpu_shader5", "#define precise", "#endif")
+
 
 @dataclass(frozen=True)
 class ShaderSource:
@@ -68,6 +71,8 @@ def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int
     if missing := sorted(gathered.switches - given.keys()):
         raise RenderError(f"shader {name!r}", f"it asks for {missing}, which are not defined", "define them as 0 or 1")
     head = [f"#version {version} core", *(f"#define {key} {int(value)}" for key, value in given.items())]
+    if re.search(r"^\s*precise ", body, re.MULTILINE):
+        head += _PRECISE
     return ShaderSource("\n".join([*head, body, ""]), tuple(gathered.files))
 
 
