@@ -193,7 +193,7 @@ class SceneHierarchies:
             "ior": surface.ior if opaque else medium.ior,
             "dispersion": surface.dispersion,
             "roughness": surface.roughness,
-            "plain": float(body.surface is None if opaque else surface.plain),
+            "plain": float(body.surface is None if opaque else surface.plain and body.mesh.colors is None),
             "passed": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
             "passed_share": surface.diffuse_transmission,
             "emissive": np.asarray(surface.emissive),
