@@ -139,7 +139,7 @@ def interface_options(command: F) -> F:
         "--interface-forks",
         type=int,
         metavar="N",
-        help="Of --interfaces traced: how often light is followed as the weaker of reflected and refracted. Default: 2.",
+        help="Of --interfaces traced: how often rays go on as the weaker of reflected and refracted light. Default: 2.",
     )(command)
     command = click.option(
         "--interface-depth",
