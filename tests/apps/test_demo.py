@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import runpy
+import warnings
 from pathlib import Path
 
 import pytest
@@ -17,7 +19,12 @@ def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
     demo = runpy.run_path(str(ROOT / "tools" / "demo.py"))
     main = demo["main"]
     main.__globals__["SIZE"] = (320, 240)
-    assert main() == 0
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert main() == 0
+    # Of a million rays through a mesh, one or two meet an edge just so, which frames tell.
+    lost = [re.match(r"(\d) pixels are not valid \(\d+ are covered\)", str(one.message)) for one in told]
+    assert all(found and int(found[1]) <= 3 for found in lost), [str(one.message) for one in told]
     printed = capsys.readouterr()
     assert printed.err == ""
     for name in ("bear", "wine"):

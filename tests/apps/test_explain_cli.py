@@ -73,7 +73,12 @@ def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
     assert [item["kind"] for item in told["objects"]] == ["body", "thin wall"]
     assert told["objects"][0]["extinction"] == pytest.approx([4 * math.log(2), 2 * math.log(2), 0.0], rel=1e-14)
     assert (told["lights"], told["left_out"]) == (0, [])
+    assert told["plan"]["passes"][-1]["name"] == "traced_interfaces"
+    assert told["plan"]["interfaces"] == "TracedInterfaces(depth=12, forks=2)"
+    assert "not modelled: light that meets more than 12 interfaces, or is the weaker of" in result.out
+    told = strict_json(run("explain", model, "--interfaces", "screen", "--json").out)
     assert told["plan"]["passes"][-1]["name"] == "surfaces"
+    assert told["plan"]["interfaces"] == "ScreenInterfaces()"
 
 
 def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
+from translucent.planning.render_plan import RenderPlan
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, Turn
 from translucent.preview.document import Model
@@ -55,6 +57,38 @@ def test_the_picture_is_the_one_that_render_makes(
     assert found.thickness == pytest.approx(frame.thickness[y, x], rel=1e-4)
     assert found.layers % 2 == 0
     assert found.body == 0
+
+
+@pytest.mark.parametrize("slow", [False, True])
+def test_slow_traced_interfaces_wait_until_the_view_is_still(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch, slow: bool
+) -> None:
+    work.do(Change("material.ior", 1.5))
+    finish(stage, work)
+    assert stage.plans[0] is not None
+    usual = stage.plans[0].interfaces
+    assert usual == tl.TracedInterfaces(depth=12)
+    monkeypatch.setattr(stages, "BUDGET", 0.0 if slow else 1e9)
+    drawn: list[RenderPlan] = []
+    draw = stage.renderer.draw
+
+    def spied(*given: Any, **options: Any) -> RenderPlan:
+        drawn.append(draw(*given, **options))
+        return drawn[-1]
+
+    monkeypatch.setattr(stage.renderer, "draw", spied)
+    for _ in range(2):
+        work.do(Turn(20.0, 10.0))
+        assert stage.draw(work, SIZE)
+        assert ("interfaces in screen space while the picture moves" in stage.simpler) is slow
+    assert [plan.interfaces for plan in drawn] == 2 * [tl.ScreenInterfaces() if slow else usual]
+    finish(stage, work)
+    assert (stage.simpler, stage.plans[0].interfaces) == ("", usual)
+    scene = work.scene()
+    assert scene is not None
+    with stage.current():
+        frame = stage.renderer.render(scene, SIZE, samples=16)
+    assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
 
 
 def test_smooth_edges_are_those_of_many_samples(stage: Stage, work: Workspace) -> None:

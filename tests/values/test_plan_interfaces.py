@@ -1,4 +1,4 @@
-"""Plans of how interfaces are found: what the planner takes, what the others save and cost, and where they are refused."""
+"""Plans of how interfaces are found: what the planner takes, what the others save, and where they are refused."""
 
 from __future__ import annotations
 

@@ -139,7 +139,7 @@ def interface_options(command: F) -> F:
         "--interface-forks",
         type=int,
         metavar="N",
-        help="Of --interfaces traced: interfaces at which reflected and refracted light are both followed. Default: 2.",
+        help="Of --interfaces traced: how often rays go on as the weaker of reflected and refracted light. Default: 2.",
     )(command)
     command = click.option(
         "--interface-depth",
@@ -152,7 +152,8 @@ def interface_options(command: F) -> F:
         "interfaces_name",
         type=click.Choice(INTERFACE_NAMES),
         help="Where light bends and is mirrored: at all interfaces, traced through the meshes; where it enters bodies "
-        "and where it leaves them, in screen space; or only where it enters (quicker). Default: by plan.",
+        "and where it leaves them, in screen space (quicker); or only where it enters (quickest). Default: traced, "
+        "where bodies are solid and rays can be; the plan says what was taken.",
     )(command)
 
 

@@ -15,7 +15,9 @@ from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Shown, Viewport
+from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.measuring import Truth
@@ -31,6 +33,9 @@ SAMPLES, SLOW_SAMPLES = 16, 4
 
 #: Factors by which a picture is coarser while it moves.
 FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+
+#: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
+COARSEST_TRACED = 3.0
 
 #: Seconds between checks of the shader files.
 WATCH = 0.5
@@ -72,6 +77,8 @@ class Stage:
         Why the picture is not what it should be, or nothing.
     shader_problem : str
         The compiler's message, while the last good shaders go on.
+    simpler : str
+        What is drawn more simply while the picture moves, and why, or nothing.
     drawing : float
         Seconds that the last call of `draw` took.
     """
@@ -90,8 +97,9 @@ class Stage:
             compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
-        self.problem = self.shader_problem = ""
+        self.problem = self.shader_problem = self.simpler = ""
         self.drawing = 0.0
+        self._moving: RenderPlan | None = None
         self._begun = False
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
@@ -160,6 +168,7 @@ class Stage:
             self.viewport.restart()
             self._truth = None
             self._strides = [self._factor(plan, STRIDES) for plan in self.plans]
+            self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
                 self._postpone(workspace, wanted)
                 return True
@@ -173,18 +182,29 @@ class Stage:
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, begun = workspace.document.look, time.perf_counter()
-        factor = self._factor(self.plans[0], FACTORS)
+        look, interfaces = workspace.document.look, self._quick_interfaces(self.plans[0])
+        if interfaces is not None:
+            self._moving = self.renderer.plan(scene, method, interfaces=interfaces)
+        begun, factor = time.perf_counter(), self._factor(self._moving or self.plans[0], FACTORS)
         try:
             with self.viewport.at_once(factor) as framebuffer:
-                plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone)
+                plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces)
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
+        if self._moving is not None:
+            self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         self._presented = ()
         return True
+
+    def _quick_interfaces(self, plan: RenderPlan | None) -> ScreenInterfaces | None:
+        """Interfaces for a picture that moves, if tracing them is known to take too long; else None."""
+        if plan is None or not plan.has(PassName.TRACED):
+            return None
+        slow = self._costs.get(_kind(plan), 0.0) / COARSEST_TRACED**2 > BUDGET
+        return ScreenInterfaces() if slow else None
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
         """Draw the next sample of a side, if there is one left to draw."""
@@ -192,7 +212,7 @@ class Stage:
         samples = (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
         if plan is None or self.viewport.steps(side) >= stride * stride * (1 + samples):
             return False
-        begun = time.perf_counter()
+        self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, scene, plan, stride, max(samples, 1))
         self._finish(side, plan, stride, begun)
         return True
@@ -287,7 +307,7 @@ class Stage:
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
-        return [plan for plan in self.plans if plan is not None]
+        return [plan for plan in (*self.plans, self._moving) if plan is not None]
 
     def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Request missing programs; until they are there, the same picture is not tried again."""
@@ -341,7 +361,7 @@ class Stage:
                 viewport.resize(FRAME)
                 for plan in self._drawn_plans if scene is not None else ():
                     if scene is not None:
-                        viewport.step(0, scene, fresh.plan(scene, plan.method), 1)
+                        viewport.step(0, scene, fresh.plan(scene, plan.method, interfaces=plan.interfaces), 1)
             except TranslucentError as error:
                 self.shader_problem = str(error)
                 if viewport is not None:
