@@ -177,6 +177,15 @@ def test_instances(trace: Tracing, placements: list[np.ndarray], rng: np.random.
     assert (~agreeing(scene, ours, theirs)).sum() <= max(1, different * len(rays[0]))
 
 
+def test_objects_of_different_meshes(trace: Tracing, rng: np.random.Generator) -> None:
+    meshes = ball(3), ball(1), ball(2)
+    scene = scene_of(*(tl.Object(mesh, WATER, transform=placed(1, (3 * i, 0, 0))) for i, mesh in enumerate(meshes)))
+    rays = random_rays(scene, 20_000, rng)
+    ours, theirs = trace(scene, *rays), embree_nearest(scene, *rays)
+    assert agreeing(scene, ours, theirs).all()
+    assert (ours.face == theirs.face).mean() > 0.999
+
+
 def test_rays_from_afar_do_not_pass_between_triangles(trace: Tracing, rng: np.random.Generator) -> None:
     mesh = ball(5)
     scene = scene_of(tl.Object(mesh, WATER))
