@@ -85,7 +85,7 @@ class TracedInterfacesPass:
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._variants.program(
             FORKS=forks,
-            FROM_EYE=inside or any(not body.has_interface for body in scene.bodies),
+            FROM_EYE=inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
