@@ -255,16 +255,19 @@ Place place_at(Ray ray, Hit hit, int before, int channel, inout bool sound) {
 }
 
 #if FROM_EYE
-// The record of a ray of the eye where it starts in several bodies, in the order in which it has entered them.
-uvec4 record_at_eye(vec3 eye, vec3 direction) {
-#if !ONE_OBJECT
-    if (start_record.x >> 16 == 0u) { return start_record; }
+// The record of a ray that starts a little ahead of the eye: of the bodies that it would have entered from afar, in that
+// order. On a surface, rays to one side start inside.
+uvec4 record_at_eye(vec3 eye, vec3 direction, float ahead) {
     vec3 behind = eye - surface_reach * direction;
     float path = 0.0, within = SURFACE_OFFSET * surface_reach;
     uvec4 record = uvec4(0u), met = uvec4(0u);
     bool sound = true;
     for (int surface = 0; surface < MOST_STEPS; ++surface) {
-        Hit hit = nearest_hit(behind, direction, max(path - within, 0.0), surface_reach, met);
+#if ONE_OBJECT
+        Hit hit = nearest_hit(behind, direction, path, surface_reach + ahead, met);
+#else
+        Hit hit = nearest_hit(behind, direction, max(path - within, 0.0), surface_reach + ahead, met);
+#endif
         if (hit.object < 0) { break; }
         if (int(traced_body(hit.object).kind) == KIND_SOLID) {
             vec3 smooth_normal, face_normal;
@@ -275,9 +278,7 @@ uvec4 record_at_eye(vec3 eye, vec3 direction) {
         met = entered_record(hit.path > path + within ? uvec4(0u) : met, hit.object);
         path = max(path, hit.path);
     }
-    if (sound && record.x != 0u) { return record; }
-#endif
-    return start_record;
+    return sound ? record : start_record;
 }
 #endif
 
@@ -481,8 +482,12 @@ void main() {
     float reach = margin + 1e-3 * surface_reach;
 #if FROM_EYE
     // Something may lie before the first interface.
-    ray.origin = starts_inside ? eye : point_at(pixel, 0.0);
-    ray.record = starts_inside ? record_at_eye(eye, direction) : uvec4(0u);
+    ray.origin = point_at(pixel, 0.0);
+    if (starts_inside) {
+        ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
+        ray.origin = eye + ray.skipped * direction;
+        ray.record = record_at_eye(eye, direction, ray.skipped);
+    }
     reach = NOTHING;
 #endif
     Sum sum = follow(ray, seen, reach, 1);

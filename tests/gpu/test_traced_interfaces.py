@@ -41,6 +41,7 @@ BALL = Sphere().tessellate(24)
 CORE = Sphere(radius=0.5).tessellate(24)
 BOX = Box((-1, -1, -1), (1, 1, 1)).tessellate()
 PANE = tl.Mesh(np.array([(-2.0, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)]), np.array([(0, 1, 2), (0, 2, 3)]))
+ON_BALL = BALL.vertices[BALL.faces[300]].mean(axis=0)
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
@@ -222,6 +223,16 @@ def test_what_lies_before_the_first_interface_is_that_of_the_reference(thorough:
     print(f"{name}: median {np.median(off):.1e}, p90 {np.quantile(off, 0.9):.1e}, max {off.max():.1e}")
     assert np.median(off) < 1e-3 if "inside two" in name else 2e-4
     assert np.quantile(off, 0.9) < 3e-3
+
+
+def test_an_eye_on_a_surface_is_outside_of_it_or_inside_as_each_ray_goes(thorough: tl.Renderer) -> None:
+    """What lies where the eye is counts as behind it: outwards nothing is met, inwards the far side alone."""
+    for target, medium, off in (((0.0, 0.0, 0.0), GLASS, 0.04), (3.0 * ON_BALL, tl.Medium(), 1e-5)):
+        camera = tl.Camera.look_at(ON_BALL, target, fov_y=60)
+        frame = thorough.render(seen(body(BALL), camera=camera), SIZE, samples=1, interfaces=DEEP)
+        truth = references.render(seen(body(BALL, medium), camera=camera), SIZE, bounces=20)
+        assert frame.valid.all()
+        assert np.median(np.abs(frame.radiance - truth.radiance)) < off  # the reference mirrors 4 % where the eye is
 
 
 PAINT = {"color": (0.8, 0.3, 0.1)}
