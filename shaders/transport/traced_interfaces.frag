@@ -20,6 +20,7 @@
 #include "shade/opaque_light.glsl"
 #include "transport/hierarchy.glsl"
 #include "transport/record.glsl"
+#include "transport/place.glsl"
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
@@ -31,20 +32,11 @@ uniform int most_interfaces;
 uniform int sample_number;           // of a pixel
 uniform float blurred_share;         // of the variance of microfacets, that blurs what is seen in them; the rest is sampled
 #endif
-#if FROM_EYE
-uniform uvec4 start_record;          // the bodies that the eye is in
-#endif
 
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
 
-const int KIND_SOLID = 0;
-const int KIND_SHEET = 1;
-const int KIND_OPAQUE = 2;
-const int KIND_UNSEEN = 3;  // drawn over the picture, or from its back
-const int KIND_FILM = 4;    // a sheet that only dims and glows
 const float EDGE_ON = 1e-3;
-const int MOST_STEPS = 512;
 const int WAITING = 8;
 
 // One of the rays that wait to be followed.
@@ -121,16 +113,6 @@ float masking_ratio(float cos_in, float cos_out, float alpha) {
 }
 #endif
 
-float index_of(int body, int channel) {
-    if (body == AIR) { return 1.0; }
-    TracedBody row = traced_body(body);
-#if DISPERSION
-    return channel_iors(row.ior, row.dispersion)[channel];
-#else
-    return row.ior;
-#endif
-}
-
 struct Sum {
     vec3 light;
     float lost;        // share of the light whose ray went through a hole, or is in more bodies than a record holds
@@ -173,137 +155,6 @@ struct Seen {
     Finish finish;
 };
 
-// All surfaces that a ray meets in one place; solids are crossed together, and their interface is one.
-struct Place {
-    int object;          // whose interface it is: of the solid that is entered, else of that left, else of a sheet; or opaque
-    bool outside;        // its outer side is met
-    vec3 smooth_normal;  // towards the ray, as is face_normal
-    vec3 face_normal;
-    uvec4 record;        // beyond
-    float path;          // to the last of its surfaces
-    vec3 coat;           // transmittance of sheets that lie there, and of films
-    vec3 glow;           // that these add
-};
-
-// The record beyond a surface of a solid. sound: not yet unbalanced, nor beyond what a record holds.
-uvec4 crossed_record(uvec4 record, int object, bool enters, inout bool sound) {
-    bool missing = false;
-    uvec4 crossed = enters ? entered_record(record, object) : left_record(record, object, missing);
-    sound = sound && !missing && !(enters && is_full(record));
-    return crossed;
-}
-
-float slant(float cosine, float ior) {
-    return 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
-}
-
-// Sides of a surface as a ray meets it, turned to face it.
-void met_sides(Hit hit, vec3 direction, out vec3 smooth_normal, out vec3 face_normal, out bool outside) {
-    hit_normals(hit, smooth_normal, face_normal);
-    outside = dot(face_normal, direction) < 0.0;
-    if (!outside) {
-        face_normal = -face_normal;
-        smooth_normal = -smooth_normal;
-    }
-}
-
-// Whether the step from one medium to another does anything to light.
-bool alters_light(int before, int after, int channel) {
-    if (before == after) { return false; }
-    return index_of(before, channel) != index_of(after, channel) || (before != AIR && traced_body(before).plain == 0.0)
-        || (after != AIR && traced_body(after).plain == 0.0);
-}
-
-// Light that passes a sheet which only dims and glows.
-void pass_film(TracedBody film, float cosine, inout vec3 light, inout vec3 share) {
-    float through = 1.0 / max(refracted_cosine(cosine, film.ior), MIN_THIN_LAYER_COSINE);
-#if EMISSION
-    light += share * emitted_radiance(film.emission, film.extinction, through);
-#endif
-    share *= transmittance(film.extinction * through);
-}
-
-// What a ray meets where it has hit a surface first. A sheet that lies on the interface of a solid only dims.
-Place place_at(Ray ray, Hit hit, int before, int channel, inout bool sound) {
-    Place place = Place(AIR, false, vec3(0.0), vec3(0.0), ray.record, hit.path, vec3(1.0), vec3(0.0));
-    float start = 0.0, end = 0.0;
-    int rank = -1;  // of what decides: 0 a sheet, 1 a solid, 2 what is opaque
-    uvec4 met = uvec4(0u);
-    for (int surface = 0; surface < RECORD_SIZE && hit.object >= 0; ++surface) {
-        TracedBody body = traced_body(hit.object);
-        int kind = int(body.kind);
-        vec3 smooth_normal, face_normal;
-        bool outside;
-        met_sides(hit, ray.direction, smooth_normal, face_normal, outside);
-        float across = -dot(face_normal, ray.direction);
-        bool decides = surface == 0;
-        if (kind == KIND_SOLID) {
-            place.record = crossed_record(place.record, hit.object, outside, sound);
-            int now = dominant_body(place.record);
-            if (rank == 0 && alters_light(before, now, channel)) {
-                pass_film(traced_body(place.object), -dot(place.face_normal, ray.direction), place.glow, place.coat);
-                rank = -1;
-            }
-            decides = decides || rank < 0 || (rank == 1 && (now == hit.object || (before == hit.object && now != place.object)));
-            rank = rank == 0 ? 0 : 1;
-        } else if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
-            decides = true;
-            rank = 2;
-        } else if (kind == KIND_SHEET && (rank < 0 || (rank == 1 && !alters_light(before, dominant_body(place.record), channel)))) {
-            decides = true;
-            rank = 0;
-        } else if (kind == KIND_SHEET || kind == KIND_FILM) {
-            pass_film(body, across, place.glow, place.coat);
-        }
-        if (decides) {
-            place.object = hit.object;
-            place.outside = outside;
-            place.smooth_normal = smooth_normal;
-            place.face_normal = face_normal;
-        }
-        place.path = max(place.path, hit.path);
-#if ONE_OBJECT
-        break;
-#else
-        if (rank == 2) { break; }
-        if (surface == 0) {
-            float within = SURFACE_OFFSET * surface_reach / max(across, 1e-2);
-            start = max(hit.path - 0.5 * within, 0.0);
-            end = hit.path + within;
-        }
-        met = entered_record(met, hit.object);
-        hit = nearest_hit(ray.origin, ray.direction, start, end, met);
-#endif
-    }
-    return place;
-}
-
-#if FROM_EYE
-// The record of a ray of the eye where it starts in several bodies, in the order in which it has entered them.
-uvec4 record_at_eye(vec3 eye, vec3 direction) {
-#if !ONE_OBJECT
-    if (start_record.x >> 16 == 0u) { return start_record; }
-    vec3 behind = eye - surface_reach * direction;
-    float path = 0.0, within = SURFACE_OFFSET * surface_reach;
-    uvec4 record = uvec4(0u), met = uvec4(0u);
-    bool sound = true;
-    for (int surface = 0; surface < MOST_STEPS; ++surface) {
-        Hit hit = nearest_hit(behind, direction, max(path - within, 0.0), surface_reach, met);
-        if (hit.object < 0) { break; }
-        if (int(traced_body(hit.object).kind) == KIND_SOLID) {
-            vec3 smooth_normal, face_normal;
-            bool outside;
-            met_sides(hit, direction, smooth_normal, face_normal, outside);
-            record = crossed_record(record, hit.object, outside, sound);
-        }
-        met = entered_record(hit.path > path + within ? uvec4(0u) : met, hit.object);
-        path = max(path, hit.path);
-    }
-    if (sound && record.x != 0u) { return record; }
-#endif
-    return start_record;
-}
-#endif
 
 Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
     Sum sum = Sum(vec3(0.0), 0.0);
@@ -316,8 +167,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
     bool ends = false;
     vec3 passed = vec3(1.0);  // transmittance of the last segment
     float reach = first_reach;
-    int step = 0;
-    for (; step < MOST_STEPS; ++step) {
+    for (int step = 0; step < MOST_STEPS; ++step) {
         if (ends) {
             if (waits == 0) { break; }
             ray = waiting[--waits];
@@ -354,7 +204,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         }
         vec3 point = ray.origin + hit.path * ray.direction;
         bool sound = true;
-        Place place = place_at(ray, hit, before, channel, sound);
+        Place place = place_at(ray.origin, ray.direction, ray.record, hit, before, channel, sound);
         TracedBody body = traced_body(place.object);
         int kind = int(body.kind);
         bool outside = place.outside;
@@ -483,7 +333,8 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             ends = true;
         }
     }
-    if (step == MOST_STEPS && !(ends && waits == 0)) { sum.lost = 1.0; }
+    // Not all has been followed after too many steps, or where a driver cuts long loops short: Mesa does after 65,535 turns.
+    if (!(ends && waits == 0)) { sum.lost = 1.0; }
     return sum;
 }
 
@@ -518,8 +369,12 @@ void main() {
     float reach = margin + 1e-3 * surface_reach;
 #if FROM_EYE
     // Something may lie before the first interface.
-    ray.origin = starts_inside ? eye : point_at(pixel, 0.0);
-    ray.record = starts_inside ? record_at_eye(eye, direction) : uvec4(0u);
+    ray.origin = point_at(pixel, 0.0);
+    if (starts_inside) {
+        ray.skipped = 2.0 * SURFACE_OFFSET * surface_reach;
+        ray.origin = eye + ray.skipped * direction;
+        ray.record = record_at_eye(eye, direction, ray.skipped);
+    }
     reach = NOTHING;
 #endif
     Sum sum = follow(ray, seen, reach, 1);

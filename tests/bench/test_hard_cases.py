@@ -9,16 +9,17 @@ import pytest
 
 import translucent as tl
 from translucent.bench.hard import geometry as hard_geometry
+from translucent.bench.hard import interfaces as hard_interfaces
 from translucent.bench.hard import values as hard_values
 from translucent.bench.hard import views as hard_views
 from translucent.bench.hard.cases import Checks, Hard
 from translucent.bench.hard.measure import measure_hard_cases
 
-ALL = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES)
+ALL = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES, *hard_interfaces.CASES)
 
 
 def test_there_is_one_of_each() -> None:
-    assert sorted(case.id for case in ALL) == [f"H{i:02}" for i in range(1, 27)]
+    assert sorted(case.id for case in ALL) == [f"H{i:02}" for i in range(1, 30)]
     assert all(case.title and case.promise for case in ALL)
 
 
@@ -31,7 +32,7 @@ def test_it_holds(renderer: tl.Renderer, case: Hard) -> None:
 
 def test_they_come_in_order(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Hard, "measure", lambda self, renderer: self)
-    assert [case.id for case in measure_hard_cases(renderer)] == [f"H{i:02}" for i in range(1, 27)]
+    assert [case.id for case in measure_hard_cases(renderer)] == [f"H{i:02}" for i in range(1, 30)]
 
 
 def test_distances_from_the_camera_would_fail(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

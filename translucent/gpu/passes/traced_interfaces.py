@@ -95,7 +95,7 @@ class TracedInterfacesPass:
         seen_map = environment.seen.kind == "image"
         return self._variants.program(
             FORKS=job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
-            FROM_EYE=job.placed.starts_inside or any(not body.has_interface for body in scene.bodies),
+            FROM_EYE=job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
             ONE_OBJECT=len(scene.objects) == 1,
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
