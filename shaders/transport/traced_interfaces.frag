@@ -1,6 +1,6 @@
-// Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. Both
-// branches are followed at the first FORKS interfaces, then the stronger one, and the weaker is looked up in the
-// environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
+// Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
+// stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
+// up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
 // interface is that which the rasterizer has found. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
