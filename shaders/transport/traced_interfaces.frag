@@ -1,6 +1,6 @@
-// Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. Both
-// branches are followed at the first FORKS interfaces, then the stronger one, and the weaker is looked up in the
-// environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
+// Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
+// stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
+// up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
 // interface is that which the rasterizer has found. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
@@ -118,7 +118,7 @@ struct Sum {
     float lost;        // share of the light whose ray went through a hole, or is in more bodies than a record holds
 };
 
-// Radiance of an opaque object along a ray, lit as where it is seen directly, but in the mean color of its textures.
+// Radiance of an opaque object along a ray, lit as where it is seen directly, but without its textures.
 vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     if (body.plain == 1.0) { return body.color * irradiance_on(point, normal, 1.0) / PI; }
     OpaqueFinish finish = OpaqueFinish(body.color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
