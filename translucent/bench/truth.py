@@ -23,8 +23,12 @@ from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
 from translucent.scene.scene import Scene
 
-#: Number of reflections that the reference follows at interfaces; what it leaves then is below the errors shown.
-BOUNCES = 12
+#: Number of interfaces at which the reference follows rays. What goes around inside of a knot, reflected totally, comes
+#: out after a hundred of them: with 48, its picture would be wrong by 6 %.
+BOUNCES = 128
+
+#: Number of rays through each pixel of the reference before rough interfaces; one picture has noise of their spread.
+PATHS = 512
 
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
@@ -62,7 +66,7 @@ class Truth:
     def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
         """Trace the ground truth of a scene."""
         begin = time.perf_counter()
-        frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES)
+        frame = reference.render(scene, size, tolerance=tolerance, bounces=BOUNCES, paths=PATHS)
         seconds = time.perf_counter() - begin
         counts = reference.hit_counts(scene, size)
         inside = interior(counts)

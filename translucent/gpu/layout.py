@@ -332,7 +332,11 @@ TRACED_BODY = PackedTable(
     "TracedBody",
     "traced_bodies",
     (
-        ("local_x", "f4", (4,)),  # rows of the transform from a position, less that in w, to coordinates of the hierarchy
+        (
+            "local_x",
+            "f4",
+            (4,),
+        ),  # rows of the transform from a position, less that in w, to coordinates of the hierarchy
         ("local_y", "f4", (4,)),
         ("local_z", "f4", (4,)),
         ("first_node", "f4", (2,)),  # of its hierarchy, and how many in each order: multiples of 4096, and the rest
