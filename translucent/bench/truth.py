@@ -28,7 +28,7 @@ from translucent.scene.scene import Scene
 BOUNCES = 128
 
 #: Number of rays through each pixel of the reference before rough interfaces; one picture has noise of their spread.
-PATHS = 512
+PATHS = 128
 
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
