@@ -14,6 +14,7 @@ import translucent as tl
 from translucent.bench import measure as measuring
 from translucent.bench import run as running
 from translucent.bench import scaling
+from translucent.bench import truth as truths
 from translucent.bench.cases import CASES, Case
 from translucent.bench.contenders import CONTENDERS, Effect, check_names, contenders
 from translucent.bench.drawing import Floor, Studio
@@ -332,6 +333,27 @@ def test_the_reference_follows_rays_until_they_come_out() -> None:
     """In a knot light goes around for a hundred reflections: twelve leave most of some pixels open."""
     frame = Truth.of(named("glass knot").scene((16, 16)), (16, 16), 1e-3).frame
     assert float(frame.provenance["residual"]) < 0.01
+
+
+def test_noise_of_the_reference_is_no_error(rng: np.random.Generator) -> None:
+    truth = Truth.of(case_of(Sphere().tessellate(24)).scene((96, 96)), (96, 96), 1e-3)
+    right = truth.frame.radiance
+    one, other = (right + 0.3 * rng.normal(size=right.shape) for _ in range(2))
+    mean = dataclasses.replace(truth.frame, radiance=0.5 * (one + other))
+    noisy = dataclasses.replace(truth, frame=mean, halves=(one, other))
+    shown = dataclasses.replace(truth.frame, radiance=right + 0.1)
+    found = noisy.errors(shown, "radiance")
+    assert found is not None
+    assert found[0].rms * noisy.scale("radiance") == pytest.approx(0.1, rel=0.1)
+
+
+def test_frosted_glass_has_two_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(truths, "PATHS", 2)
+    truth = Truth.of(named("frosted").scene((8, 8)), (8, 8), 1e-3)
+    assert truth.halves is not None
+    one, other = truth.halves
+    assert (one != other).any()
+    np.testing.assert_allclose(truth.frame.radiance, 0.5 * (one + other))
 
 
 def test_all_that_is_promised_is_measured() -> None:
