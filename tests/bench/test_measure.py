@@ -287,6 +287,7 @@ def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(studio: S
     assert (np.array(errors[1:]) < 1.05 * np.array(errors[:-1])).all()
     assert errors[-1] < 0.02 < 0.2 < screen.radiance.rms < front.radiance.rms  # type: ignore[union-attr]
     assert front.radiance.rms < straight.radiance.rms  # type: ignore[union-attr]
+    assert constant.radiance.rms < 0.7 * straight.radiance.rms, "it mirrors and bends"  # type: ignore[union-attr]
     # In viewers of glTF absorption is wrong beside the missing interface.
     assert constant.radiance.median > front.radiance.median  # type: ignore[union-attr]
     assert constant.parameters.endswith(" m, of least squared error, FrontInterface()")
