@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.bench.measuring import case_of, measured
 from translucent.bench import measure as measuring
 from translucent.bench import run as running
 from translucent.bench import scaling
@@ -19,7 +19,7 @@ from translucent.bench.contenders import CONTENDERS, Effect, check_names, conten
 from translucent.bench.drawing import Floor, Studio
 from translucent.bench.files import read_report, write_report
 from translucent.bench.measure import CaseRun
-from translucent.bench.record import CaseRecord, Report
+from translucent.bench.record import Report
 from translucent.bench.run import Effort, measure_all
 from translucent.bench.scaling import ScalingRun
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
@@ -33,23 +33,6 @@ from translucent.gpu.targets import Targets
 
 #: Rounds are few and frames small: what is tested is that there are numbers.
 HASTE = Effort(0.0, 0.0, 0.4)
-
-
-@pytest.fixture
-def studio(renderer: tl.Renderer) -> Iterator[Studio]:
-    with renderer.gpu.context.current():
-        made = Studio(renderer)
-        yield made
-        made.release()
-
-
-def case_of(mesh: tl.Mesh, **more: object) -> Case:
-    return Case("mine", "Mine", "mine", lambda size: tl.showcase(mesh, size=size), **more)  # type: ignore[arg-type]
-
-
-def measured(studio: Studio, case: Case, *names: str, size: tuple[int, int] = (64, 64)) -> CaseRecord:
-    chosen = contenders(case.effect, quick=False, only=names)
-    return CaseRun(studio, None, case, size, 0.0).measure(chosen)
 
 
 def test_rows_have_times_errors_and_pictures(studio: Studio) -> None:
@@ -265,35 +248,6 @@ def test_methods_are_chosen_by_name_or_family() -> None:
     assert {one.name for one in contenders("scattering", quick=True)} < {
         one.name for one in contenders("scattering", quick=False)
     }
-
-
-def test_one_interface_lies_between_two_and_straight_rays_in_passes_and_is_not_exact(studio: Studio) -> None:
-    case = next(case for case in CASES if case.name == "glass")
-    made = measured(studio, case, "SignedDepth", "one interface", "straight rays", size=(64, 64))
-    rows = {row.method: row for row in made.rows}
-    two, one, none = (rows[name] for name in ("SignedDepth", "one interface", "straight rays"))
-    assert not any(row.exact for row in (two, one, none))
-    assert two.promise.startswith("refraction and reflection beyond the first interval")
-    assert none.promise == "none: interfaces are left out"
-    assert [row.passes for row in (two, one, none)] == [3, 2, 1]
-    assert one.parameters == "SignedDepth(anchored=True), interfaces=FrontInterface()"
-    assert "rays leave curved bodies in wrong directions" in one.promise
-    # The root mean square of all of them is that of reflections inside, which none follows on.
-    assert one.radiance.median > 3 * two.radiance.median  # type: ignore[union-attr]
-    assert {"SignedDepth", "one interface", "straight rays"} <= {picture.method for picture in made.pictures}
-
-
-def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
-    case = next(case for case in CASES if case.name == "thin wall")
-    made = measured(studio, case, "SignedDepth", "one interface", "straight rays", size=(96, 96))
-    rows = {row.method: row for row in made.rows}
-    assert rows["one interface"].refusal == "sheets have one interface, at which nothing bends"
-    wall, none = rows["SignedDepth"].radiance, rows["straight rays"].radiance
-    assert wall is not None
-    assert none is not None
-    # Both faces mirror in closed form; what is left is where the sheet hides itself.
-    assert wall.median < 1e-3
-    assert none.median > 30 * wall.median
 
 
 def test_all_that_is_promised_is_measured() -> None:

@@ -11,9 +11,9 @@ import numpy as np
 
 from translucent.assets import mesh_path
 from translucent.bench.contenders import Effect
-from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, subdivided
+from translucent.bench.shapes import lens_row, lying_torus, menger_sponge, nested_shells, subdivided
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solids import Box, Sphere, Torus
+from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
 from translucent.media.density import DensityGrid
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
@@ -82,6 +82,25 @@ def _glass(make: Callable[[], Mesh], surface: Surface, size: Size) -> Scene:
     scene = showcase(mesh, size=size, environment=Environment.studio())
     glass = Medium.from_color((0.8, 0.95, 0.9), 0.3 * mesh.diagonal, ior=1.5)
     return dataclasses.replace(scene, objects=[Object(mesh, glass, surface=surface)])
+
+
+def _nested(outer: Object, inner: Object, size: Size) -> Scene:
+    """A body within another, in a studio: where both are, the one of higher priority is."""
+    bodies = [outer, inner]
+    return Scene(bodies, framing(bodies, size), environment=Environment.studio(), overlap="priority")
+
+
+def _filled_goblet(size: Size) -> Scene:
+    crystal = Medium.from_color((0.82, 0.9, 0.86), distance=0.01, ior=1.5)
+    wine = Medium.from_color((0.6, 0.05, 0.12), distance=0.02, ior=1.34)
+    return _nested(Object(_toolkit("wine"), wine), Object(_toolkit("goblet"), crystal, priority=1), size)
+
+
+def _ball_in_ball(size: Size) -> Scene:
+    glass = Medium.from_color((0.8, 0.95, 0.9), distance=0.6, ior=1.5)
+    heavy = Medium.from_color((0.9, 0.5, 0.2), distance=0.6, ior=1.8)
+    core = Object(Sphere(radius=0.5).tessellate(96), heavy, priority=1)
+    return _nested(Object(Sphere().tessellate(96), glass), core, size)
 
 
 def _wall(size: Size) -> Scene:
@@ -161,7 +180,7 @@ def _density(size: Size) -> Scene:
 
 
 #: Cases of interfaces, which take long: all but one are left out by ``--quick``.
-_WITH_INTERFACES = partial(Case, effect="interfaces", quick=False)
+_WITH_INTERFACES = partial(Case, effect="interfaces", quick=False, shrink=2)
 
 CASES: tuple[Case, ...] = (
     Case("sphere", "Sphere", "convex: two surfaces on every ray", partial(_shown, lambda: Sphere().tessellate(316))),
@@ -229,7 +248,14 @@ CASES: tuple[Case, ...] = (
         "interfaces that mirror, and bend rays twice",
         partial(_glass, _ball, Surface()),
         quick=True,
-        compared=160,
+        compared=128,
+    ),
+    _WITH_INTERFACES(
+        "hollow",
+        "Hollow glass ball",
+        "rays that enter and leave twice, and mirrors around a hollow",
+        partial(_glass, SphericalShell().tessellate, Surface()),
+        compared=80,
     ),
     _WITH_INTERFACES(
         "glass knot",
@@ -239,24 +265,54 @@ CASES: tuple[Case, ...] = (
         compared=96,
     ),
     _WITH_INTERFACES(
+        "filled goblet",
+        "Wine in a crystal glass",
+        "media that touch, and differ in how they bend",
+        _filled_goblet,
+        compared=96,
+    ),
+    _WITH_INTERFACES(
+        "nested balls",
+        "Ball in a ball",
+        "a body of one medium within another",
+        _ball_in_ball,
+        compared=80,
+    ),
+    _WITH_INTERFACES(
+        "amber",
+        "Amber",
+        "flat faces that mirror totally, again and again",
+        partial(_glass, partial(_toolkit, "amber"), Surface()),
+        compared=96,
+    ),
+    _WITH_INTERFACES(
+        "lenses",
+        "Row of lenses",
+        "bodies behind each other, seen through each other",
+        partial(_glass, lens_row, Surface()),
+        compared=80,
+    ),
+    _WITH_INTERFACES(
         "frosted",
         "Frosted glass ball",
         "rough interfaces, that blur what they mirror and what is behind",
         partial(_glass, _ball, Surface(roughness=0.4)),
-        compared=40,
+        compared=32,
     ),
     _WITH_INTERFACES(
         "dispersion",
         "Ball of heavy flint",
         "each channel bends on its own",
         partial(_glass, _ball, Surface(dispersion=1.0)),
-        compared=128,
+        brief=True,
+        compared=96,
     ),
     _WITH_INTERFACES(
         "thin wall",
         "Sheet of glass",
         "a thin wall: both of its faces mirror, and rays that pass go straight on",
         _wall,
+        brief=True,
         compared=120,
     ),
     Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 from translucent.bench.row import Kind
 from translucent.errors import InputError
-from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces
+from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.methods import (
     METHODS,
     BackFaceDepth,
@@ -41,7 +41,9 @@ _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 #: Largest number of steps with light scattered into each: more take seconds for a frame.
 _MOST_LIT_STEPS = 128
 
-_SCREEN = ScreenInterfaces()
+#: Trees of traced interfaces, as depth and forks, and whether ``--quick`` has them: from the cheapest tree to one whose
+#: depth is beyond the planner's, which is among them, each with as many forks as pay there.
+_TREES = {(2, 0): True, (4, 0): False, (4, 1): True, (8, 1): False, (8, 2): False, (12, 2): True, (16, 3): False}
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,9 @@ class Contender:
     name, family : str
         As in `translucent.bench.row.Row`.
     method : Method
-        With its parameters. `ThinLayer` and shortcuts get the thickness with the least squared error of all, which
-        nobody has who does not know the truth: no choice of theirs would do better.
+        With its parameters; with `interfaces`, the planner picks another where the scene needs it. `ThinLayer` and
+        shortcuts get the thickness with the least squared error of all, which nobody has who does not know the truth:
+        no choice of theirs would do better.
     technique : str
     kind : {"method", "counter-example", "cpu"}
     effects : tuple of str
@@ -66,8 +69,8 @@ class Contender:
     ior : {"matched", "refracted"}, optional
         Drawn with media of the index of refraction 1 and without surfaces, or else of `REFRACTED_IOR` where they have
         none of their own.
-    interfaces : Interfaces
-        How they are found, as `translucent.Renderer.render` has it.
+    interfaces : Interfaces, optional
+        How they are found, as `translucent.Renderer.render` has it; None where they are not what is measured.
     """
 
     name: str
@@ -79,7 +82,7 @@ class Contender:
     quick: bool = True
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
-    interfaces: Interfaces = _SCREEN
+    interfaces: Interfaces | None = None
 
     @property
     def fitted(self) -> bool:
@@ -92,7 +95,8 @@ class Contender:
             return "the shortcuts are drawn without opaque objects"
         if self.technique == "half" and any(body.sheet_thickness is not None for body in scene.bodies):
             return "signed distances of a sheet mean nothing"
-        if self.interfaces.one_interface and all(body.sheet_thickness is not None for body in scene.bodies):
+        front = self.interfaces is not None and self.interfaces.one_interface
+        if front and all(body.sheet_thickness is not None for body in scene.bodies):
             return "sheets have one interface, at which nothing bends"
         return None
 
@@ -109,7 +113,7 @@ def _ordered() -> Iterable[Contender]:
     yield Contender("DepthPeeling, all layers", "DepthPeeling", DepthPeeling(max_layers=MAX_LAYERS))
     for k in (2, 4, 8):
         yield Contender(f"KBuffer, k = {k}", "KBuffer", KBuffer(k=k), quick=k == 8)
-    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), effects=(*_ALL, "interfaces"), pictured=_SOURCES)
+    yield Contender("FragmentLists", "FragmentLists", FragmentLists(), pictured=_SOURCES)
 
 
 def _light_points() -> Iterable[Contender]:
@@ -156,6 +160,44 @@ def _as_they_are() -> Iterable[Contender]:
             yield Contender(method.__name__, method.__name__, method())
 
 
+def _with_interfaces() -> Iterable[Contender]:
+    """Ways of finding interfaces; and what viewers of glTF do, one interface before a constant thickness."""
+    every: tuple[Effect, ...] = ("interfaces",)
+    front, screen = FrontInterface(), ScreenInterfaces()
+    yield Contender(
+        "constant thickness, one interface",
+        "constant thickness",
+        SignedDepth(),
+        "constant",
+        "counter-example",
+        every,
+        pictured=every,
+        interfaces=front,
+    )
+    yield Contender(
+        "straight rays",
+        "straight rays",
+        SignedDepth(),
+        kind="counter-example",
+        effects=every,
+        ior="matched",
+        interfaces=screen,  # of which matched media have none
+    )
+    for one in (front, screen):
+        name = type(one).__name__
+        yield Contender(name, name, SignedDepth(), effects=every, pictured=every, interfaces=one)
+    for (depth, forks), quick in _TREES.items():
+        yield Contender(
+            f"TracedInterfaces, depth {depth}, {'1 fork' if forks == 1 else f'{forks} forks'}",
+            "TracedInterfaces",
+            SignedDepth(),
+            effects=every,
+            quick=quick,
+            pictured=every if (depth, forks) in ((2, 0), (12, 2)) else (),
+            interfaces=TracedInterfaces(depth, forks),
+        )
+
+
 CONTENDERS: tuple[Contender, ...] = (
     Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
     Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
@@ -170,26 +212,7 @@ CONTENDERS: tuple[Contender, ...] = (
         "counter-example",
         pictured=("absorption", "emission"),
     ),
-    Contender(
-        "SignedDepth", "SignedDepth", SignedDepth(), effects=(*_ALL, "interfaces"), pictured=(*_ALL, "interfaces")
-    ),
-    Contender(
-        "one interface",
-        "one interface",
-        SignedDepth(),
-        effects=("interfaces",),
-        pictured=("interfaces",),
-        interfaces=FrontInterface(),
-    ),
-    Contender(
-        "straight rays",
-        "straight rays",
-        SignedDepth(),
-        kind="counter-example",
-        effects=("interfaces",),
-        pictured=("interfaces",),
-        ior="matched",
-    ),
+    Contender("SignedDepth", "SignedDepth", SignedDepth(), pictured=_ALL),
     Contender(
         "SignedDepth from the camera",
         "SignedDepth",
@@ -203,7 +226,8 @@ CONTENDERS: tuple[Contender, ...] = (
     *_ordered(),
     *_light_points(),
     *_marched(),
-    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", quick=False),
+    *_with_interfaces(),
+    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", get_args(Effect), quick=False),
 )
 
 

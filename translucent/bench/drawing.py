@@ -170,12 +170,17 @@ class Planned(_OnGpu):
                     step.run(self._job, spec)
 
 
+#: Passes of a plan that shade what a shortcut has found, those that find and shade an interface included.
+_AFTER_SHORTCUTS = (PassName.INTERFACES, PassName.TRANSMITTANCE, PassName.SURFACES)
+
+
 class Short(_OnGpu):
-    """Drawing of a shortcut: it replaces the passes over geometry, with the shading of signed depth."""
+    """Drawing of a shortcut: it replaces the passes that find thickness, with the shading of signed depth."""
 
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan, shortcut: Shortcut) -> None:
-        shading = tuple(spec for spec in plan.passes if spec.name is PassName.TRANSMITTANCE)
-        super().__init__(studio, scene, targets, RenderPlan(SignedDepth(), shading, plan.spectral))
+        shading = tuple(spec for spec in plan.passes if spec.name in _AFTER_SHORTCUTS)
+        short = RenderPlan(SignedDepth(), shading, plan.spectral, interfaces=plan.interfaces)
+        super().__init__(studio, scene, targets, short)
         self._shortcut = shortcut
 
     def draw(self) -> Sample:

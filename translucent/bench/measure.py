@@ -112,6 +112,7 @@ class CaseRun:
             plan = plan_of(self.studio, contender, seen, self.cpu)
             entry.contender, entry.assumed = fitted(self.studio, contender, seen, truth.frame, size)
             plan = plan_of(self.studio, entry.contender, seen, self.cpu)
+            row = dataclasses.replace(row, parameters=_parameters(entry.contender, plan, entry.assumed))
             drawn = drawing(self.studio, entry.contender, seen, plan, targets, entry.assumed, self.cpu)
             try:
                 with warnings.catch_warnings():
@@ -162,6 +163,8 @@ class CaseRun:
                     entry.drawn.release()
             floor.release()
             targets.release()
+        if self.case.effect == "interfaces":
+            found = {name: one.of_whole_frames for name, one in found.items()}
         rows = [
             _with_times(entry.row, found.get(entry.row.method), failures, peeled=entry.contender.method.peels)
             for entry in self._entries
@@ -211,26 +214,31 @@ def _untrusted(scene: Scene) -> str:
     )
 
 
-def _parameters(contender: Contender) -> str:
-    return {
+def _parameters(contender: Contender, plan: RenderPlan | None = None, assumed: float = 0.0) -> str:
+    """The configuration as Python writes it, or of shortcuts in words, with that of interfaces behind it."""
+    method, interfaces = contender.method, contender.interfaces
+    if plan is not None:
+        interfaces = plan.interfaces
+        if contender.interfaces is not None:
+            method = plan.method
+    found = {
         "constant": "best constant in metres",
         "ball": "best diameter in metres",
         "unmarked": "BackFaceDepth() without its mask",
         "half": "SignedDepth(anchored=True) into float16",
         "cpu": 'Renderer(backend="cpu")',
-        "march": f"reference.march with {contender.method}",
-        "plan": str(contender.method)
-        + ("" if contender.interfaces.finds_exits else f", interfaces={contender.interfaces}"),
+        "march": f"reference.march with {method}",
+        "plan": str(method),
     }[contender.technique]
+    if assumed:
+        found = f"{assumed:.4g} m, of least squared error"
+    return found if interfaces is None else f"{found}, {interfaces}"
 
 
 def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRecord, plan: RenderPlan) -> Row:
     """The row with what the planner promises and what the frame shows."""
     assert entry.frame is not None
     contender, frame = entry.contender, entry.frame
-    parameters = row.parameters
-    if entry.assumed:
-        parameters = f"{entry.assumed:.4g} m, of least squared error"
     promise, exact = promise_of(contender, plan, entry.scene, case.quantity)
     found: dict[str, Any] = {}
     for quantity in get_args(Quantity):
@@ -246,7 +254,6 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
     passes = plan.geometry_passes if contender.technique in ("plan", "half", "unmarked") else 1
     return dataclasses.replace(
         row,
-        parameters=parameters,
         promise=promise,
         exact=exact,
         passes=passes if contender.kind != "cpu" else None,

@@ -25,6 +25,8 @@ _BESIDE_THICKNESS = (
 
 def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
     """Promise of a row in a quantity, in words, and whether it is exact."""
+    if contender.technique == "constant" and contender.interfaces is not None:
+        return "none: the best constant thickness, and rays that bend once, where they enter", False
     if contender.technique in ("constant", "ball"):
         return "none: the nearest face alone, with the best thickness that there is", False
     if contender.technique == "unmarked":

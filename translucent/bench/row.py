@@ -92,7 +92,7 @@ class Row:
         The planner calls the method exact on this case.
     wall, gpu : Timing, optional
         From the first draw to the last having finished, by the clock and by the GPU's timer: of the part that finds
-        thickness or intervals.
+        thickness or intervals; on cases of interfaces the clock's are of the whole frame, and the timer has none.
     frame : Timing, optional
         By the clock, the whole frame: that and the shading of every pixel.
     ratio, frame_ratio : Ratio, optional

@@ -134,7 +134,7 @@ def _measured(
 ) -> Iterator[Report]:
     """The report after each part of it."""
     scaling = ScalingRun(studio, effort.step_seconds, quick)
-    parts = len(cases) + sum(len(ladder.steps) for ladder in scaling.ladders()) + 24
+    parts = len(cases) + sum(len(ladder.steps) for ladder in scaling.ladders()) + 26
     done = 0
     for case in cases:
         progress(f"case {case.name}", done, parts)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from translucent.assets import mesh_path
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.solids import Box, Sphere, Torus
+from translucent.geometry.solids import Box, Ellipsoid, Sphere, Torus
 from translucent.mesh_files import load_mesh
 
 Vertices = npt.NDArray[np.float64]
@@ -62,6 +62,12 @@ def nested_shells(shells: int = 6, segments: int = 96) -> Mesh:
     radii = np.linspace(1.0, 0.15, 2 * shells)
     parts = [Sphere(radius=float(radius)).tessellate(segments) for radius in radii]
     return joined([(p.vertices, p.faces if i % 2 == 0 else p.faces[:, ::-1]) for i, p in enumerate(parts)], "shells")
+
+
+def lens_row(lenses: int = 3, segments: int = 64) -> Mesh:
+    """Lenses, one behind the other along z: flat ellipsoids, apart by half of their width."""
+    lens = Ellipsoid(radii=(1.0, 1.0, 0.3)).tessellate(segments)
+    return joined([(lens.vertices - (0, 0, i), lens.faces) for i in range(lenses)], "lenses")
 
 
 def plates(layers: int) -> Mesh:

@@ -65,6 +65,8 @@ def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | 
         if cpu is None:
             raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
         return cpu.plan(scene)
+    if contender.interfaces is not None:
+        return studio.renderer.plan(scene, interfaces=contender.interfaces)
     if contender.technique == "plan":
-        return studio.renderer.plan(scene, contender.method, interfaces=contender.interfaces)
+        return studio.renderer.plan(scene, contender.method)
     return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())

@@ -8,7 +8,7 @@ from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
 
 _HEAD = (
-    f"{'method':<36}{'ms':>8}{'p95':>8}{'÷ floor':>9}{'±':>6}{'frame':>7}{'passes':>7}{'layers':>7}{'ms/layer':>9}"
+    f"{'method':<38}{'ms':>8}{'p95':>8}{'÷ floor':>9}{'±':>6}{'frame':>7}{'passes':>7}{'layers':>7}{'ms/layer':>9}"
     f"{'RMS':>9}{'p99.9':>9}{'invalid':>9}"
 )
 
@@ -47,8 +47,8 @@ def _lines(report: Report) -> Iterator[str]:
 def _row(case: CaseRecord, row: Row) -> str:
     name = f"{row.method}{' *' if row.pareto else ''}"
     if row.failure or row.refusal or row.wall is None:
-        return f"{name:<36}{'failed' if row.failure else 'refused'}: {row.failure or row.refusal}"
-    line = f"{name:<36}{row.wall.median:>8.2f}{row.wall.p95:>8.2f}"
+        return f"{name:<38}{'failed' if row.failure else 'refused'}: {row.failure or row.refusal}"
+    line = f"{name:<38}{row.wall.median:>8.2f}{row.wall.p95:>8.2f}"
     line += f"{row.ratio.median:>9.2f}{row.ratio.noise:>6.2f}" if row.ratio else f"{'':>15}"
     line += f"{row.frame_ratio.median:>7.2f}" if row.frame_ratio else f"{'':>7}"
     line += f"{'' if row.passes is None else row.passes:>7}{'' if row.layers is None else row.layers:>7}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +72,11 @@ class Samples:
     def spent(self) -> float:
         """Total time in seconds so far."""
         return sum(self.frame) + sum(self.floor_wall)
+
+    @property
+    def of_whole_frames(self) -> Samples:
+        """Samples of whole frames alone, for what has no part that finds thickness; the GPU's timer had only that."""
+        return replace(self, wall=self.frame, gpu=[], part=self.whole)
 
     def add(self, sample: Sample, floor: float, floor_wall: float) -> None:
         """Add a sample."""

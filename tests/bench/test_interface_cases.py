@@ -1,0 +1,102 @@
+"""Ways of finding interfaces, measured against all the light that there is. No time is judged here."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from tests.bench.measuring import case_of, measured, named
+from translucent.bench import truth as truths
+from translucent.bench.cases import CASES
+from translucent.bench.contenders import contenders
+from translucent.bench.drawing import Studio
+from translucent.bench.page.advice import advise
+from translucent.bench.truth import Truth
+from translucent.geometry.solids import Sphere
+
+
+def test_a_deeper_tree_is_nearer_to_all_light_and_what_is_drawn_is_not(studio: Studio) -> None:
+    names = ("constant-thickness", "straight rays", "FrontInterface", "ScreenInterfaces", "TracedInterfaces")
+    made = measured(studio, named("glass"), *names, size=(64, 64))
+    rows = {row.method: row for row in made.rows}
+    constant, straight, front, screen = (
+        rows[name]
+        for name in ("constant thickness, one interface", "straight rays", "FrontInterface", "ScreenInterfaces")
+    )
+    traced = [row for row in made.rows if row.family == "TracedInterfaces"]
+    assert not [row.failure or row.refusal for row in made.rows if row.failure or row.refusal]
+    errors = [row.radiance.rms for row in traced]  # type: ignore[union-attr]
+    assert (np.array(errors[1:]) < 1.05 * np.array(errors[:-1])).all()
+    assert errors[-1] < 0.02 < 0.2 < screen.radiance.rms < front.radiance.rms  # type: ignore[union-attr]
+    assert front.radiance.rms < straight.radiance.rms  # type: ignore[union-attr]
+    assert constant.radiance.rms < 0.7 * straight.radiance.rms, "it mirrors and bends"  # type: ignore[union-attr]
+    # In viewers of glTF absorption is wrong beside the missing interface.
+    assert constant.radiance.median > front.radiance.median  # type: ignore[union-attr]
+    assert constant.parameters.endswith(" m, of least squared error, FrontInterface()")
+    assert traced[-1].parameters == "SignedDepth(anchored=True), TracedInterfaces(depth=16, forks=3)"
+    assert straight.parameters == "SignedDepth(anchored=True)"
+    assert straight.promise == "none: interfaces are left out"
+    assert [row.passes for row in (traced[0], screen, front, straight)] == [2, 3, 2, 1]
+    assert not any(row.exact for row in rows.values())
+    # Pixels are what tracing is about: the whole frame is its time.
+    assert all(row.wall == row.frame and row.ratio == row.frame_ratio for row in made.rows if row.kind == "method")
+    advice = advise(made)
+    assert advice is not None
+    assert advice.row.family == "TracedInterfaces"
+    assert advice.constant is constant
+
+
+def test_a_thin_wall_mirrors_and_does_not_bend(studio: Studio) -> None:
+    made = measured(studio, named("thin wall"), "ScreenInterfaces", "FrontInterface", "straight rays", size=(192, 192))
+    rows = {row.method: row for row in made.rows}
+    assert rows["FrontInterface"].refusal == "sheets have one interface, at which nothing bends"
+    wall, none = rows["ScreenInterfaces"].radiance, rows["straight rays"].radiance
+    assert wall is not None
+    assert none is not None
+    # Both faces mirror in closed form; what is left is where the sheet hides itself.
+    assert wall.median < 1e-3
+    assert none.median > 30 * wall.median
+
+
+def test_what_the_planner_picks_for_interfaces_is_measured() -> None:
+    measured = {one.interfaces for one in contenders("interfaces", quick=True)}
+    for case in CASES:
+        if case.effect == "interfaces":
+            assert tl.plan(case.scene((8, 8))).interfaces in measured
+
+
+def test_media_within_each_other_have_a_method_that_finds_their_order(studio: Studio) -> None:
+    made = measured(studio, named("filled goblet"), "traced-interfaces-depth-12-2-forks", size=(32, 32))
+    row = made.rows[1]
+    assert row.parameters == "FragmentLists(light_points=8), TracedInterfaces(depth=12, forks=2)"
+    assert row.radiance is not None
+
+
+def test_the_reference_follows_rays_until_they_come_out() -> None:
+    """In a knot light goes around for a hundred reflections: twelve leave most of some pixels open."""
+    frame = Truth.of(named("glass knot").scene((16, 16)), (16, 16), 1e-3).frame
+    assert float(frame.provenance["residual"]) < 0.01
+
+
+def test_noise_of_the_reference_is_no_error(rng: np.random.Generator) -> None:
+    truth = Truth.of(case_of(Sphere().tessellate(24)).scene((96, 96)), (96, 96), 1e-3)
+    right = truth.frame.radiance
+    one, other = (right + 0.3 * rng.normal(size=right.shape) for _ in range(2))
+    mean = dataclasses.replace(truth.frame, radiance=0.5 * (one + other))
+    noisy = dataclasses.replace(truth, frame=mean, halves=(one, other))
+    shown = dataclasses.replace(truth.frame, radiance=right + 0.1)
+    found = noisy.errors(shown, "radiance")
+    assert found is not None
+    assert found[0].rms * noisy.scale("radiance") == pytest.approx(0.1, rel=0.1)
+
+
+def test_frosted_glass_has_two_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(truths, "PATHS", 2)
+    truth = Truth.of(named("frosted").scene((8, 8)), (8, 8), 1e-3)
+    assert truth.halves is not None
+    one, other = truth.halves
+    assert (one != other).any()
+    np.testing.assert_allclose(truth.frame.radiance, 0.5 * (one + other))
