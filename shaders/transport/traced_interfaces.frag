@@ -28,6 +28,7 @@ uniform sampler2D entered;           // interface towards the eye: normal, axial
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 uniform int most_interfaces;
+uniform float faintest_share;        // of the light, its three channels together: fainter rays are not followed
 #if MICROFACETS
 uniform int sample_number;           // of a pixel
 uniform float blurred_share;         // of the variance of microfacets, that blurs what is seen in them; the rest is sampled
@@ -318,14 +319,14 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         }
 #if FORKS > 0
         weaker.forks -= ray.met == 1 ? 0 : 1;
-        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > FAINTEST_SHARE) {
+        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > faintest_share) {
             waiting[waits++] = weaker;
         } else
 #endif
         if (strength(weaker.share) > 0.0) {
             sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * environment_seen(weaker.origin, weaker.direction, weaker.reflected, weaker.blur);
         }
-        if (last || strength(ray.share) < FAINTEST_SHARE) {
+        if (last || strength(ray.share) < faintest_share) {
             // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
             bool total = reflectance == 1.0;
             sum.light += (on_stronger ? vec3(1.0) : again) * ray.share

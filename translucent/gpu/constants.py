@@ -88,7 +88,6 @@ CONSTANTS: dict[str, str] = {
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "RECORD_SIZE": "8",  # bodies that a ray can be in
     "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene
-    "FAINTEST_SHARE": "1.2e-2",  # of the light of a ray, its three channels together: a fainter one is not followed
     "TOUCHING": "1e-6",  # axial depth between surfaces that count as one interface
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},

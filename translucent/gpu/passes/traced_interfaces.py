@@ -40,6 +40,9 @@ _ENTERED = ("entered", "surface_finish", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
 
 
+#: Share of a ray's light below which it is not followed, with two forks or fewer.
+FAINTEST_SHARE = 1.2e-2
+
 #: Samples of a pixel below which microfacets would be mere noise.
 FEW_SAMPLES = 4
 
@@ -73,8 +76,10 @@ class TracedInterfacesPass:
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
         self._bind(job, hierarchies, *tables)
         program = self._program(job)
+        depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
-            "most_interfaces": job.plan.interfaces.tree[0] if job.plan.interfaces else 0,
+            "faintest_share": faintest_share(forks),
+            "most_interfaces": depth,
             "start_record": record,
             "sample_number": job.sample,
             "blurred_share": blurred_share(job.samples),
@@ -139,6 +144,14 @@ class TracedInterfacesPass:
             textures["seen_map"] = environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
+
+
+def faintest_share(forks: int) -> float:
+    """Share of a ray's light, its three channels together, below which it is not followed.
+
+    With two forks the rays left out weigh as much as those of a third fork; more forks ask for more.
+    """
+    return FAINTEST_SHARE / 4.0 ** max(forks - 2, 0)
 
 
 def blurred_share(samples: int) -> float:
