@@ -76,7 +76,7 @@ void leave(inout Ray ray, vec3 point, vec3 face_normal) {
     float offset = SURFACE_OFFSET * surface_reach;
     float across = dot(face_normal, ray.direction);
     ray.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
-    ray.skipped = offset * abs(across);
+    ray.skipped = offset / max(abs(across), 1e-2);
 }
 
 // Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
@@ -183,6 +183,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         int before = dominant_body(ray.record);
         passed = vec3(1.0);
         if (ray.record.x != 0u) {
+            if (hit.object < 0) { sum.lost += strength(ray.share) / 3.0; }  // it has left through a hole
             Filling filling = filling_of(ray.record, before);
             float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
 #if EMISSION
@@ -198,7 +199,6 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             ray.share *= passed;
         }
         if (hit.object < 0) {
-            if (ray.record.x != 0u) { sum.lost += strength(ray.share) / 3.0; }
             sum.light += ray.share * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
             ends = true;
             continue;
@@ -363,7 +363,7 @@ void main() {
     Finish finish = finish_of(surface);
     finish.color = tint.rgb;
     finish.unoccluded = tint.a;
-    Seen seen = Seen(int(min(surface.x, 65535.0) + 0.5), point_at(pixel, front.w), front.xyz, finish);
+    Seen seen = Seen(front.w < NOTHING ? int(surface.x + 0.5) : AIR, point_at(pixel, front.w), front.xyz, finish);
     vec3 eye = point_at(pixel, surface_eye_axial_depth);
     float margin = min(1e-3 * surface_reach, distance(seen.point, eye));
     Ray ray = Ray(seen.point - margin * direction, 0.0, direction, vec3(1.0), uvec4(0u), 0, FORKS, false, 0.0, 0, -direction);

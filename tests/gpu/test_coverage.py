@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 import pytest
 import trimesh
@@ -167,9 +165,11 @@ def test_a_part_and_its_rest_are_each_pixel_once(part: Part) -> None:
 
 
 @pytest.mark.parametrize("samples", [1, 4])
-@pytest.mark.parametrize("interfaces", ["both", "front"])
+@pytest.mark.parametrize(
+    "interfaces", [tl.TracedInterfaces(), tl.ScreenInterfaces(), tl.FrontInterface()], ids=["traced", "screen", "front"]
+)
 def test_glass_changes_what_it_covers_and_nothing_else(
-    interfaces: Literal["both", "front"], samples: int, renderer: tl.Renderer
+    interfaces: tl.TracedInterfaces | tl.ScreenInterfaces | tl.FrontInterface, samples: int, renderer: tl.Renderer
 ) -> None:
     camera = tl.Camera.look_at((0, 0, 4), (0, 0, 0), fov_y=45.0)
     checks = tl.Environment.checkerboard((0.1, 0.2, 0.3), (0.9, 0.8, 0.7), 7)

@@ -136,6 +136,8 @@ def lift(name: str, defines: Mapping[str, int]) -> Lifted:
     used = set().union(*(part.names for part in kept))
     version = WITH_STORAGE if any(_STORAGE.search(part.code) for part in kept) else PLAIN
     head = [f"#version {version} core", f"// translucent: shaders/{name}"]
+    if any("precise" in part.names for part in kept):
+        head.append("#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere")
     decided = {key: int(value) for key, value in defines.items()}
     head += [f"#define {key} {value}" for key, value in decided.items() if key in used]
     head += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]

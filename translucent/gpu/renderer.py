@@ -30,7 +30,7 @@ from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
 
 #: Largest share of a pixel's light that may come along rays that went astray.
-MOST_LOST = 0.02
+MOST_LOST = 0.005
 
 #: First OpenGL version in which shaders write to buffers.
 SHADER_STORAGE = 430
