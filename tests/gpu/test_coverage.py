@@ -89,7 +89,7 @@ def test_the_picture_is_as_if_all_of_it_were_shaded(method: str | None, renderer
     most = 1 if method == "back-face-depth" else 3
     media = MEDIA if chosen is None or chosen.ordered else MEDIA[:2]
     covered = []
-    for seed in range(8):
+    for seed in range(4):
         frame = require_equal(renderer, scene_of(seed, most, media), chosen, 1 + 2 * (seed % 2))
         covered.append(float(frame.coverage.mean()))
     # Little, much, and in between: else the test shows nothing.
