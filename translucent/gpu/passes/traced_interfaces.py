@@ -80,6 +80,7 @@ class TracedInterfacesPass:
         values = {
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
+            "all_closed": _all_closed(job.scene),
             "start_record": record,
             "sample_number": job.sample,
             "blurred_share": blurred_share(job.samples),
@@ -166,6 +167,11 @@ def media_center(scene: Scene) -> Array:
     """(3,): center of the bounds of all bodies, from which positions count."""
     boxes = np.stack([body.bounds for body in scene.bodies])
     return np.asarray(0.5 * boxes[:, 0].min(axis=0) + 0.5 * boxes[:, 1].max(axis=0))
+
+
+def _all_closed(scene: Scene) -> bool:
+    """Whether rays can leave each solid only through its surface."""
+    return all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
 
 
 def _record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
