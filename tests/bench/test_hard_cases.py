@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +14,20 @@ from translucent.bench.hard import interfaces as hard_interfaces
 from translucent.bench.hard import values as hard_values
 from translucent.bench.hard import views as hard_views
 from translucent.bench.hard.cases import Checks, Hard
+from translucent.bench.hard.measure import CASES as ALL
 from translucent.bench.hard.measure import measure_hard_cases
-
-ALL = (*hard_values.CASES, *hard_views.CASES, *hard_geometry.CASES, *hard_interfaces.CASES)
 
 
 def test_there_is_one_of_each() -> None:
-    assert sorted(case.id for case in ALL) == [f"H{i:02}" for i in range(1, 30)]
+    rooms = (hard_values, hard_views, hard_geometry, hard_interfaces)
+    assert len(ALL) == sum(len(room.CASES) for room in rooms)
+    assert [case.id for case in ALL] == [f"H{i:02}" for i in range(1, len(ALL) + 1)]
     assert all(case.title and case.promise for case in ALL)
+
+
+def test_the_page_on_the_report_names_the_first_and_the_last() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
+    assert f"{ALL[0].id} to {ALL[-1].id} are inputs" in page
 
 
 @pytest.mark.parametrize("case", [case for case in ALL if case.id != "H23"], ids=lambda case: case.id)
@@ -32,7 +39,7 @@ def test_it_holds(renderer: tl.Renderer, case: Hard) -> None:
 
 def test_they_come_in_order(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Hard, "measure", lambda self, renderer: self)
-    assert [case.id for case in measure_hard_cases(renderer)] == [f"H{i:02}" for i in range(1, 30)]
+    assert [case.id for case in measure_hard_cases(renderer)] == [case.id for case in ALL]
 
 
 def test_distances_from_the_camera_would_fail(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

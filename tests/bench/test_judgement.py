@@ -10,11 +10,14 @@ import pytest
 from translucent.bench.claims import check_claims
 from translucent.bench.comparison import compare_reports, machines_differ
 from translucent.bench.frontier import beats, mark_frontier
+from translucent.bench.hard.measure import CASES
 from translucent.bench.record import CaseRecord, HardCase, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
 from translucent.bench.timing import MOST, Sample, interleaved, ratio, timing
 
 from .test_record import PROVENANCE
+
+ALL_HARD = tuple(HardCase(case.id, "", "", "", True) for case in CASES)
 
 
 def row(method: str, time: float, error: float, noise: float = 0.0, invalid: float = 0.0, kind: str = "method") -> Row:
@@ -137,10 +140,20 @@ def test_claims_hold_where_the_numbers_do() -> None:
         row("SignedDepth from the camera", 1.1, 1e-4, kind="counter-example"),
         row("SignedDepth in float16", 1.1, 1e-4, kind="counter-example"),
     )
-    hard = tuple(HardCase(f"H{i:02}", "", "", "", True) for i in range(1, 27))
-    assert claims(case(*good), case(*good, name="far slab"), hard=hard) == [True] * 7
+    assert claims(case(*good), case(*good, name="far slab"), hard=ALL_HARD) == [True] * 7
     assert claims() == [None] * 7
-    assert claims(hard=hard[:23])[-1] is False
+
+
+def test_hard_cases_hold_where_each_that_there_is_has_been_measured_and_holds() -> None:
+    first, last = ALL_HARD[0].id, ALL_HARD[-1].id
+    found = check_claims((), ALL_HARD)[-1]
+    assert (found.text, found.held) == (f"All hard cases {first} to {last} hold", True)
+    assert found.measured == f"{len(ALL_HARD)} measured"
+    short = check_claims((), ALL_HARD[:-2])[-1]
+    assert (short.held, short.measured) == (False, f"2 not measured: {ALL_HARD[-2].id}, {last}")
+    broken = dataclasses.replace(ALL_HARD[3], title="far", result="off", passed=False)
+    wrong = check_claims((), (*ALL_HARD[:3], broken, *ALL_HARD[4:]))[-1]
+    assert (wrong.held, wrong.measured) == (False, f"{broken.id} far: off")
 
 
 @pytest.mark.parametrize(

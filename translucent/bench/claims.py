@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from translucent.bench.frontier import NOISES, error_of
+from translucent.bench.hard.measure import CASES as HARD_CASES
 from translucent.bench.record import CaseRecord, Claim, HardCase
 from translucent.bench.row import Row
 
@@ -140,11 +141,12 @@ def _error_factor(case: CaseRecord, shortcut: str) -> float | None:
 
 
 def _hard(hard_cases: Sequence[HardCase]) -> Claim:
-    text = "All hard cases H01 to H26 hold"
+    text = f"All hard cases {HARD_CASES[0].id} to {HARD_CASES[-1].id} hold"
     if not hard_cases:
         return Claim(text, None, "none has been measured in this run")
     failed = [f"{case.id} {case.title}: {case.result}" for case in hard_cases if not case.passed]
-    missing = 26 - len({case.id for case in hard_cases})
+    measured = {case.id for case in hard_cases}
+    missing = [case.id for case in HARD_CASES if case.id not in measured]
     if missing:
-        failed.append(f"{missing} not measured")
-    return Claim(text, not failed, "; ".join(failed) or f"{len(hard_cases)} measured")
+        failed.append(f"{len(missing)} not measured: {', '.join(missing)}")
+    return Claim(text, not failed, "; ".join(failed) or f"{len(measured)} measured")

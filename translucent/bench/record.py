@@ -183,7 +183,7 @@ class Series:
 
 @dataclass(frozen=True)
 class HardCase:
-    """Record of one of the hard cases H01 to H29.
+    """Record of one of the hard cases.
 
     Attributes
     ----------

@@ -11,6 +11,7 @@ from translucent.bench.cases import CASES, Case, Size
 from translucent.bench.claims import check_claims
 from translucent.bench.contenders import check_names, contenders
 from translucent.bench.drawing import Studio
+from translucent.bench.hard.measure import CASES as HARD_CASES
 from translucent.bench.hard.measure import measure_hard_cases
 from translucent.bench.machine import provenance
 from translucent.bench.measure import CaseRun
@@ -134,7 +135,7 @@ def _measured(
 ) -> Iterator[Report]:
     """The report after each part of it."""
     scaling = ScalingRun(studio, effort.step_seconds, quick)
-    parts = len(cases) + sum(len(ladder.steps) for ladder in scaling.ladders()) + 26
+    parts = len(cases) + sum(len(ladder.steps) for ladder in scaling.ladders()) + len(HARD_CASES)
     done = 0
     for case in cases:
         progress(f"case {case.name}", done, parts)
