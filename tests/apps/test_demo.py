@@ -18,7 +18,7 @@ def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
     monkeypatch.chdir(tmp_path)
     demo = runpy.run_path(str(ROOT / "tools" / "demo.py"))
     main = demo["main"]
-    main.__globals__["SIZE"] = (320, 240)
+    main.__globals__["SIZE"] = (160, 120)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         assert main() == 0

@@ -51,6 +51,7 @@ def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
         if option.default == "1280x720":
             monkeypatch.setattr(option, "default", "320x180")
     monkeypatch.setattr(run, "QUICK", run.Effort(0.0, 0.0, 0.3))
+    monkeypatch.setattr(run, "QUICK_SIZE", (64, 64))
     monkeypatch.setattr(run, "CASES", run.CASES[:1])
     monkeypatch.setattr(run.ScalingRun, "ladders", lambda _: [])
     monkeypatch.setattr(run, "measure_hard_cases", lambda _: iter(()))
@@ -128,4 +129,4 @@ def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         if name == WINDOWED:
             continue
         example = command.epilog.removeprefix("Example: translucent ")
-        assert main(shlex.split(example)) == 0, example
+        assert main([*shlex.split(example), *SMALL.get(name, [])]) == 0, example

@@ -12,8 +12,15 @@ from pathlib import Path
 import pytest
 
 from tests.preview.waiting import SIZE, wait
+from translucent.preview import worker
 from translucent.preview.document import Document, Model
 from translucent.preview.workspace import Workspace
+
+
+@pytest.fixture(autouse=True)
+def not_nice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Worker processes that tests wait for are not nice: they would wait for the tests beside them."""
+    monkeypatch.setattr(worker, "NICENESS", 0)
 
 
 @pytest.fixture

@@ -78,7 +78,10 @@ def slow(report: Callable[[float | None, str], None], path: str) -> None:
             Path(path).unlink()
 
 
-def test_a_file_that_nobody_waits_for_is_not_left_half_written(work: Workspace, tmp_path: Path) -> None:
+def test_a_file_that_nobody_waits_for_is_not_left_half_written(
+    work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker, "PARTING", 0.3)
     path = tmp_path / "a.png"
     work.export(str(path), slow)
     task = work.lanes["write"].task
@@ -123,8 +126,8 @@ def hard(report: Callable[[float | None, str], None], path: str) -> None:
 def test_what_a_killed_process_has_left_is_removed(
     work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker, "PARTING", 0.3)
     monkeypatch.setattr(worker._Running, "stop", lambda _: False)
+    monkeypatch.setattr(worker.Companion._end, "__defaults__", (0.3,))
     work.export(str(tmp_path / "a.png"), hard)
     task = work.lanes["write"].task
     assert task is not None

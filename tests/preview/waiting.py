@@ -25,9 +25,11 @@ def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> 
 def finish(stage: Stage, work: Workspace) -> None:
     """Draw until nothing is left to draw, or to be compiled for it."""
     end = time.monotonic() + 60.0
-    while stage.draw(work, SIZE) or work.compiler.lane.task is not None:
+    while (drawn := stage.draw(work, SIZE)) or work.compiler.lane.task is not None:
         assert time.monotonic() < end, "the picture is never done"
         work.update()
+        if not drawn:
+            time.sleep(0.002)
 
 
 def pixels(stage: Stage) -> np.ndarray:

@@ -135,7 +135,7 @@ class _Running:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_run, args=(theirs,), daemon=True)
+        self._process: BaseProcess = context.Process(target=_run, args=(theirs, NICENESS), daemon=True)
         self._process.start()
         theirs.close()
         self._numbers = itertools.count(1)
@@ -228,13 +228,13 @@ class _Unpickler(pickle.Unpickler):
         return self._kept[token]
 
 
-def _run(pipe: Connection) -> None:
+def _run(pipe: Connection, niceness: int) -> None:
     """Main loop of the worker process, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # not at once: files are removed that are half written
     warnings.showwarning = lambda message, *_, **__: pipe.send(("warning", str(message)))
     if hasattr(os, "nice"):
-        os.nice(NICENESS)
+        os.nice(niceness)
     kept: dict[int, object] = {}
     while True:
         try:
