@@ -14,7 +14,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 
 white = tl.scattering_medium((0.95, 0.88, 0.72), 0.002, ior=1.44)
-dull = tl.Surface(roughness=0.45, multiple_scattering=True)
+dull = tl.Surface(roughness=0.45)
 wax = tl.Object(tl.load_mesh(mesh_path("candle")), white, surface=dull)
 wick = tl.Object(tl.load_mesh(mesh_path("wick")), None, color=(0.03, 0.02, 0.02))
 

@@ -23,7 +23,7 @@ leaning = np.eye(4)
 leaning[:3, :3] = [[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]
 
 stone = tl.scattering_medium((0.07, 0.34, 0.17), 0.003, ior=1.6)
-polish = tl.Surface(roughness=0.18, multiple_scattering=True)
+polish = tl.Surface(roughness=0.18)
 bangle = tl.Object(tl.load_mesh(mesh_path("bangle")), stone, transform=leaning, surface=polish)
 
 camera = tl.Camera.look_at((0.02, 0.09, 0.24), (0.0, 0.036, 0.0), fov_y=24.0)

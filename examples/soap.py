@@ -19,7 +19,7 @@ turned = np.eye(4)
 turned[:3, :3] = [[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]
 
 soap = tl.scattering_medium((0.9, 0.66, 0.34), 0.006, ior=1.45)
-waxy = tl.Surface(roughness=0.35, multiple_scattering=True)
+waxy = tl.Surface(roughness=0.35)
 bar = tl.Object(tl.load_mesh(mesh_path("soap")), soap, turned, surface=waxy)
 
 # %%

@@ -8,7 +8,7 @@ import numpy as np
 
 import translucent as tl
 from translucent.arrays import Array, Integers, Mask
-from translucent.cpu.embree import EmbreeMesh
+from translucent.geometry.embree import EmbreeMesh
 
 #: Paths that differ by no more than this share of a body's radius are the same: corners in float32 are off by 6e-8 of
 #: it, origins and directions again, over cosines down to 0.02.

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from translucent.assets import mesh_path
-from translucent.cpu.embree import starts
+from translucent.geometry.embree import starts
 from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.renderer import CpuRenderer

@@ -72,6 +72,9 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.planning.plan import plan as plan
     from translucent.planning.render_plan import Capabilities as Capabilities
     from translucent.planning.render_plan import RenderPlan as RenderPlan
+    from translucent.planning.scattering import Diffusion as Diffusion
+    from translucent.planning.scattering import ScatteringLayer as ScatteringLayer
+    from translucent.planning.scattering import SingleScattering as SingleScattering
     from translucent.renderer import Renderer as Renderer
     from translucent.scene.backdrop import Backdrop as Backdrop
     from translucent.scene.camera import Camera as Camera
@@ -111,6 +114,7 @@ _NAMES = {
     "media.presets": "Preset preset presets",
     "mesh_files": "load_mesh",
     "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
+    "planning.scattering": "Diffusion ScatteringLayer SingleScattering",
     "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer RayMarched SignedDepth ThinLayer",
     "planning.plan": "plan",
     "planning.render_plan": "Capabilities RenderPlan",

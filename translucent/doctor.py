@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, get_args
 
-from translucent.cpu.embree import embree_versions
 from translucent.cpu.threads import processors
 from translucent.errors import RenderError
+from translucent.geometry.embree import embree_versions
 from translucent.gpu.context import Backend, NoContextError, open_context
 from translucent.gpu.renderer import SHADER_STORAGE
 

@@ -6,7 +6,7 @@ import dataclasses
 import sys
 import warnings
 from types import TracebackType
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, TypeAlias, get_args
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,6 +23,8 @@ from translucent.planning.methods import Method
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan, plan_over_backdrop
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import Scattering
+from translucent.planning.scattering.choice import check_scattering
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.environment import Environment
@@ -39,6 +41,10 @@ BACKENDS = (*get_args(Backend), "cpu")
 
 #: More samples per pixel change nothing that 8 bits could show.
 MAX_SAMPLES = 4096
+
+
+#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces and scattering.
+_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None]
 
 
 class Renderer:
@@ -65,9 +71,9 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[Scene, dict[tuple[Method | None, bool, Interfaces | None], RenderPlan]] = (
-            WeakKeyDictionary()
-        )
+        self._plans: WeakKeyDictionary[
+            Scene, dict[tuple[Method | None, bool, Interfaces | None, Scattering | None], RenderPlan]
+        ] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
         self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
@@ -115,15 +121,17 @@ class Renderer:
         *,
         over_backdrop: bool = False,
         interfaces: Interfaces | None = None,
+        scattering: Scattering | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         check_interfaces(interfaces)
+        check_scattering(scattering)
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, interfaces)) not in plans:
+        if (key := (method, over_backdrop, interfaces, scattering)) not in plans:
             make = plan_over_backdrop if over_backdrop else plan
-            plans[key] = make(scene, method, self._engine.capabilities, interfaces=interfaces)
+            plans[key] = make(scene, method, self._engine.capabilities, interfaces=interfaces, scattering=scattering)
         return plans[key]
 
     def render(
@@ -136,6 +144,7 @@ class Renderer:
         *,
         transparent: bool = False,
         interfaces: Interfaces | None = None,
+        scattering: Scattering | None = None,
     ) -> Frame:
         """Render a scene.
 
@@ -159,6 +168,9 @@ class Renderer:
             How to find the interfaces at which light refracts and reflects: by rays through the meshes, drawn in screen
             space, or drawn where rays enter alone; None lets the planner pick. Thickness, optical depth and
             transmittance stay those of the straight ray.
+        scattering : Diffusion, ScatteringLayer or SingleScattering, optional
+            How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
+            back, or not at all; None lets the planner pick for each body.
 
         Returns
         -------
@@ -170,7 +182,7 @@ class Renderer:
         ------
         InputError
             If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
-            scene has opaque objects besides it; if interfaces cannot be found as asked for.
+            scene has opaque objects besides it; if interfaces or scattering cannot be had as asked for.
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
@@ -179,7 +191,16 @@ class Renderer:
         self._require_open()
         size = check_size(size)
         try:
-            frame = self._render(scene, size, method, samples, backdrop, transparent=transparent, interfaces=interfaces)
+            frame = self._render(
+                scene,
+                size,
+                method,
+                samples,
+                backdrop,
+                transparent=transparent,
+                interfaces=interfaces,
+                scattering=scattering,
+            )
         except BaseException as error:
             self._note_interruption(error)
             raise
@@ -197,15 +218,18 @@ class Renderer:
         *,
         transparent: bool,
         interfaces: Interfaces | None,
+        scattering: Scattering | None,
     ) -> Frame:
         if transparent:
             return self._render_transparent(
-                scene, size, self.plan(scene, method, interfaces=interfaces), samples, backdrop
+                scene, size, self.plan(scene, method, interfaces=interfaces, scattering=scattering), samples, backdrop
             )
         if backdrop is None:
-            return self._engine.render(scene, size, self.plan(scene, method, interfaces=interfaces), samples)
+            return self._engine.render(
+                scene, size, self.plan(scene, method, interfaces=interfaces, scattering=scattering), samples
+            )
         _check_backdrop(backdrop, size)
-        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces)
+        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering)
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _render_transparent(
@@ -236,6 +260,7 @@ class Renderer:
         tone: str = "none",
         *,
         interfaces: Interfaces | None = None,
+        scattering: Scattering | None = None,
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -250,6 +275,7 @@ class Renderer:
         tone : {"none", "neutral", "agx"}
             Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
         interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
+        scattering : Diffusion, ScatteringLayer or SingleScattering, optional
             As for `render`.
 
         Raises
@@ -262,7 +288,7 @@ class Renderer:
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)
-        chosen = self.plan(scene, method, interfaces=interfaces)
+        chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering)
         try:
             self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
         except BaseException as error:

@@ -1,6 +1,7 @@
 // Light that a layer scatters any number of times, as one diffuse stream forwards and one backwards. Pure. Depths are
 // without unit: coefficients K and S in 1/m times the thickness of the layer. Each function is the float32 twin of the
-// same name in translucent/formulas/two_stream.py, where the sources are cited: Schuster 1905; Kubelka & Munk 1931; Gate 1974.
+// same name in translucent/formulas/two_stream.py, where the sources are cited: Schuster 1905; Kubelka & Munk 1931; Gate 1974;
+// Saunderson 1942.
 
 #include <constants>
 #include "lib/optics.glsl"
@@ -40,4 +41,17 @@ vec3 two_stream_transmittance(vec3 absorption_depth, vec3 scattering_depth) {
 vec3 multiple_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
     vec3 once = scattering_depth * mean_transmittance(2.0 * (absorption_depth + scattering_depth));
     return max(two_stream_reflectance(absorption_depth, scattering_depth) - once, vec3(0.0));
+}
+
+// A layer between two interfaces that mirror the share r of diffuse light from inside: (1 - r) (U+ +- U-) / 2.
+vec3 mirrored_reflectance(vec3 reflectance, vec3 transmittance, float mirrored) {
+    vec3 even = reflectance + transmittance;
+    vec3 odd = reflectance - transmittance;
+    return 0.5 * (1.0 - mirrored) * (even / (1.0 - mirrored * even) + odd / (1.0 - mirrored * odd));
+}
+
+vec3 mirrored_transmittance(vec3 reflectance, vec3 transmittance, float mirrored) {
+    vec3 even = reflectance + transmittance;
+    vec3 odd = reflectance - transmittance;
+    return 0.5 * (1.0 - mirrored) * (even / (1.0 - mirrored * even) - odd / (1.0 - mirrored * odd));
 }

@@ -13,12 +13,13 @@ struct Finish {
     float ior;
     float dispersion;
     bool is_sheet;
-    bool scatters_much;   // show what is scattered more than once
+    bool scatters_much;   // gives back what it scatters more than once, as a layer
     vec3 sheet_depth;     // optical depth straight through a sheet
     vec3 painted_through; // share of light on the paint that passes to the other side, with its color,
     float painted_share;  // and without
     vec3 stream_absorption;
     vec3 stream_scattering;
+    float inner_mirror;   // share of diffuse light from inside that the interface mirrors
     float longest;        // metres across the body
     float roughness;
     float transmission;
@@ -30,7 +31,7 @@ struct Finish {
 Finish finish_of(vec4 surface) {
     SurfaceRow row = surface_table_row(int(surface.x + 0.5));
     return Finish(row.ior, row.dispersion, row.is_sheet > 0.5, row.scatters_much > 0.5, row.sheet_depth, row.painted_through,
-        row.painted_share, row.stream_absorption, row.stream_scattering, row.longest, surface.y, surface.z, vec3(1.0), 1.0);
+        row.painted_share, row.stream_absorption, row.stream_scattering, row.inner_mirror, row.longest, surface.y, surface.z, vec3(1.0), 1.0);
 }
 
 // Reflectance of a rough interface: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -96,12 +97,14 @@ vec3 lights_on(vec3 point, vec3 normal) {
 vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3 passed) {
     vec3 absorbed = finish.stream_absorption * thickness;
     vec3 turned = finish.stream_scattering * thickness;
-    vec3 through = max(two_stream_transmittance(absorbed, turned) - passed, vec3(0.0));
-    vec3 back = two_stream_reflectance(absorbed, turned);
+    vec3 bare_through = max(two_stream_transmittance(absorbed, turned) - passed, vec3(0.0));
+    vec3 bare_back = two_stream_reflectance(absorbed, turned);
+    vec3 through = mirrored_transmittance(bare_back, bare_through, finish.inner_mirror);
+    vec3 back = mirrored_reflectance(bare_back, bare_through, finish.inner_mirror);
     vec3 sum = environment_irradiance(normal) * back + environment_irradiance(-normal) * through;
 #if SINGLE_SCATTERING
     // Light of lights that is scattered once is in the emitted radiance.
-    back = multiple_reflectance(absorbed, turned);
+    back = max(back - (1.0 - finish.inner_mirror) * (bare_back - multiple_reflectance(absorbed, turned)), vec3(0.0));
 #endif
     sum += lights_on(point, normal) * back + lights_on(point, -normal) * through;
     return sum / PI;

@@ -16,6 +16,7 @@
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/interface_light.glsl"
+#include "shade/diffused_light.glsl"
 #include "shade/refraction.glsl"
 
 uniform sampler2D emitted_radiance_sum;
@@ -157,6 +158,9 @@ void main() {
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;
         if (finish.scatters_much) { light += scattered_out(finish, point, normal, crossing.thickness, crossing.passed); }
+#if DIFFUSED
+        light += diffused_out(int(surface.x + 0.5), point, starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior));
+#endif
         light *= finish.transmission * finish.color;
     }
     if (finish.transmission < 1.0 && !starts_inside) {

@@ -17,6 +17,7 @@
 #include "shade/environment_light.glsl"
 #include "shade/environment_beyond.glsl"
 #include "shade/interface_light.glsl"
+#include "shade/diffused_light.glsl"
 #include "shade/opaque_light.glsl"
 #include "transport/hierarchy.glsl"
 #include "transport/record.glsl"
@@ -192,10 +193,15 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
 #endif
             passed = transmittance(filling.extinction * path);
-#if MUCH_SCATTERED
+#if LAYERED
             if (before != AIR && surface_table_row(before).scatters_much > 0.5) {
                 Finish layer = finish_of(vec4(float(before), 0.0, 1.0, 0.0));
                 sum.light += ray.share * scattered_out(layer, ray.origin, ray.outwards, path, passed);
+            }
+#endif
+#if DIFFUSED
+            if (before != AIR) {
+                sum.light += ray.share * diffused_out(before, ray.origin, clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0));
             }
 #endif
             ray.share *= passed;
@@ -310,7 +316,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         vec3 arrival = ray.direction;
         bool arrived_reflected = ray.reflected;
         vec3 again = outside ? vec3(1.0) : passed;
-#if MUCH_SCATTERED
+#if LAYERED
         // Light that scatters on the way comes out all the same where media give it back.
         if (before != AIR && surface_table_row(before).scatters_much > 0.5) { again = vec3(1.0); }
 #endif

@@ -19,11 +19,11 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.bake.gltf.maps import wrapping
-from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.renderer import CpuRenderer
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import Errors, compare
+from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.gltf.textures import sample
 from translucent.media.medium import Medium

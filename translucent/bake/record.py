@@ -87,7 +87,7 @@ def _range(values: Any) -> Record | None:
 
 def provenance() -> dict[str, str]:
     """Versions of everything that the numbers depend on."""
-    from translucent.cpu.embree import embree_versions
+    from translucent.geometry.embree import embree_versions
 
     return {
         "translucent": VERSION,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.cpu.embree import EmbreeMesh
 from translucent.errors import InputError
+from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import smooth_normals
 

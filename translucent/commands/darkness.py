@@ -87,9 +87,7 @@ def _clearer(depth: float) -> str:
 def _media(scene: Scene) -> list[Medium]:
     """Media in which multiple scattering matters."""
     return [
-        body.medium
-        for body in scene.bodies
-        if body.medium is not None and body.surface is not None and body.surface.multiple_scattering
+        body.medium for body in scene.bodies if body.medium is not None and body.has_interface and body.medium.scatters
     ]
 
 

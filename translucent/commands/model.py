@@ -58,7 +58,7 @@ def read_scene(
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
     from translucent.gltf.load import load_scene
-    from translucent.scene.showcase import filled, finished, showcase
+    from translucent.scene.showcase import filled, with_roughness, showcase
 
     options = options or CameraOptions()
     if options.camera is not None and options.defining:
@@ -77,7 +77,7 @@ def read_scene(
             scene = filled(scene, medium)
         if environment is not None:
             scene = dataclasses.replace(scene, environment=environment)
-    scene = finished(scene, roughness)
+    scene = with_roughness(scene, roughness)
     return dataclasses.replace(scene, camera=_defined_camera(scene, options, size)) if options.defining else scene
 
 

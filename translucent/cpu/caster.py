@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.cpu.embree import STEP, embree_scene
 from translucent.cpu.vectors import dot
+from translucent.geometry.embree import STEP, embree_scene
 from translucent.geometry.normals import drawn_normals
 from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.tracer import TracedObject, center_from

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.cpu.embree import EmbreeMesh
 from translucent.cpu.outline import Edges, Outline
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.projection import PAIRS, ProjectedObject
+from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.reference.hits import Hits, from_eye
 from translucent.scene.camera import Camera

@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from translucent.cpu.bending import BentLight
 from translucent.cpu.caster import Caster
-from translucent.cpu.embree import embree_versions
 from translucent.cpu.facets import Spread
 from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
@@ -22,6 +21,7 @@ from translucent.cpu.threads import in_threads, processors
 from translucent.errors import RenderError
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
+from translucent.geometry.embree import embree_versions
 from translucent.geometry.mesh import Mesh
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.reference.refraction import bends

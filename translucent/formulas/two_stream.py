@@ -7,7 +7,8 @@ References
 ----------
 Schuster 1905, "Radiation through a foggy atmosphere"; Kubelka & Munk 1931, "Ein Beitrag zur Optik der Farbanstriche";
 Gate 1974, "Comparison of the photon diffusion model and Kubelka-Munk equation with the exact solution of the radiative
-transport equation"; Thennadil 2008, "Relationship between the Kubelka-Munk scattering and radiative transfer
+transport equation"; Saunderson 1942, "Calculation of the color
+of pigmented plastics"; Thennadil 2008, "Relationship between the Kubelka-Munk scattering and radiative transfer
 coefficients", who finds Gate's relation to hold over a larger range than those with an absorption term in S.
 """
 
@@ -82,3 +83,32 @@ def multiple_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: npt.
     k, s = np.asarray(absorption_depth, dtype=np.float64), np.asarray(scattering_depth, dtype=np.float64)
     once = s * optics.mean_transmittance(2.0 * (k + s))
     return np.maximum(two_stream_reflectance(k, s) - once, 0.0)
+
+
+def mirrored_reflectance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
+    """Reflectance of a layer between interfaces that mirror the share r of diffuse light (Saunderson 1942).
+
+    Of what the layer sends out, 1 - r leaves: (1 - r) (U+ + U-) / 2 with U+- = (R +- T) / (1 - r (R +- T)), in which
+    light goes back and forth any number of times.
+
+    Parameters
+    ----------
+    reflectance, transmittance : array_like
+        R and T of the bare layer, R + T <= 1.
+    mirrored : array_like
+        r, 0 to below 1.
+    """
+    even, odd = _mirrored_modes(reflectance, transmittance, mirrored)
+    return np.asarray(0.5 * (even + odd))
+
+
+def mirrored_transmittance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
+    """Transmittance of a layer between two such interfaces; as for `mirrored_reflectance`: (1 - r) (U+ - U-) / 2."""
+    even, odd = _mirrored_modes(reflectance, transmittance, mirrored)
+    return np.asarray(0.5 * (even - odd))
+
+
+def _mirrored_modes(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> list[Array]:
+    """(1 - r) U+ and (1 - r) U-: the layer lit alike from both sides, and oppositely."""
+    back, through, r = (np.asarray(x, dtype=np.float64) for x in (reflectance, transmittance, mirrored))
+    return [(1.0 - r) * mode / (1.0 - r * mode) for mode in (back + through, back - through)]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from functools import cached_property
 
 import moderngl
 import numpy as np
+import numpy.typing as npt
 
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.balance import Balance, face_counts
 from translucent.gpu.body_uniforms import body_roles
 from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.densities import density_uniforms, scene_grids
+from translucent.gpu.diffusion import DiffusedLight
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, UniformBlock
 from translucent.gpu.light_cameras import media_sphere
@@ -23,6 +26,7 @@ from translucent.gpu.uniforms import (
     LightLookup,
     environment_uniforms,
     light_uniforms,
+    media_center,
     media_uniforms,
     scatter_uniforms,
     shade_uniforms,
@@ -81,6 +85,17 @@ class FrameJob(SceneView):
         if self.features.marches and not self.features.scatters:
             self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))
         self.place((0.0, 0.0))
+
+    @cached_property
+    def diffused_light(self) -> DiffusedLight | None:
+        """Light that diffuses in bodies; None where it does not."""
+        return self.resources.diffusion.of(self.scene, self.plan.given_back.diffusion)
+
+    @property
+    def diffused_rows(self) -> dict[int, dict[str, npt.ArrayLike]]:
+        """Fields of the objects in which light diffuses, for the table of surfaces."""
+        light = self.diffused_light
+        return {} if light is None else light.rows(media_center(self.scene))
 
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""

@@ -317,13 +317,24 @@ SURFACE_ROW = PackedTable(
         ("ior", "f4", ()),
         ("dispersion", "f4", ()),
         ("is_sheet", "f4", ()),  # 1 where it is drawn without an inside
-        ("scatters_much", "f4", ()),  # 1 where what is scattered more than once is shown
+        ("scatters_much", "f4", ()),  # 1 where what is scattered more than once leaves as from a layer
         ("sheet_depth", "f4", (3,)),  # optical depth straight through a sheet
         ("longest", "f4", ()),  # metres across the body
         ("painted_through", "f4", (3,)),  # share of light on the paint that passes to the other side, with its color,
         ("painted_share", "f4", ()),  # and without
         ("stream_absorption", "f4", (3,)),
+        ("inner_mirror", "f4", ()),  # share of diffuse light from inside that its interface mirrors
         ("stream_scattering", "f4", (3,)),
+        ("diffuses", "f4", ()),  # 1 where light diffuses in it
+        ("grid_low", "f4", (3,)),  # corner of the grid of its diffused light, from the center of the media
+        ("cells_per_metre", "f4", ()),
+        ("grid_size", "f4", (3,)),  # cells along each axis
+        ("first_layer", "f4", ()),  # of the grid in the texture of all grids
+        ("albedo", "f4", (3,)),
+        ("conductance", "f4", ()),
+        ("emergent_fluxes", "f4", (4,)),
+        ("exit_share", "f4", ()),
+        ("mean_cosine", "f4", ()),
     ),
 )
 

@@ -26,6 +26,7 @@ from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.scattering.choice import shown
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.scene import Scene
 
@@ -140,7 +141,7 @@ class GpuRenderer:
                 targets.nothing().use()  # a released framebuffer must not be the bound one
                 old.release()
             self._targets = targets
-        scene = scene.with_ambient_emitted
+        scene = shown(scene, plan.given_back).with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:

@@ -6,6 +6,7 @@ import moderngl
 
 from translucent.gpu.buffers import MeshCache
 from translucent.gpu.densities import GridTexture
+from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.environment_maps import EnvironmentMaps
 from translucent.gpu.hierarchies import HierarchyCache
 from translucent.gpu.storage import Storage
@@ -21,10 +22,20 @@ class Resources:
         self.environments = EnvironmentMaps(gl)
         self.textures = TextureCache(gl)
         self.hierarchies = HierarchyCache(gl)
+        self.diffusion = DiffusionCache(gl)
         #: Views from lights, which are the same for frames of all sizes.
         self.light_lists = Storage(gl, "light that media scatter")
 
     def release(self) -> None:
         """Free all caches."""
-        for cache in (self.meshes, self.grids, self.environments, self.textures, self.hierarchies, self.light_lists):
+        caches = (
+            self.meshes,
+            self.grids,
+            self.environments,
+            self.textures,
+            self.hierarchies,
+            self.diffusion,
+            self.light_lists,
+        )
+        for cache in caches:
             cache.release()

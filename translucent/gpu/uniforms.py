@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
 from translucent.gpu.balance import Balance
 from translucent.gpu.body_uniforms import MAX_SCENE_OPTICAL_DEPTH, bounded_extinction
@@ -27,6 +28,7 @@ from translucent.gpu.layout import (
     VIEW,
 )
 from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.media.given_back import LayeredMedium
 from translucent.media.medium import Medium
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
@@ -201,6 +203,12 @@ def environment_uniforms(environment: Environment) -> bytes:
     )
 
 
+def media_center(scene: Scene) -> Array:
+    """(3,): center of the bounds of all bodies, from which positions count."""
+    boxes = np.stack([body.bounds for body in scene.bodies])
+    return np.asarray(0.5 * boxes[:, 0].min(axis=0) + 0.5 * boxes[:, 1].max(axis=0))
+
+
 def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
     """Contents of the Surfaces block, for a picture of this size."""
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
@@ -221,15 +229,37 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
     )
 
 
-def surface_table(scene: Scene, sheets: Mapping[int, float]) -> npt.NDArray[np.float32]:
+def surface_table(
+    scene: Scene, sheets: Mapping[int, float], diffused: Mapping[int, Mapping[str, npt.ArrayLike]] | None = None
+) -> npt.NDArray[np.float32]:
     """(objects, texels, 4): a `SURFACE_ROW` of each object; that of an opaque one is not read.
 
-    `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers.
+    `sheets`: thickness in metres of those objects that are drawn without an inside, by their numbers; `diffused`:
+    fields of those in which light diffuses.
     """
-    return SURFACE_ROW.pack([_surface_row(scene, body, sheets.get(i)) for i, body in enumerate(scene.objects)])
+    fields = diffused or {}
+    rows = [_surface_row(scene, body, sheets.get(i), fields.get(i)) for i, body in enumerate(scene.objects)]
+    return SURFACE_ROW.pack(rows)
 
 
-def _surface_row(scene: Scene, body: Object, sheet: float | None) -> dict[str, npt.ArrayLike]:
+#: Fields of a body in which no light diffuses.
+_NO_DIFFUSION: dict[str, npt.ArrayLike] = {
+    "diffuses": 0.0,
+    "grid_low": 0.0,
+    "cells_per_metre": 0.0,
+    "grid_size": 1.0,
+    "first_layer": 0.0,
+    "albedo": 0.0,
+    "conductance": 0.0,
+    "emergent_fluxes": 0.0,
+    "exit_share": 0.0,
+    "mean_cosine": 1.0,
+}
+
+
+def _surface_row(
+    scene: Scene, body: Object, sheet: float | None, diffused: Mapping[str, npt.ArrayLike] | None
+) -> dict[str, npt.ArrayLike]:
     medium, surface = body.medium or Medium(), body.surface or Surface()
     stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
     limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
@@ -237,11 +267,13 @@ def _surface_row(scene: Scene, body: Object, sheet: float | None) -> dict[str, n
         "ior": medium.ior,
         "dispersion": surface.dispersion,
         "is_sheet": sheet is not None,
-        "scatters_much": surface.multiple_scattering and medium.scatters,
+        "scatters_much": isinstance(medium, LayeredMedium),
         "sheet_depth": bounded_extinction(medium, scene.diagonal) * (sheet or 0.0),
         "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
         "painted_through": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
         "painted_share": surface.diffuse_transmission,
         "stream_absorption": np.minimum(stream[0], limit),
+        "inner_mirror": diffuse_interface(medium.ior).reflected,
         "stream_scattering": np.minimum(stream[1], limit),
+        **(_NO_DIFFUSION if diffused is None else diffused),
     }

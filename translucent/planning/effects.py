@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from translucent.media.given_back import DiffusedMedium, LayeredMedium
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.layers import layer_effects
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering.choice import GivenBack
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Note of a plan in which interfaces do nothing to light.
@@ -60,9 +62,18 @@ def with_ambient_told(plan: RenderPlan) -> RenderPlan:
     return replace(plan, passes=passes, unmodelled=(*effects, way))
 
 
+def with_given_back_told(plan: RenderPlan, scene: Scene, back: GivenBack) -> RenderPlan:
+    """The plan of what bodies give back, with a note where they are layers though light should diffuse in them."""
+    notes = tuple(
+        Note(NoteKind.LAYER_INSTEAD, f"diffusion in {scene.objects[i].mesh.name!r}: {why}; shown as a layer")
+        for i, why in back.refusals
+    )
+    return replace(plan, given_back=back, unmodelled=(*plan.unmodelled, *notes))
+
+
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
     """Notes on scattered light that is not rendered."""
-    if interfaces and any(body.surface is not None and body.surface.multiple_scattering for body in scene.bodies):
+    if interfaces and any(isinstance(body.medium, LayeredMedium) for body in scene.bodies):
         text = (
             "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
             "path of the ray, which edges and folds are not"
@@ -82,6 +93,12 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
         )
         return [Note(NoteKind.LIGHTS_LEFT_OUT, text)]
+    if interfaces and (bodies := [body for body in scene.bodies if isinstance(body.medium, DiffusedMedium)]):
+        text = (
+            f"{object_names(bodies)}: light that crosses other bodies on its way to them is not dimmed there, and what "
+            "is smaller than a cell has no light of its own"
+        )
+        return [Note(NoteKind.DIFFUSED_LIGHT, text)]
     if scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
         text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
         return [Note(NoteKind.UNUSED_LIGHTS, text)]

@@ -29,6 +29,8 @@ class NoteKind(StrEnum):
     ONLY_REMOVES = "only removes"
     SCATTERED_AGAIN = "scattered again"
     SPREAD_INSIDE = "spread inside"
+    DIFFUSED_LIGHT = "diffused light"
+    LAYER_INSTEAD = "layer instead"
     DIMMED_AMBIENT = "dimmed ambient"
     UNUSED_LIGHTS = "unused lights"
     SHADOWS = "shadows"

@@ -7,7 +7,7 @@ import dataclasses
 from translucent.errors import InputError
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
-from translucent.planning.effects import unmodelled_effects, with_ambient_told
+from translucent.planning.effects import unmodelled_effects, with_ambient_told, with_given_back_told
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
@@ -17,6 +17,8 @@ from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.scattering import Scattering, SingleScattering
+from translucent.planning.scattering.choice import check_scattering, given_back, shown
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
@@ -27,6 +29,7 @@ def plan(
     capabilities: Capabilities | None = None,
     *,
     interfaces: Interfaces | None = None,
+    scattering: Scattering | None = None,
 ) -> RenderPlan:
     """Choose the passes for a scene.
 
@@ -39,18 +42,26 @@ def plan(
         Of the machine; default: all.
     interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
         How to find the interfaces at which light refracts and reflects; None lets the planner pick.
+    scattering : Diffusion, ScatteringLayer or SingleScattering, optional
+        How to show light that media scatter more than once; None lets the planner pick.
 
     Raises
     ------
     InputError
-        If no available method can render the scene, or its interfaces cannot be found as asked for.
+        If no available method can render the scene, or not with interfaces or scattering as asked for.
     """
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     check_interfaces(interfaces)
+    check_scattering(scattering)
     capabilities = capabilities or Capabilities()
+    if capabilities.opengl and (back := given_back(scene, scattering)):
+        once = SingleScattering()
+        found = plan(shown(scene, back), method, capabilities, interfaces=interfaces, scattering=once)
+        return with_given_back_told(found, scene, back)
     if scene.scatters_ambient:
-        return with_ambient_told(plan(scene.with_ambient_emitted, method, capabilities, interfaces=interfaces))
+        emitted = scene.with_ambient_emitted
+        return with_ambient_told(plan(emitted, method, capabilities, interfaces=interfaces, scattering=scattering))
     if not scene.bodies:
         raise InputError(
             f"rendering {object_names(scene.objects)}",
@@ -63,7 +74,10 @@ def plan(
         return _plan_traced(scene, method, interfaces, capabilities)
     sheets = method is not None and method.makes_sheets
     bending, instead = chosen_interfaces(scene, interfaces, sheets=sheets)
-    chosen = assembled(scene, *_choice(scene, method, capabilities, bending), bending, capabilities)
+    thickness, why = _choice(scene, method, capabilities, bending)
+    if method is None and isinstance(scattering, SingleScattering) and isinstance(thickness, FragmentLists):
+        thickness = dataclasses.replace(thickness, light_points=scattering.points)
+    chosen = assembled(scene, thickness, why, bending, capabilities)
     if scatters(scene) and not capabilities.shader_storage:
         chosen = with_unlit_marked(scene, chosen)
     return with_fallback_told(chosen, instead) if instead else chosen
@@ -117,6 +131,7 @@ def plan_over_backdrop(
     capabilities: Capabilities | None = None,
     *,
     interfaces: Interfaces | None = None,
+    scattering: Scattering | None = None,
 ) -> RenderPlan:
     """Plan for a scene before a `Backdrop`, which another renderer has drawn.
 
@@ -135,7 +150,7 @@ def plan_over_backdrop(
     if interfaces is not None and interfaces.traced:
         found = "what is drawn elsewhere has no mesh that a ray could meet"
         raise InputError(f"{interfaces} before a backdrop", found, "use ScreenInterfaces()")
-    chosen = plan(scene, method, capabilities, interfaces=interfaces or ScreenInterfaces())
+    chosen = plan(scene, method, capabilities, interfaces=interfaces or ScreenInterfaces(), scattering=scattering)
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
     return dataclasses.replace(
         chosen,

@@ -8,6 +8,7 @@ from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.scattering.choice import NOTHING_GIVEN_BACK, GivenBack
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ class RenderPlan:
         What the scene asks for and no pass renders.
     interfaces : Interfaces, optional
         How interfaces are found; None where none changes light, or none is rendered.
+    given_back : GivenBack
+        Bodies that give back light which they scatter many times, and how.
     traced : bool
         Rays are traced on the processors, which finds all surfaces on each. Of the `method` only one thing counts
         then: whether bodies are sheets.
@@ -59,6 +62,7 @@ class RenderPlan:
     limits: tuple[Note, ...] = ()
     unmodelled: tuple[Note, ...] = ()
     interfaces: Interfaces | None = None
+    given_back: GivenBack = NOTHING_GIVEN_BACK
     traced: bool = False
 
     @property

@@ -125,7 +125,24 @@ class Object(Frozen):
     @property
     def has_interface(self) -> bool:
         """Whether its interface changes light: refracts, reflects, tints or scatters it."""
-        return self.medium is not None and not self.covers and (self.medium.ior != 1.0 or not self.plain)
+        if self.medium is None or self.covers:
+            return False
+        return self.medium.ior != 1.0 or self.medium.gives_back or not self.plain
+
+    @cached_property
+    def mean_thickness(self) -> float:
+        """Twice the volume over the area, in metres: of a wide slab its thickness, of a ball two thirds of the radius.
+
+        Of a sheet, its thickness; of what is not closed, a quarter of the diagonal.
+        """
+        if self.sheet_thickness is not None:
+            return self.sheet_thickness
+        corners = (self.mesh.vertices @ self.matrix[:3, :3].T)[self.mesh.faces]
+        if not self.mesh.diagnosis.sound:
+            return 0.25 * float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+        area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        volume = abs(self.mesh.volume * float(np.linalg.det(self.matrix[:3, :3])))
+        return 2.0 * volume / float(area.sum())
 
     @property
     def has_holes(self) -> bool:

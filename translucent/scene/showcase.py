@@ -105,23 +105,15 @@ def framing(
     return Camera.framing(np.concatenate(corners), size, fov_y=fov_y, up=up)
 
 
-def finished(scene: AnyScene, roughness: float | None = None) -> AnyScene:
-    """Scene with interfaces as a picture needs them.
-
-    Media that scatter give back, and let through, what they scatter many times: without that milk would be black. A
-    roughness replaces that of all surfaces of media.
-    """
+def with_roughness(scene: AnyScene, roughness: float | None) -> AnyScene:
+    """Scene with this roughness of all surfaces of media; the scene itself for None."""
+    if roughness is None:
+        return scene
 
     def finish(item: Object) -> Object:
-        if item.medium is None or item.covers or not (item.medium.scatters or roughness is not None):
+        if item.medium is None or item.covers:
             return item
-        surface = item.surface or Surface()
-        surface = dataclasses.replace(
-            surface,
-            multiple_scattering=item.medium.scatters or surface.multiple_scattering,
-            roughness=surface.roughness if roughness is None else roughness,
-        )
-        return dataclasses.replace(item, surface=surface)
+        return dataclasses.replace(item, surface=dataclasses.replace(item.surface or Surface(), roughness=roughness))
 
     return dataclasses.replace(scene, objects=[finish(item) for item in scene.objects])
 

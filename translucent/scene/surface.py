@@ -68,10 +68,6 @@ class Surface(Frozen):
         Tints that light.
     dispersion : float
         20 / Abbe number, 0 to 10; 0: all wavelengths bend alike.
-    multiple_scattering : bool
-        Add the light that a scattering medium gives back, and lets through, after more than one event: the layer of
-        Kubelka and Munk (1931) as thick as the body along the view ray. An approximation, exact for a wide flat slab
-        in diffuse light.
     color_texture, roughness_texture, transmission_texture, normal_texture : Texture, optional
         Multiply the values above, over the texture coordinates of the mesh: RGB, G (and B of `metallic`), R; a normal
         map is in tangent space, with green upwards.
@@ -107,7 +103,6 @@ class Surface(Frozen):
     diffuse_transmission: float = 0.0
     diffuse_transmission_color: ColorLike = (1.0, 1.0, 1.0)
     dispersion: float = 0.0
-    multiple_scattering: bool = False
     color_texture: Texture | None = None
     roughness_texture: Texture | None = None
     transmission_texture: Texture | None = None
@@ -145,7 +140,6 @@ class Surface(Frozen):
             and self.transmission_texture is None
             and self.color_texture is None
             and bool((np.asarray(self.color) == 1.0).all())
-            and not self.multiple_scattering
             and not self.glows
         )
 

@@ -31,6 +31,7 @@ _SAMPLERS = (
     "light_levels",
     "light_irradiance",
     "seen_map",
+    "diffused_light",
 )
 
 
@@ -66,6 +67,7 @@ class SurfacesPass:
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,
+            DIFFUSED=job.diffused_light is not None,
         )
         finishes = self._bind_finishes(job)
         self._variants.draw_covered(job, program, framebuffer, top_first=True)
@@ -88,7 +90,9 @@ class SurfacesPass:
         """Bind surfaces and lights; returns the texture of surfaces, which the caller releases."""
         environment = job.scene.environment
         maps = job.resources.environments.light(environment)
-        table = surface_table(job.scene, job.features.sheets)
+        table = surface_table(job.scene, job.features.sheets, job.diffused_rows)
+        if job.diffused_light is not None:
+            job.diffused_light.texture.use(_SAMPLERS.index("diffused_light"))
         finishes = job.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
         rest = (
             finishes,

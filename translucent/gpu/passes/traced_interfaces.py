@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import moderngl
-import numpy as np
 
-from translucent.arrays import Array
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
@@ -14,7 +12,8 @@ from translucent.gpu.passes.opaque import blurred_opaque
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
-from translucent.gpu.uniforms import surface_table
+from translucent.gpu.uniforms import media_center, surface_table
+from translucent.media.given_back import LayeredMedium
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
 
@@ -35,6 +34,7 @@ _SAMPLERS = (
     "light_levels",
     "light_irradiance",
     "seen_map",
+    "diffused_light",
 )
 _ENTERED = ("entered", "surface_finish", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
@@ -72,9 +72,12 @@ class TracedInterfacesPass:
                 return
         hierarchies = job.resources.hierarchies.of(job.scene)
         rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
-        contents = surface_table(job.scene, job.features.sheets), rows
+        diffused = job.diffused_light
+        contents = surface_table(job.scene, job.features.sheets, job.diffused_rows), rows
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
         self._bind(job, hierarchies, *tables)
+        if diffused is not None:
+            diffused.texture.use(_UNITS["diffused_light"])
         program = self._program(job)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
@@ -106,7 +109,8 @@ class TracedInterfacesPass:
             PRIORITY=scene.overlap == "priority",
             UNION=scene.overlap == "union",
             EMISSION=job.features.emits and not job.features.scatters,
-            MUCH_SCATTERED=any(surface.multiple_scattering for surface in surfaces),
+            LAYERED=any(isinstance(body.medium, LayeredMedium) for body in scene.bodies),
+            DIFFUSED=job.diffused_light is not None,
             MICROFACETS=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
@@ -161,12 +165,6 @@ def blurred_share(samples: int) -> float:
     The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so.
     """
     return 1.0 if samples < FEW_SAMPLES else float(samples**-0.15)
-
-
-def media_center(scene: Scene) -> Array:
-    """(3,): center of the bounds of all bodies, from which positions count."""
-    boxes = np.stack([body.bounds for body in scene.bodies])
-    return np.asarray(0.5 * boxes[:, 0].min(axis=0) + 0.5 * boxes[:, 1].max(axis=0))
 
 
 def _all_closed(scene: Scene) -> bool:

@@ -1,0 +1,161 @@
+"""Light that enters a body through its surface: from the environment, from lights, and from itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from translucent.arrays import Array, Integers, Mask
+from translucent.diffusion.grid import BodyGrid
+from translucent.formulas import optics
+from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
+from translucent.geometry.embree import EmbreeMesh
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Object
+
+#: Directions in which each sample looks for the environment and for other parts of the body.
+DIRECTIONS = 128
+
+#: Rows of the map whose texels are shared out among these directions.
+MAP_HEIGHT = 96
+
+#: Start of shadow rays before the surface, as a share of a cell.
+BEFORE = 1e-4
+
+#: Bounds of the correction by which a quadrature over directions gives the known share of uniform light.
+_CORRECTION = (0.5, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Casters:
+    """Objects that keep light from a body: itself and what is opaque.
+
+    Parameters
+    ----------
+    body : Object
+    opaque : tuple of Object
+    """
+
+    body: Object
+    opaque: tuple[Object, ...] = ()
+
+    @cached_property
+    def meshes(self) -> list[tuple[Object, EmbreeMesh]]:
+        """All of them, ready for rays; the body first."""
+        return [(item, EmbreeMesh(item.mesh)) for item in (self.body, *self.opaque)]
+
+    def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
+        """Distance in metres at which rays (k, 3), (k, 3) meet the body, and at which anything opaque; inf for none."""
+        found = np.full((2, len(origins)), np.inf)
+        for number, (item, mesh) in enumerate(self.meshes):
+            into = np.linalg.inv(item.matrix)
+            local = directions @ into[:3, :3].T
+            length = np.linalg.norm(local, axis=1, keepdims=True)
+            start = (origins @ into[:3, :3].T + into[:3, 3] - mesh.center) / mesh.radius
+            face, distance = mesh.first_hits(start, local / length)
+            metres = np.where(face >= 0, distance * mesh.radius / length[:, 0], np.inf)
+            row = min(number, 1)
+            found[row] = np.minimum(found[row], metres)
+        return found[0], found[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Sky:
+    """Parts of all directions that each sample of a body sees.
+
+    Attributes
+    ----------
+    directions : (k, 3) float64
+    cosine : (s, k) float64
+        With the normal, 0 where the direction is below the surface.
+    seen : (s, k) bool
+    facing : (h,), (h,), (h,) int
+        Pairs of sample and direction in which another place of the body is seen, and the sample that is nearest there.
+    """
+
+    directions: Array
+    cosine: Array
+    seen: Mask
+    facing: tuple[Integers, Integers, Integers]
+
+
+def sky_of(grid: BodyGrid, casters: Casters) -> Sky:
+    """What each sample of a body sees in each direction."""
+    directions = even_directions(DIRECTIONS)
+    cosine = np.maximum(grid.normals @ directions.T, 0.0)
+    cosine[grid.face_normals @ directions.T <= 0.0] = 0.0
+    sample, direction = np.nonzero(cosine)
+    start = grid.points + BEFORE * grid.cells.step * grid.face_normals
+    itself, others = casters.nearest(start[sample], directions[direction])
+    seen = np.zeros(cosine.shape, bool)
+    seen[sample, direction] = np.isinf(itself) & np.isinf(others)
+    faced = np.isfinite(itself) & (itself <= others)
+    places = start[sample[faced]] + itself[faced, None] * directions[direction[faced]]
+    nearest = cKDTree(grid.points).query(places)[1] if faced.any() else np.zeros(0, int)
+    return Sky(directions, cosine, seen, (sample[faced], direction[faced], nearest))
+
+
+def even_directions(count: int) -> Array:
+    """(count, 3): unit vectors on a Fibonacci spiral."""
+    number = np.arange(count) + 0.5
+    up = 1.0 - 2.0 * number / count
+    angle, level = np.pi * (1.0 + np.sqrt(5.0)) * number, np.sqrt(1.0 - up * up)
+    return np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
+
+
+def environment_parts(environment: Environment, directions: Array) -> tuple[Array, Array]:
+    """(k, 3), (k,): integral of the radiance over the directions nearest to each, and their solid angle."""
+    polar = (np.arange(MAP_HEIGHT) + 0.5) / MAP_HEIGHT * np.pi
+    around = (np.arange(2 * MAP_HEIGHT) + 0.5) / MAP_HEIGHT * np.pi
+    up, level = np.cos(polar)[:, None], np.sin(polar)[:, None]
+    way = np.stack(np.broadcast_arrays(level * np.cos(around), up, level * np.sin(around)), axis=-1).reshape(-1, 3)
+    angle = np.repeat(np.sin(polar[:, None]) * (np.pi / MAP_HEIGHT) ** 2, 2 * MAP_HEIGHT, axis=1).ravel()
+    nearest = cKDTree(directions).query(way)[1]
+    radiance = np.asarray(environment.lighting(way), np.float64)
+    parts = [np.bincount(nearest, angle * radiance[:, channel], len(directions)) for channel in range(3)]
+    return np.stack(parts, axis=1), np.asarray(np.bincount(nearest, angle, len(directions)), np.float64)
+
+
+def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterface) -> Array:
+    """(s, k): flux that enters for each radiance from a direction, if it is seen, over its solid angle."""
+    passed = (1.0 - optics.fresnel_dielectric(sky.cosine, ior)) * sky.cosine
+    polished = passed @ solid_angles
+    exact = np.pi * interface.entering
+    correction = np.clip(exact / np.maximum(polished, 1e-9), *_CORRECTION)
+    return np.asarray(passed * correction[:, None])
+
+
+def from_itself(sky: Sky, shares: Array, solid_angles: Array, interface: DiffuseInterface) -> sparse.csr_array:
+    """(s, s): flux that enters at a sample for the fluence at another that it faces."""
+    sample, direction, other = sky.facing
+    values = (shares * solid_angles)[sample, direction] * interface.exit_share / np.pi
+    return sparse.csr_array((values, (sample, other)), (len(shares), len(shares)))
+
+
+def from_light(
+    grid: BodyGrid, casters: Casters, light: PointLight | DirectionalLight, ior: float, interface: DiffuseInterface
+) -> Array:
+    """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way."""
+    if isinstance(light, PointLight):
+        towards = np.asarray(light.position) - grid.points
+        distance = np.linalg.norm(towards, axis=1)
+        direction = towards / np.maximum(distance, 1e-18)[:, None]
+    else:
+        direction = np.broadcast_to(-np.asarray(light.direction), grid.points.shape)
+        distance = np.full(len(grid.points), np.inf)
+    cosine = (direction * grid.normals).sum(axis=1)
+    lit = (cosine > 0.0) & ((direction * grid.face_normals).sum(axis=1) > 0.0)
+    start = grid.points + BEFORE * grid.cells.step * grid.face_normals
+    if lit.any():
+        nearest = np.minimum(*casters.nearest(start[lit], direction[lit]))
+        lit[lit] = nearest >= distance[lit]
+    polished = 1.0 - optics.fresnel_dielectric(np.maximum(cosine, 0.0), ior)
+    # What a rough interface loses, of any light as of uniform light.
+    share = interface.entering / diffuse_interface(ior).entering
+    flux = np.asarray(light.irradiance_on(grid.points, grid.normals), np.float64)
+    return np.asarray(np.where(lit, polished * share, 0.0)[:, None] * flux)

@@ -1,0 +1,155 @@
+"""Light that a body gives back by diffusion, as pictures need it: two volumes around its surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter
+
+from translucent.arrays import Array
+from translucent.diffusion.entering import (
+    Casters,
+    Sky,
+    environment_parts,
+    from_itself,
+    from_light,
+    sky_of,
+    transfer,
+)
+from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.solution import SurfaceLight, surface_light
+from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
+from translucent.media.medium import Medium
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Object, Scene
+
+#: Cells by which values at the surface are spread beyond the cells that it crosses.
+SPREAD = 3
+
+
+@dataclass(frozen=True, eq=False)
+class DiffusionField:
+    """Light of a body at its surface, on a grid of cells in world coordinates.
+
+    Attributes
+    ----------
+    fluence, entering : (x, y, z, 3) float32
+        Of scattered light below the surface; and flux that enters there times the albedo. Spread beyond the surface.
+    low : (3,) float64
+        Corner of the grid in metres.
+    step : float
+        Side of a cell in metres.
+    albedo : (3,) float64
+        Of single scattering after similarity: sigma_s' / (sigma_a + sigma_s').
+    conductance, exit_share, mean_cosine : float
+        Of the interface; see `DiffuseInterface`.
+    fluxes : tuple of 4 floats
+        See `emergent_fluxes`.
+    steps : int
+        Iterations of the solver.
+    cells : int
+        In the system.
+    """
+
+    fluence: npt.NDArray[np.float32]
+    entering: npt.NDArray[np.float32]
+    low: Array
+    step: float
+    albedo: Array
+    conductance: float
+    exit_share: float
+    mean_cosine: float
+    fluxes: tuple[float, float, float, float]
+    steps: int
+    cells: int
+
+
+@dataclass(frozen=True, eq=False)
+class LitBody:
+    """Geometry of a body in which light diffuses; the same for all media and lights.
+
+    Attributes
+    ----------
+    grid : BodyGrid
+    casters : Casters
+    sky : Sky
+    """
+
+    grid: BodyGrid
+    casters: Casters
+    sky: Sky
+
+
+def lit_body(body: Object, opaque: tuple[Object, ...], step: float) -> LitBody:
+    """Geometry of a body with cells of this side, shadowed by itself and by opaque objects."""
+    grid = body_grid(body, step)
+    casters = Casters(body, opaque)
+    return LitBody(grid, casters, sky_of(grid, casters))
+
+
+def diffusion_field(lit: LitBody, medium: Medium, roughness: float, scene: Scene) -> DiffusionField:
+    """Light that a body with this medium gives back in a scene, for its environment and lights."""
+    grid, interface = lit.grid, diffuse_interface(medium.ior, roughness)
+    radiance, solid_angles = environment_parts(scene.environment, lit.sky.directions)
+    shares = transfer(lit.sky, solid_angles, medium.ior, interface)
+    entering = (shares * lit.sky.seen) @ radiance
+    power = np.zeros((grid.count, 3))
+    for light in scene.lights:
+        if isinstance(light, PointLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
+            power[cell] += 4.0 * np.pi * np.asarray(light.intensity)
+        else:
+            entering = entering + from_light(grid, lit.casters, light, medium.ior, interface)
+    itself = from_itself(lit.sky, shares, solid_angles, interface)
+    found = surface_light(grid, medium, roughness, entering, itself, power)
+    return _field(grid, medium, roughness, found)
+
+
+def _cell_at(grid: BodyGrid, point: Array) -> int:
+    """Number of the cell at a point, -1 outside."""
+    place = np.floor((point - grid.cells.low) / grid.cells.step).astype(int)
+    if (place < 0).any() or (place >= grid.number.shape).any():
+        return -1
+    return int(grid.number[tuple(place)])
+
+
+def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight) -> DiffusionField:
+    reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+    total = reduced + np.asarray(medium.absorption)
+    albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
+    interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
+    values = np.concatenate([found.fluence, albedo * found.entering], axis=1)
+    volume = _spread(grid, values).astype(np.float32)
+    return DiffusionField(
+        fluence=np.ascontiguousarray(volume[..., :3]),
+        entering=np.ascontiguousarray(volume[..., 3:]),
+        low=grid.cells.low,
+        step=grid.cells.step,
+        albedo=albedo,
+        conductance=interface.conductance,
+        exit_share=interface.exit_share,
+        mean_cosine=polished.mean_cosine,
+        fluxes=emergent_fluxes(medium.ior, polished.mean_cosine),
+        steps=found.steps,
+        cells=grid.count,
+    )
+
+
+def _spread(grid: BodyGrid, values: Array) -> Array:
+    """(x, y, z, n): means of samples' values (s, n) in the cells where they lie, spread to cells around."""
+    size = grid.number.shape
+    place = np.floor((grid.points - grid.cells.low) / grid.cells.step).astype(int)
+    at = np.ravel_multi_index(tuple(np.clip(place, 0, np.array(size) - 1).T), size)
+    total = int(np.prod(size))
+    count = np.bincount(at, minlength=total).astype(np.float64)
+    sums = np.stack([np.bincount(at, column, total) for column in values.T], axis=1)
+    filled = (sums / np.maximum(count, 1.0)[:, None]).reshape(*size, -1)
+    known = (count > 0.0).reshape(size)
+    for _ in range(SPREAD):
+        near = uniform_filter(known.astype(np.float64), 3, mode="constant")
+        mean = uniform_filter(filled * known[..., None], (3, 3, 3, 1), mode="constant")
+        new = ~known & (near > 1e-9)
+        filled[new] = mean[new] / near[new][:, None]
+        known |= new
+    return np.asarray(filled)

@@ -1,0 +1,215 @@
+"""Grid of cut cells of a body, with sample points on its surface: what diffusion needs of its geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from translucent.arrays import Array, Integers, Mask
+from translucent.geometry.normals import corner_normals
+from translucent.geometry.voxels import Voxels, voxels
+from translucent.scene.scene import Object
+
+#: Sample points on the surface for each area of a cell's face.
+SAMPLES = 3.0
+
+#: Share of a cell that must be inside for the cell to count: thinner slivers would make the system stiff for nothing.
+LEAST_INSIDE = 0.05
+
+#: Depths below the surface, in cells, at which the fluence is read: the first that enough of the body surrounds.
+PROBE_DEPTHS = (1.0, 0.75, 0.5, 0.25)
+
+#: Share of the eight cells around such a point that must be inside.
+LEAST_AROUND = 0.55
+
+#: Shortest distance between the centers of two cells, and least depth, in cells.
+LEAST_LENGTH, LEAST_DEPTH = 0.3, 0.1
+
+#: Places in each layer between the surface and the depth of reading at which its volume is counted.
+_LAYER_PLACES = (np.arange(4) + 0.5) / 4
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """Linear interpolation of cell values at points.
+
+    Attributes
+    ----------
+    weights : (points, cells) csr_array
+        Rows sum to 1, or to 0 where no cell is near.
+    center : (points, 3) float64
+        Where the weighted centroid of the cells is, in cells from the corner of the grid.
+    around : (points,) float64
+        Share of the cells around each point that is inside.
+    """
+
+    weights: sparse.csr_array
+    center: Array
+    around: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyGrid:
+    """Cells of a body and sample points on its surface, in world coordinates.
+
+    Attributes
+    ----------
+    cells : Voxels
+    number : (x, y, z) int
+        Of each cell in the system, -1 where it does not count.
+    points, face_normals, normals : (s, 3) float64
+        Sample points on the surface, spread evenly.
+    area : float
+        Of the surface, that each sample stands for, in m^2.
+    """
+
+    cells: Voxels
+    number: Integers
+    points: Array
+    face_normals: Array
+    normals: Array
+    area: float
+
+    @cached_property
+    def count(self) -> int:
+        """Number of cells in the system."""
+        return int(self.number.max(initial=-1)) + 1
+
+    @cached_property
+    def volumes(self) -> Array:
+        """(cells,): volume inside each cell in m^3."""
+        return np.asarray(self.cells.inside[self.number >= 0] * self.cells.step**3)
+
+    @cached_property
+    def faces(self) -> tuple[Integers, Integers, Array]:
+        """(f,), (f,), (f,): the two cells at each face between them, and its open area over their distance, in m."""
+        first, second, ratio = [], [], []
+        for axis in range(3):
+            lower: list[slice] = [slice(None)] * 3
+            upper, middle = list(lower), list(lower)
+            lower[axis], upper[axis], middle[axis] = slice(0, -1), slice(1, None), slice(1, -1)
+            a, b = self.number[tuple(lower)], self.number[tuple(upper)]
+            area = self.cells.open_area[axis][tuple(middle)]
+            apart = self.cells.center[tuple(upper)][..., axis] - self.cells.center[tuple(lower)][..., axis]
+            joined = (a >= 0) & (b >= 0) & (area > 0.0)
+            first.append(a[joined])
+            second.append(b[joined])
+            ratio.append(area[joined] / np.maximum(apart[joined], LEAST_LENGTH) * self.cells.step)
+        return np.concatenate(first), np.concatenate(second), np.concatenate(ratio)
+
+    @cached_property
+    def below(self) -> tuple[sparse.csr_array, Array]:
+        """How the fluence somewhat below each sample is read, and how far below it is in m, (s,)."""
+        weights = sparse.csr_array((len(self.points), self.count))
+        depth = np.zeros(len(self.points))
+        missing = np.ones(len(self.points), bool)
+        for wanted in PROBE_DEPTHS:
+            probe = self.probe(self.points - wanted * self.cells.step * self.face_normals)
+            found = self._depth(probe)
+            taken = missing & (probe.around > LEAST_AROUND) & (found > 0.3 * wanted)
+            weights = weights + _rows(probe.weights, taken)
+            depth[taken] = found[taken]
+            missing &= ~taken
+        nearest = self._nearest(missing)
+        return sparse.csr_array(weights + nearest), np.maximum(depth, LEAST_DEPTH) * self.cells.step
+
+    @cached_property
+    def layers(self) -> Array:
+        """(cells,): volume in m^3 of each cell that is less deep than the fluence is read, counted for each sample."""
+        depth = self.below[1]
+        volume = np.zeros(self.count)
+        for place in _LAYER_PLACES:
+            probe = self.probe(self.points - (place * depth)[:, None] * self.face_normals)
+            volume += probe.weights.T @ (self.area * depth / len(_LAYER_PLACES))
+        return volume
+
+    def probe(self, points: Array) -> Probe:
+        """Linear interpolation at points (k, 3), in metres, from the cells around each as far as they are inside."""
+        place = (points - self.cells.low) / self.cells.step - 0.5
+        corner = np.floor(place).astype(int)
+        share = place - corner
+        size = np.array(self.number.shape)
+        rows, columns, values = [], [], []
+        center, around = np.zeros(points.shape), np.zeros(len(points))
+        for offset in np.ndindex(2, 2, 2):
+            cell = corner + offset
+            x, y, z = np.clip(cell, 0, size - 1).T
+            number = self.number[x, y, z]
+            weight = np.where(offset, share, 1.0 - share).prod(axis=1) * self.cells.inside[x, y, z]
+            weight = np.where((number >= 0) & ((cell >= 0) & (cell < size)).all(axis=1), weight, 0.0)
+            used = np.flatnonzero(weight)
+            rows.append(used)
+            columns.append(number[used])
+            values.append(weight[used])
+            center += weight[:, None] * self.cells.center[x, y, z]
+            around += weight
+        row, value = np.concatenate(rows), np.concatenate(values)
+        scale = np.where(around > 0.0, around, 1.0)
+        weights = sparse.csr_array((value / scale[row], (row, np.concatenate(columns))), (len(points), self.count))
+        return Probe(weights, center / scale[:, None], around)
+
+    def _depth(self, probe: Probe) -> Array:
+        """(s,): depth of what is read below the samples, in cells."""
+        places = (self.points - self.cells.low) / self.cells.step
+        return np.asarray(((places - probe.center) * self.face_normals).sum(axis=1))
+
+    def _nearest(self, missing: Mask) -> sparse.csr_array:
+        """Reading of the nearest cell, for samples that have nothing below them."""
+        found = np.full(len(self.points), -1)
+        places = (self.points - self.cells.low) / self.cells.step
+        for depth in (0.02, 0.25, 0.5, 0.9, 1.3):
+            x, y, z = np.clip((places - depth * self.face_normals).astype(int), 0, np.array(self.number.shape) - 1).T
+            found = np.where(found < 0, self.number[x, y, z], found)
+        row = np.flatnonzero(missing & (found >= 0))
+        return sparse.csr_array((np.ones(len(row)), (row, found[row])), (len(self.points), self.count))
+
+
+def body_grid(body: Object, step: float) -> BodyGrid:
+    """Grid of a closed body with cells of this side in metres."""
+    matrix = body.matrix[:3, :3]
+    corners = body.mesh.vertices @ matrix.T + body.matrix[:3, 3]
+    faces = np.asarray(body.mesh.faces)
+    if np.linalg.det(matrix) < 0.0:
+        faces = faces[:, ::-1]
+    cells = voxels(corners, faces, step)
+    counts = cells.inside > LEAST_INSIDE
+    number = np.full(counts.shape, -1)
+    number[counts] = np.arange(counts.sum())
+    points, face_normals, face, weights, area = _surface_samples(corners[faces], SAMPLES / step**2)
+    at_corners = corner_normals(body.mesh).reshape(-1, 3, 3)
+    if np.linalg.det(matrix) < 0.0:
+        at_corners = at_corners[:, ::-1]
+    normals = np.einsum("sc,sci->si", weights, at_corners[face]) @ np.linalg.inv(matrix)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), face_normals)
+    return BodyGrid(cells, number, points, face_normals, normals, area)
+
+
+def _surface_samples(triangles: Array, density: float) -> tuple[Array, Array, Integers, Array, float]:
+    """Points, face normals, faces, barycentric weights of even samples on triangles (m, 3, 3), and the area of each."""
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    double = np.linalg.norm(normal, axis=1)
+    ends = np.cumsum(0.5 * double)
+    count = int(np.ceil(ends[-1] * density))
+    number = np.arange(count)
+    face = np.minimum(np.searchsorted(ends, (number + 0.5) / count * ends[-1]), len(ends) - 1)
+    u, v = plane_points(count).T
+    folded = u + v > 1.0
+    u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
+    weights = np.stack([1.0 - u - v, u, v], axis=1)
+    points = np.einsum("sc,sci->si", weights, triangles[face])
+    return points, normal[face] / double[face, None], face, weights, float(ends[-1]) / count
+
+
+def plane_points(count: int) -> Array:
+    """(count, 2): additive recurrence over the unit square (Roberts 2018, "quasirandom sequences")."""
+    return np.asarray((0.5 + np.arange(count)[:, None] * [0.7548776662466927, 0.5698402909980532]) % 1.0)
+
+
+def _rows(matrix: sparse.csr_array, taken: npt.NDArray[np.bool_]) -> sparse.csr_array:
+    """The matrix with all other rows set to 0."""
+    return sparse.csr_array(sparse.diags_array(taken.astype(np.float64)) @ matrix)

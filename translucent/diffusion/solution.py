@@ -1,0 +1,271 @@
+"""Diffusion in a body: fluence in its cells and at its surface, from the light that enters and that it emits.
+
+-div(D grad phi) + sigma_a phi = q in the body, for each channel, and -D dphi/dn = c phi at its surface, by finite
+volumes on cut cells (Johansen & Colella 1998). Between the surface and the depth at which the fluence is read below
+each sample, about a cell, the equation is solved exactly in one dimension: cells may be much larger than a mean free
+path.
+
+References
+----------
+Stam 1995, "Multiple scattering as a diffusion process"; Haber et al. 2005, "Embedded boundary method for shape
+optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 1956 for D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import cg
+
+from translucent.arrays import Array
+from translucent.diffusion.grid import BodyGrid, plane_points
+from translucent.errors import RenderError
+from translucent.formulas import optics
+from translucent.formulas.diffuse_interface import (
+    DiffuseInterface,
+    diffuse_interface,
+    diffusion_coefficient,
+    half_space_reflectance,
+)
+from translucent.media.medium import Medium
+
+#: Relative residual at which a solution is good enough: far below what diffusion itself gets wrong.
+TOLERANCE = 1e-4
+
+#: Steps after which conjugate gradients are given up.
+MOST_STEPS = 4000
+
+#: Depths of first events for each sample: quantiles of the exponential distribution.
+QUANTILES = (np.arange(4) + 0.5) / 4
+
+#: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
+MOST_BOUNCES, ENOUGH = 24, 1e-3
+
+#: Least share of a cell's volume that absorbs; and what keeps cells that nothing touches from 0, in D times a cell.
+_LEAST_ABSORBING, _STRAY = 0.02, 1e-9
+
+#: Largest argument of exponentials: beyond it nothing is left.
+_DEEP = 40.0
+
+
+@dataclass(frozen=True)
+class SurfaceLight:
+    """Light at the samples of a body's surface.
+
+    Attributes
+    ----------
+    fluence : (s, 3) float64
+        Of light that has been scattered, below the surface.
+    entering : (s, 3) float64
+        Flux that enters, that of the body itself included.
+    steps : int
+        Iterations that the solver took, in all.
+    """
+
+    fluence: Array
+    entering: Array
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Layer:
+    """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
+
+    u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
+    the flux to the surface D u' / u times it.
+    """
+
+    depth: Array
+    attenuation: float
+    condition: float
+
+    def u(self, depth: Array) -> Array:
+        """Solution without a source, 1 at the surface: cosh(k z) + c / D sinh(k z) / k."""
+        return np.asarray(np.cosh(self._bounded(depth)) + self.condition * self.rise(depth))
+
+    def slope(self) -> Array:
+        """u' at the depth of reading."""
+        return np.asarray(
+            self.attenuation**2 * self.rise(self.depth) + self.condition * np.cosh(self._bounded(self.depth))
+        )
+
+    def rise(self, depth: Array) -> Array:
+        """sinh(k z) / k, z where nothing is absorbed."""
+        x = self._bounded(depth)
+        return np.asarray(np.where(x > 1e-4, np.sinh(x) / np.maximum(x, 1e-4), 1.0 + x * x / 6.0) * depth)
+
+    def _bounded(self, depth: Array) -> Array:
+        return np.minimum(self.attenuation * depth, _DEEP)
+
+
+def surface_light(
+    grid: BodyGrid,
+    medium: Medium,
+    roughness: float,
+    entering: Array,
+    from_itself: sparse.csr_array,
+    inside: Array | None = None,
+) -> SurfaceLight:
+    """Solve for the light at a body's surface.
+
+    Parameters
+    ----------
+    grid : BodyGrid
+    medium : Medium
+        That scatters in every channel in which light enters, or not at all in one.
+    roughness : float
+        Of its surface.
+    entering : (s, 3)
+        Flux that enters at the samples from outside, in W/m^2.
+    from_itself : (s, s) csr_array
+        Flux that enters for the fluence at each sample.
+    inside : (cells, 3), optional
+        Power of lights inside each cell, in W.
+
+    Raises
+    ------
+    RenderError
+        If the solver does not get there.
+    """
+    interface = diffuse_interface(medium.ior, roughness)
+    ways = _first_ways(grid, medium.ior)
+    fluence, flux = np.zeros_like(entering), entering.copy()
+    steps = 0
+    for channel in range(3):
+        absorption = float(np.asarray(medium.absorption)[channel])
+        scattering = float(np.asarray(medium.scattering)[channel]) * (1.0 - medium.anisotropy)
+        if scattering <= 0.0:
+            continue
+        emission = 4.0 * np.pi * float(np.asarray(medium.emission)[channel]) * grid.volumes
+        power = emission if inside is None else emission + inside[:, channel]
+        solver = _Channel(grid, interface, medium.ior, absorption, scattering, ways)
+        fluence[:, channel], flux[:, channel], taken = solver.solved(entering[:, channel], from_itself, power)
+        steps += taken
+    return SurfaceLight(fluence, flux, steps)
+
+
+class _Channel:
+    """The linear system of one channel."""
+
+    def __init__(
+        self,
+        grid: BodyGrid,
+        interface: DiffuseInterface,
+        ior: float,
+        absorption: float,
+        scattering: float,
+        ways: Array,
+    ) -> None:
+        self._grid = grid
+        extinction = absorption + scattering
+        self._albedo = scattering / extinction
+        d = float(diffusion_coefficient(absorption, scattering))
+        self._read, depth = grid.below
+        layer = _Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
+        at_depth = layer.u(depth)
+        self._attenuated = 1.0 / at_depth
+        # What of the entering light the exact half-space gives back less than diffusion would.
+        self._excess = _half_space_excess(self._albedo, ior) / diffuse_interface(ior).conductance
+        self._sources(layer, interface, extinction, ways, d)
+        lost = grid.area * d * layer.slope() * self._attenuated
+        self._matrix = _balance(grid, d, absorption, lost)
+        self._scale = 1.0 / np.sqrt(self._matrix.diagonal())
+        self._scaled = sparse.csr_array(
+            sparse.diags_array(self._scale) @ self._matrix @ sparse.diags_array(self._scale)
+        )
+        self._guess = np.zeros(grid.count)
+
+    def _sources(self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: Array, d: float) -> None:
+        """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
+        grid, share = self._grid, self._albedo / len(QUANTILES)
+        self._near = np.zeros(len(grid.points))
+        into_cells = np.zeros(len(grid.points))
+        deep = sparse.csr_array((len(grid.points), grid.count))
+        for quantile in QUANTILES:
+            path = -np.log1p(-quantile) / extinction
+            below = np.full(len(grid.points), path * interface.mean_cosine)
+            near = below < layer.depth
+            into_cells += np.where(near, share * layer.u(below) * self._attenuated, 0.0)
+            rise = layer.rise(np.maximum(layer.depth - below, 0.0))
+            self._near += np.where(near, share * rise / d * self._attenuated, 0.0)
+            if not near.all():
+                there = grid.probe(grid.points + path * ways).weights
+                deep = deep + sparse.diags_array(np.where(near, 0.0, share)) @ there
+        sources = deep + sparse.diags_array(into_cells) @ self._read
+        self._into_cells = sparse.csr_array((grid.area * sources).T)
+
+    def solved(self, entering: Array, from_itself: sparse.csr_array, power: Array) -> tuple[Array, Array, int]:
+        """Fluence and flux at the samples, and steps: light of the body falls on it again until little changes."""
+        flux, steps = entering, 0
+        for _ in range(MOST_BOUNCES):
+            cells, taken = self._cells(self._into_cells @ flux + self._albedo * power)
+            steps += taken
+            surface = (self._read @ cells) * self._attenuated + (self._near - self._excess) * flux
+            fluence = np.maximum(surface, 0.0)
+            again = entering + from_itself @ fluence
+            change = np.abs(again - flux).max(initial=0.0)
+            flux = again
+            if change <= ENOUGH * np.abs(flux).max(initial=0.0):
+                break
+        return fluence, flux, steps
+
+    def _cells(self, source: Array) -> tuple[Array, int]:
+        """Fluence in the cells, and iterations; warm from the last one."""
+        steps = 0
+
+        def count(_: Array) -> None:
+            nonlocal steps
+            steps += 1
+
+        found, failed = cg(
+            self._scaled, source * self._scale, x0=self._guess, rtol=TOLERANCE, maxiter=MOST_STEPS, callback=count
+        )
+        if failed:
+            raise RenderError(
+                "diffusion in a body",
+                f"the solver is not there after {MOST_STEPS} steps in {self._grid.count} cells",
+                "render with scattering=tl.ScatteringLayer()",
+            )
+        self._guess = found
+        return np.asarray(found * self._scale), steps
+
+
+def _balance(grid: BodyGrid, d: float, absorption: float, lost: Array) -> sparse.csr_array:
+    """Symmetric matrix of what flows between cells, is absorbed in them, and leaves through the surface."""
+    first, second, ratio = grid.faces
+    flow = d * ratio
+    absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
+    diagonal = absorption * absorbing + _STRAY * d * grid.cells.step
+    diagonal += np.bincount(first, flow, grid.count) + np.bincount(second, flow, grid.count)
+    between = sparse.coo_array(
+        (np.concatenate([-flow, -flow]), (np.concatenate([first, second]), np.concatenate([second, first]))),
+        (grid.count, grid.count),
+    )
+    read, _ = grid.below
+    leaving = read.T @ sparse.diags_array(lost) @ read
+    return sparse.csr_array(between + sparse.diags_array(diagonal) + leaving)
+
+
+def _first_ways(grid: BodyGrid, ior: float) -> Array:
+    """(s, 3): a direction inside for each sample, as uniform light from outside has them."""
+    first, second = plane_points(len(grid.points)).T
+    cosine = optics.refracted_cosine(np.sqrt(first), ior)
+    normal = grid.face_normals
+    aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    across = np.cross(normal, aside)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    along = np.cross(normal, across)
+    angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
+    return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
+
+
+def _half_space_excess(albedo: float, ior: float) -> float:
+    """Share of the light entering a half-space that diffusion gives back beyond the exact one."""
+    interface = diffuse_interface(ior)
+    d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance
+    attenuation = np.sqrt((1.0 - albedo) / d)
+    diffused = albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine))
+    return float(diffused - half_space_reflectance(round(albedo, 6), ior))

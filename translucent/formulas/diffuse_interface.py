@@ -1,0 +1,198 @@
+"""Diffuse light at an interface, and the light that a half-space of scattering medium behind it gives back; float64.
+
+References
+----------
+Walsh 1926, "The reflection factor of a polished glass surface for diffused light"; Haskell et al. 1994, "Boundary
+conditions for the diffusion equation in radiative transfer"; Chandrasekhar 1960, "Radiative transfer", section 34;
+Grosjean 1956, "A high
+accuracy approximation for solving multiple scattering problems in infinite homogeneous media"; Walter et al. 2007,
+"Microfacet models for refraction through rough surfaces".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.formulas import interface, optics
+
+#: Points of the quadratures, and of the sums over microfacets of a rough interface.
+NODES, FACETS = 64, 1 << 14
+
+#: Change of Chandrasekhar's function at which its iteration ends, and steps after which it ends anyway.
+H_TOLERANCE, H_STEPS = 1e-10, 4000
+
+
+@dataclass(frozen=True)
+class DiffuseInterface:
+    """Shares of diffuse light that an interface reflects and lets through; the rest, if it is rough, is lost.
+
+    A single reflection at GGX microfacets loses what would meet a second one: as `TracedInterfaces` does.
+
+    Attributes
+    ----------
+    entering : float
+        Of uniform radiance from outside, the share that enters.
+    mean_cosine : float
+        Of the entering light, inside: the mean depth of its first event is this many mean free paths.
+    reflected, reflected_flux : float
+        Of light from inside, the share that is reflected: of uniform radiance, weighted by the cosine; and of radiance
+        that is as the cosine, weighted by its square (R_phi and R_j of Haskell et al. 1994).
+    leaving, leaving_flux : float
+        Likewise, the shares that leave.
+    """
+
+    entering: float
+    mean_cosine: float
+    reflected: float
+    reflected_flux: float
+    leaving: float
+    leaving_flux: float
+
+    @property
+    def conductance(self) -> float:
+        """Net flux through the interface from inside, as a share of the fluence there: (1 - R_phi) / (2 (1 + R_j))."""
+        return 0.5 * (1.0 - self.reflected) / (1.0 + self.reflected_flux)
+
+    @property
+    def exit_share(self) -> float:
+        """Flux outside as a share of the fluence inside; the conductance unless the interface loses light."""
+        return 0.25 * self.leaving + 0.5 * self.conductance * self.leaving_flux
+
+
+@lru_cache(maxsize=256)
+def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
+    """Shares of diffuse light at an interface.
+
+    Parameters
+    ----------
+    ior : float
+        Index inside relative to outside, >= 1.
+    roughness : float
+        Square root of the GGX alpha, 0 to 1.
+    """
+    cosine, weight = _nodes(ior)
+    outside, outside_weight = _gauss()
+    entered = 1.0 - optics.fresnel_dielectric(outside, ior)
+    flux = 2.0 * outside * outside_weight * entered
+    mean_cosine = float((flux * optics.refracted_cosine(outside, ior)).sum() / flux.sum())
+    if roughness > 0.0 and ior > 1.0:
+        (_, entering), (reflected, leaving) = (_rough_shares(relative, roughness, 2) for relative in (ior, 1.0 / ior))
+        reflected_flux, leaving_flux = _rough_shares(1.0 / ior, roughness, 3)
+        return DiffuseInterface(entering, mean_cosine, reflected, reflected_flux, leaving, leaving_flux)
+    inside = _inside_reflectance(cosine, ior)
+    reflected = float((2.0 * cosine * inside * weight).sum())
+    reflected_flux = float((3.0 * cosine**2 * inside * weight).sum())
+    return DiffuseInterface(
+        float(flux.sum()), mean_cosine, reflected, reflected_flux, 1.0 - reflected, 1.0 - reflected_flux
+    )
+
+
+@lru_cache(maxsize=256)
+def emergent_fluxes(ior: float, mean_cosine: float) -> tuple[float, float, float, float]:
+    """Flux outside of each term of `translucent.formulas.diffusion.emergent_radiance`, through a polished interface.
+
+    Of w phi, 3 w c phi mu, E / (mu + m) and 3 w E mu^2 / (mu + m), in this order.
+    """
+    cosine, weight = _nodes(ior)
+    passed = 0.5 * cosine * weight * (1.0 - _inside_reflectance(cosine, ior))
+    once = passed / (cosine + mean_cosine)
+    terms = passed, 3.0 * passed * cosine, once, 3.0 * once * cosine**2
+    uniform, rising, fresh, shadowed = (float(term.sum()) for term in terms)
+    return uniform, rising, fresh, shadowed
+
+
+@lru_cache(maxsize=1024)
+def half_space_reflectance(albedo: float, ior: float = 1.0) -> float:
+    """Share of the diffuse light entering a half-space that leaves again after isotropic scattering; exact.
+
+    The bare half-space reflects as Chandrasekhar's H functions say; its interface mirrors part of that back, and the
+    half-space reflects it again: one linear system on a quadrature.
+
+    Parameters
+    ----------
+    albedo : float
+        Of single scattering, 0 to 1.
+    ior : float
+        Index of the half-space relative to what is above; polished.
+    """
+    cosine, weight = _nodes(ior)
+    h = _chandrasekhar_h(albedo, cosine, weight)
+    bare = 0.5 * albedo * np.outer(h, h * cosine * weight) / (cosine[:, None] + cosine)
+    mirrored = _inside_reflectance(cosine, ior)
+    # Uniform radiance from outside stays uniform inside the cone that it refracts to, but for Fresnel's share.
+    down = 1.0 - mirrored
+    up = np.linalg.solve(np.eye(len(cosine)) - bare * mirrored, bare @ down)
+    flux = cosine * weight
+    return float((flux * (1.0 - mirrored) * up).sum() / (flux * down).sum())
+
+
+def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
+    """H at the nodes: 1 / H = sqrt(1 - w) + w / 2 int mu' H(mu') / (mu + mu') (Chandrasekhar 1960, V 22)."""
+    h = np.ones_like(cosine)
+    kernel = 0.5 * albedo * cosine * weight / (cosine[:, None] + cosine)
+    for _ in range(H_STEPS):
+        better = 1.0 / (np.sqrt(1.0 - albedo) + kernel @ h)
+        done = np.abs(better - h).max() < H_TOLERANCE
+        h = better
+        if done:
+            break
+    return h
+
+
+def _inside_reflectance(cosine: Array, ior: float) -> Array:
+    """Fresnel's reflectance of light from inside, at the nodes of `_nodes`."""
+    return optics.fresnel_dielectric(cosine, 1.0 / ior) if ior > 1.0 else np.zeros_like(cosine)
+
+
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights on 0 to 1."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    return 0.5 * (x + 1.0), 0.5 * weight
+
+
+def _nodes(ior: float) -> tuple[Array, Array]:
+    """Nodes and weights for cosines inside, apart on both sides of the critical one."""
+    x, weight = _gauss()
+    if ior == 1.0:
+        return x, weight
+    critical = float(np.sqrt((1.0 - 1.0 / ior) * (1.0 + 1.0 / ior)))
+    return (
+        np.concatenate([critical * x, critical + (1.0 - critical) * x]),
+        np.concatenate([critical * weight, (1.0 - critical) * weight]),
+    )
+
+
+def _rough_shares(ior: float, roughness: float, power: int) -> tuple[float, float]:
+    """Reflected and transmitted share of light whose density over cosines is `power` mu^(power - 1)."""
+    number = np.arange(FACETS)
+    first, *shares = ((0.5 + number[:, None] * [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]) % 1.0).T
+    cosine, alpha = first ** (1.0 / power), roughness * roughness
+    towards = np.stack([np.sqrt(1.0 - cosine**2), np.zeros_like(cosine), cosine], axis=1)
+    facet = interface.ggx_visible_normal(towards, alpha, np.stack(shares, axis=1))
+    on_facet = np.clip((towards * facet).sum(axis=1), 0.0, 1.0)
+    reflectance = optics.fresnel_dielectric(on_facet, ior)
+    back = 2.0 * on_facet * facet[:, 2] - cosine
+    on = interface.refracted_direction(-towards, facet, np.full(FACETS, ior))[:, 2]
+
+    def unmasked(cosine_out: Array) -> Array:
+        into = interface.smith_lambda(cosine, alpha)
+        out = interface.smith_lambda(np.maximum(cosine_out, 1e-6), alpha)
+        return np.where(cosine_out > 0.0, (1.0 + into) / (1.0 + into + out), 0.0)
+
+    return float((reflectance * unmasked(back)).mean()), float(((1.0 - reflectance) * unmasked(-on)).mean())
+
+
+def diffusion_coefficient(absorption: npt.ArrayLike, reduced_scattering: npt.ArrayLike) -> Array:
+    """D = (2 sigma_a + sigma_s') / (3 (sigma_a + sigma_s')^2) in m (Grosjean 1956).
+
+    1 / (3 sigma_t') where little is absorbed; where much is, the light of a far source decays nearly as it does in the
+    exact solution.
+    """
+    a, s = np.asarray(absorption, np.float64), np.asarray(reduced_scattering, np.float64)
+    # Divided twice, so that no square overflows.
+    return np.asarray((1.0 + a / (a + s)) / (3.0 * (a + s)))

@@ -1,0 +1,52 @@
+"""Light that leaves a body in which it diffuses, in float64. Each has a twin in ``shaders/lib/diffusion.glsl``.
+
+All functions are pure and broadcast over channels.
+
+References
+----------
+Eddington 1926, "The internal constitution of the stars", section 226: light that leaves a scattering half-space.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+
+
+@np.errstate(under="ignore")
+def emergent_radiance(
+    fluence: npt.ArrayLike,
+    entering: npt.ArrayLike,
+    albedo: npt.ArrayLike,
+    conductance: npt.ArrayLike,
+    mean_cosine: npt.ArrayLike,
+    cosine: npt.ArrayLike,
+) -> Array:
+    """Radiance times 4 pi, inside a body below its surface and towards it, of light that has been scattered.
+
+    The source of scattered light seen along a ray that leaves, where the fluence rises inwards from the surface and
+    light has entered just now: w (phi (1 + 3 c mu) - 3 E mu^2 / (mu + m)) + E / (mu + m). Constant over all angles in
+    a lossless body in uniform light; 1 + 3 c mu where all light comes from deep below.
+
+    Parameters
+    ----------
+    fluence : array_like (..., 3)
+        phi at the surface.
+    entering : array_like (..., 3)
+        E: flux that enters there, times the albedo.
+    albedo : array_like (..., 3)
+        w: sigma_s' / sigma_t', 0 to 1.
+    conductance : array_like
+        c: `DiffuseInterface.conductance`.
+    mean_cosine : array_like
+        m: of the light that enters.
+    cosine : array_like
+        mu: of the direction towards the surface, inside.
+    """
+    phi, e, w, c, m, mu = (
+        np.asarray(x, np.float64) for x in (fluence, entering, albedo, conductance, mean_cosine, cosine)
+    )
+    once = e / (mu + m)
+    return np.asarray(w * (phi * (1.0 + 3.0 * c * mu) - 3.0 * once * mu * mu) + once)

@@ -1,0 +1,123 @@
+"""Choice of the way in which each body shows what it scatters many times: as asked for, or by the planner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from translucent.errors import InputError
+from translucent.media.given_back import DiffusedMedium, LayeredMedium
+from translucent.media.medium import Medium
+from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
+from translucent.scene.scene import Object, Scene
+
+#: Least reduced scattering across a body, sigma_s' times its mean thickness, at which the planner shows more than
+#: single scattering: below, less than a tenth of the scattered light is scattered again.
+LEAST_DEPTH = 0.2
+
+
+@dataclass(frozen=True)
+class GivenBack:
+    """Bodies of a scene that give back light which they scatter many times.
+
+    Attributes
+    ----------
+    diffused : tuple of int
+        Numbers of the objects in which light diffuses.
+    layered : tuple of int
+        Of those that give back light as layers.
+    diffusion : Diffusion
+    refusals : tuple of (int, str)
+        Objects that are layers since light cannot diffuse in them, and why.
+    """
+
+    diffused: tuple[int, ...] = ()
+    layered: tuple[int, ...] = ()
+    diffusion: Diffusion = field(default_factory=Diffusion)
+    refusals: tuple[tuple[int, str], ...] = ()
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return bool(self.diffused or self.layered)
+
+
+#: Where media show what they scatter once, and no more.
+NOTHING_GIVEN_BACK = GivenBack()
+
+
+def check_scattering(scattering: object) -> None:
+    """Raise `InputError` for what is no choice of scattering."""
+    if scattering is None or isinstance(scattering, Scattering):
+        return
+    known = [f"tl.{one}" for one in (Diffusion(), ScatteringLayer(), SingleScattering())]
+    raise InputError(
+        f"scattering {scattering!r}",
+        "not a choice of scattering",
+        f"give {', '.join(known[:-1])} or {known[-1]}",
+    )
+
+
+def given_back(scene: Scene, asked: Scattering | None) -> GivenBack:
+    """Bodies that give back what they scatter many times, and how.
+
+    Unless something is asked for, bodies without interfaces, as fog and smoke are, do not, nor do those in which little
+    is scattered.
+
+    Raises
+    ------
+    InputError
+        If what is asked for can be done for none of the bodies that scatter.
+    """
+    if asked is not None and not asked.gives_back:
+        return GivenBack()
+    wanted = Diffusion() if asked is None else asked
+    bodies = {
+        i: body
+        for i, body in enumerate(scene.objects)
+        if body.medium is not None
+        and body.medium.scatters
+        and not body.covers
+        and (asked is not None or (body.has_interface and _is_deep(body, body.medium)))
+    }
+    refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
+    layer = ScatteringLayer()
+    layered = tuple(
+        i for i, body in bodies.items() if (i in refused or wanted == layer) and layer.refusal(body) is None
+    )
+    if asked is not None and bodies and len(refused) == len(bodies) and wanted == layer:
+        i, why = next(iter(refused.items()))
+        raise InputError(str(asked), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering()")
+    if not isinstance(wanted, Diffusion):
+        return GivenBack(layered=layered)
+    diffused = tuple(i for i in bodies if i not in refused)
+    return GivenBack(diffused, layered, wanted, tuple((i, why) for i, why in refused.items() if i in layered))
+
+
+def _is_deep(body: Object, medium: Medium) -> bool:
+    reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+    return bool(reduced.max() * body.mean_thickness > LEAST_DEPTH)
+
+
+_SHOWN: WeakKeyDictionary[Scene, dict[GivenBack, Scene]] = WeakKeyDictionary()
+
+
+def shown(scene: Scene, back: GivenBack | None) -> Scene:
+    """Scene whose media say what they give back; the scene itself if they give back nothing."""
+    if not back:
+        return scene
+    known = _SHOWN.setdefault(scene, {})
+    if back not in known:
+        objects = list(scene.objects)
+        for i in back.layered:
+            objects[i] = replace(objects[i], medium=LayeredMedium.of(_medium(objects[i])))
+        for i in back.diffused:
+            objects[i] = replace(objects[i], medium=DiffusedMedium.of(_medium(objects[i])))
+        known[back] = replace(scene, objects=objects)
+    return known[back]
+
+
+def _medium(body: Object) -> Medium:
+    assert body.medium is not None
+    return body.medium

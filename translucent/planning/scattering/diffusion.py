@@ -1,0 +1,67 @@
+"""Bodies in which light diffuses, solved for on a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from translucent.errors import InputError
+from translucent.planning.methods.base import check_count
+from translucent.planning.scattering.base import Scattering
+from translucent.scene.scene import Object
+
+#: Resolutions that make sense: below, no body has an inside; above, the memory told in the error is needed.
+LEAST_RESOLUTION, MOST_RESOLUTION = 8, 128
+
+#: Bytes that a cell takes, with its share of samples on the surface and of what they see.
+CELL_BYTES = 4000
+
+
+@dataclass(frozen=True)
+class Diffusion(Scattering):
+    """Light scattered many times, as it diffuses in the body and leaves through its surface.
+
+    The diffusion equation on cells that the mesh cuts, lit by what enters: the environment and lights, shadowed by the
+    body and by opaque objects, and light of the body that falls on it again. Solved on the CPU where the light, the
+    medium or the mesh changes; a picture then takes two look-ups. Light that passes unscattered is seen along rays as
+    ever.
+
+    Parameters
+    ----------
+    resolution : int
+        A body gets about resolution^3 / 4 cells, whatever its shape, 8 to 128: a ball is 0.8 times as many cells wide.
+    """
+
+    name: ClassVar[str] = "diffusion"
+    gives_back: ClassVar[bool] = True
+
+    resolution: int = 32
+
+    def __post_init__(self) -> None:
+        check_count("Diffusion resolution", self.resolution, 1 << 16, least=LEAST_RESOLUTION, example=32)
+        if self.resolution > MOST_RESOLUTION:
+            gigabytes = CELL_BYTES * self.resolution**3 / 4 / 1e9
+            raise InputError(
+                f"Diffusion resolution {self.resolution}",
+                f"a body would have {self.resolution**3 / 4:.2g} cells and take about {gigabytes:.0f} GB",
+                f"give at most {MOST_RESOLUTION}; 32 is enough where scattering dominates",
+            )
+
+    def cell_size(self, body: Object) -> float:
+        """Side of a cell in metres."""
+        volume = abs(body.mesh.volume * float(np.linalg.det(body.matrix[:3, :3])))
+        return float(np.cbrt(4.0 * volume) / self.resolution)
+
+    def refusal(self, body: Object) -> str | None:
+        """Reason: no closed solid of one density, or thinner than a cell everywhere."""
+        if body.sheet_thickness is not None:
+            return "it is a sheet"
+        if body.density is not None:
+            return "its density varies"
+        if not body.mesh.diagnosis.sound or not body.mesh.volume > 0.0:
+            return "its mesh is not closed"
+        if body.mean_thickness < self.cell_size(body):
+            return f"it is thinner than a cell everywhere, {self.cell_size(body):.2g} m at this resolution"
+        return None
