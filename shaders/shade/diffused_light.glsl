@@ -14,10 +14,14 @@ vec3 diffused_out(int object, vec3 point, float cosine) {
     at = (at + vec3(0.0, 0.0, row.first_layer)) / texels;
     vec3 fluence = textureLod(diffused_light, at, 0.0).rgb;
     vec3 entering = textureLod(diffused_light, at + vec3(0.0, 0.0, row.grid_size.z / texels.z), 0.0).rgb;
+    // Light that has entered just now can darken the rest no more than to a fifth: where the two do not fit together, as
+    // beside the edge of a shadow.
+    vec4 shares = row.emergent_fluxes;
+    float steady = shares.x + row.conductance * shares.y;
+    entering = min(entering, 0.8 * steady / shares.w * fluence);
     vec3 emergent = emergent_radiance(fluence, entering, row.albedo, row.conductance, row.mean_cosine, cosine);
     // Scaled so that the flux that leaves is that of the diffusion.
-    vec4 shares = row.emergent_fluxes;
-    vec3 flux = row.albedo * (fluence * (shares.x + row.conductance * shares.y) - entering * shares.w) + entering * shares.z;
+    vec3 flux = row.albedo * (fluence * steady - entering * shares.w) + entering * shares.z;
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
     return max(emergent * scale, vec3(0.0)) / (4.0 * PI * row.ior * row.ior);
 }

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from translucent.arrays import Array, Integers, Mask
 from translucent.geometry.normals import corner_normals
@@ -126,6 +127,15 @@ class BodyGrid:
             probe = self.probe(self.points - (place * depth)[:, None] * self.face_normals)
             volume += probe.weights.T @ (self.area * depth / len(_LAYER_PLACES))
         return volume
+
+    @cached_property
+    def crumbs(self) -> Mask:
+        """(cells,): cells in parts of the grid that no sample reads."""
+        first, second, _ = self.faces
+        joined = sparse.coo_array((np.ones(len(first)), (first, second)), (self.count, self.count))
+        parts, part = connected_components(joined, directed=False)
+        read = np.bincount(part, np.asarray(self.below[0].sum(axis=0)), parts) > 0.0
+        return np.asarray(~read[part])
 
     def probe(self, points: Array) -> Probe:
         """Linear interpolation at points (k, 3), in metres, from the cells around each as far as they are inside."""

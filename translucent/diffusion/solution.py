@@ -37,14 +37,17 @@ TOLERANCE = 1e-4
 #: Steps after which conjugate gradients are given up.
 MOST_STEPS = 4000
 
-#: Depths of first events for each sample: quantiles of the exponential distribution.
-QUANTILES = (np.arange(4) + 0.5) / 4
+#: First events above the depth at which the fluence is read, and below it, for each sample.
+EVENTS = 4
+
+#: Share of the light below which no first events are looked for.
+_NOTHING = 1e-3
 
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
 MOST_BOUNCES, ENOUGH = 24, 1e-3
 
-#: Least share of a cell's volume that absorbs; and what keeps cells that nothing touches from 0, in D times a cell.
-_LEAST_ABSORBING, _STRAY = 0.02, 1e-9
+#: Least share of a cell's volume that absorbs.
+_LEAST_ABSORBING = 0.02
 
 #: Largest argument of exponentials: beyond it nothing is left.
 _DEEP = 40.0
@@ -179,20 +182,23 @@ class _Channel:
 
     def _sources(self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: Array, d: float) -> None:
         """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
-        grid, share = self._grid, self._albedo / len(QUANTILES)
-        self._near = np.zeros(len(grid.points))
-        into_cells = np.zeros(len(grid.points))
-        deep = sparse.csr_array((len(grid.points), grid.count))
-        for quantile in QUANTILES:
-            path = -np.log1p(-quantile) / extinction
-            below = np.full(len(grid.points), path * interface.mean_cosine)
-            near = below < layer.depth
-            into_cells += np.where(near, share * layer.u(below) * self._attenuated, 0.0)
-            rise = layer.rise(np.maximum(layer.depth - below, 0.0))
-            self._near += np.where(near, share * rise / d * self._attenuated, 0.0)
-            if not near.all():
-                there = grid.probe(grid.points + path * ways).weights
-                deep = deep + sparse.diags_array(np.where(near, 0.0, share)) @ there
+        grid, count = self._grid, len(self._grid.points)
+        # Shares of the light that is scattered above the depth of reading, and below it.
+        below = np.exp(-np.minimum(extinction * layer.depth / interface.mean_cosine, _DEEP))
+        above = -np.expm1(-np.minimum(extinction * layer.depth / interface.mean_cosine, _DEEP))
+        self._near, into_cells = np.zeros(count), np.zeros(count)
+        for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
+            depth = -np.log1p(-quantile * above) * interface.mean_cosine / extinction
+            share = self._albedo / EVENTS * above * self._attenuated
+            into_cells += share * layer.u(depth)
+            self._near += share * layer.rise(layer.depth - depth) / d
+        deep = sparse.csr_array((count, grid.count))
+        for quantile in _tails(count) if below.max() > _NOTHING else ():
+            path = -(np.log(below) + np.log1p(-quantile)) / extinction
+            there = grid.probe(grid.points + path[:, None] * ways)
+            # Where the path has left the body nothing is scattered; near its end, as much as is inside of cells.
+            share = self._albedo / EVENTS * below * there.around
+            deep = deep + sparse.diags_array(share) @ there.weights
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
 
@@ -237,7 +243,8 @@ def _balance(grid: BodyGrid, d: float, absorption: float, lost: Array) -> sparse
     first, second, ratio = grid.faces
     flow = d * ratio
     absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
-    diagonal = absorption * absorbing + _STRAY * d * grid.cells.step
+    # Crumbs that no sample reads would otherwise keep all of the light that is put into them.
+    diagonal = absorption * absorbing + np.where(grid.crumbs, d * grid.cells.step, 0.0)
     diagonal += np.bincount(first, flow, grid.count) + np.bincount(second, flow, grid.count)
     between = sparse.coo_array(
         (np.concatenate([-flow, -flow]), (np.concatenate([first, second]), np.concatenate([second, first]))),
@@ -246,6 +253,12 @@ def _balance(grid: BodyGrid, d: float, absorption: float, lost: Array) -> sparse
     read, _ = grid.below
     leaving = read.T @ sparse.diags_array(lost) @ read
     return sparse.csr_array(between + sparse.diags_array(diagonal) + leaving)
+
+
+def _tails(samples: int) -> Array:
+    """(EVENTS, samples): quantiles of the paths below the depth of reading, other ones for each sample."""
+    shift = (0.5 + 0.6180339887498949 * np.arange(samples)) % 1.0
+    return np.asarray((np.arange(EVENTS)[:, None] + shift) / EVENTS)
 
 
 def _first_ways(grid: BodyGrid, ior: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -100,7 +101,7 @@ def _along_last_axis(
     entered = cell > first[of]
     crossed = np.bincount(place[entered], np.ones(int(entered.sum())), total)
 
-    def averaged(values: npt.NDArray[np.floating]) -> Array:
+    def averaged(values: npt.NDArray[Any]) -> Array:
         shape = (size[0], LINES, size[1], LINES, deep)
         return np.asarray(values.reshape(shape).mean(axis=(1, 3)))
 
