@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy import sparse
@@ -108,17 +108,30 @@ def even_directions(count: int) -> Array:
     return np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
 
 
-def environment_parts(environment: Environment, directions: Array) -> tuple[Array, Array]:
-    """(k, 3), (k,): integral of the radiance over the directions nearest to each, and their solid angle."""
+def environment_parts(environment: Environment, directions: Array) -> Array:
+    """(k, 3): integral of the radiance over the directions that are nearer to each one than to the others."""
+    nearest, _ = nearest_parts(directions)
+    ways, angle = _map_directions()
+    radiance = angle[:, None] * np.asarray(environment.lighting(ways), np.float64)
+    return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
+
+
+def nearest_parts(directions: Array) -> tuple[Integers, Array]:
+    """Which direction is nearest to each texel of a map of all, and the solid angle of the texels of each, (k,)."""
+    ways, angle = _map_directions()
+    nearest = np.asarray(cKDTree(directions).query(ways)[1])
+    return nearest, np.asarray(np.bincount(nearest, angle, len(directions)), np.float64)
+
+
+@cache
+def _map_directions() -> tuple[Array, Array]:
+    """Directions and solid angles of the texels of an equirectangular map."""
     polar = (np.arange(MAP_HEIGHT) + 0.5) / MAP_HEIGHT * np.pi
     around = (np.arange(2 * MAP_HEIGHT) + 0.5) / MAP_HEIGHT * np.pi
     up, level = np.cos(polar)[:, None], np.sin(polar)[:, None]
-    way = np.stack(np.broadcast_arrays(level * np.cos(around), up, level * np.sin(around)), axis=-1).reshape(-1, 3)
+    ways = np.stack(np.broadcast_arrays(level * np.cos(around), up, level * np.sin(around)), axis=-1).reshape(-1, 3)
     angle = np.repeat(np.sin(polar[:, None]) * (np.pi / MAP_HEIGHT) ** 2, 2 * MAP_HEIGHT, axis=1).ravel()
-    nearest = cKDTree(directions).query(way)[1]
-    radiance = np.asarray(environment.lighting(way), np.float64)
-    parts = [np.bincount(nearest, angle * radiance[:, channel], len(directions)) for channel in range(3)]
-    return np.stack(parts, axis=1), np.asarray(np.bincount(nearest, angle, len(directions)), np.float64)
+    return ways, angle
 
 
 def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterface) -> Array:

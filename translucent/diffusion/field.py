@@ -15,11 +15,12 @@ from translucent.diffusion.entering import (
     environment_parts,
     from_itself,
     from_light,
+    nearest_parts,
     sky_of,
     transfer,
 )
 from translucent.diffusion.grid import BodyGrid, body_grid
-from translucent.diffusion.solution import SurfaceLight, surface_light
+from translucent.diffusion.solution import BodySystem, SurfaceLight
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
 from translucent.media.medium import Medium
 from translucent.scene.lights import PointLight
@@ -89,21 +90,38 @@ def lit_body(body: Object, opaque: tuple[Object, ...], step: float) -> LitBody:
     return LitBody(grid, casters, sky_of(grid, casters))
 
 
-def diffusion_field(lit: LitBody, medium: Medium, roughness: float, scene: Scene) -> DiffusionField:
-    """Light that a body with this medium gives back in a scene, for its environment and lights."""
-    grid, interface = lit.grid, diffuse_interface(medium.ior, roughness)
-    radiance, solid_angles = environment_parts(scene.environment, lit.sky.directions)
-    shares = transfer(lit.sky, solid_angles, medium.ior, interface)
-    entering = (shares * lit.sky.seen) @ radiance
-    power = np.zeros((grid.count, 3))
-    for light in scene.lights:
-        if isinstance(light, PointLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
-            power[cell] += 4.0 * np.pi * np.asarray(light.intensity)
-        else:
-            entering = entering + from_light(grid, lit.casters, light, medium.ior, interface)
-    itself = from_itself(lit.sky, shares, solid_angles, interface)
-    found = surface_light(grid, medium, roughness, entering, itself, power)
-    return _field(grid, medium, roughness, found)
+class DiffusingBody:
+    """A body with its medium, ready for any light.
+
+    Parameters
+    ----------
+    lit : LitBody
+    medium : Medium
+    roughness : float
+        Of its surface.
+    """
+
+    def __init__(self, lit: LitBody, medium: Medium, roughness: float) -> None:
+        self._lit, self._medium, self._roughness = lit, medium, roughness
+        self._interface = diffuse_interface(medium.ior, roughness)
+        solid_angles = nearest_parts(lit.sky.directions)[1]
+        shares = transfer(lit.sky, solid_angles, medium.ior, self._interface)
+        self._itself = from_itself(lit.sky, shares, solid_angles, self._interface)
+        self._seen = (shares * lit.sky.seen).astype(np.float32)
+        self._system = BodySystem(lit.grid, medium, roughness)
+
+    def field(self, scene: Scene) -> DiffusionField:
+        """Light that the body gives back in a scene, for its environment and lights."""
+        grid = self._lit.grid
+        entering = self._seen @ environment_parts(scene.environment, self._lit.sky.directions)
+        inside = np.zeros((grid.count, 3))
+        for light in scene.lights:
+            if isinstance(light, PointLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
+                inside[cell] += 4.0 * np.pi * np.asarray(light.intensity)
+            else:
+                entering = entering + from_light(grid, self._lit.casters, light, self._medium.ior, self._interface)
+        found = self._system.solved(entering, self._itself, inside)
+        return _field(grid, self._medium, self._roughness, found)
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:

@@ -38,7 +38,7 @@ TOLERANCE = 1e-4
 MOST_STEPS = 4000
 
 #: First events above the depth at which the fluence is read, and below it, for each sample.
-EVENTS = 4
+EVENTS, DEEP_EVENTS = 4, 2
 
 #: Share of the light below which no first events are looked for.
 _NOTHING = 1e-3
@@ -103,50 +103,53 @@ class _Layer:
         return np.minimum(self.attenuation * depth, _DEEP)
 
 
-def surface_light(
-    grid: BodyGrid,
-    medium: Medium,
-    roughness: float,
-    entering: Array,
-    from_itself: sparse.csr_array,
-    inside: Array | None = None,
-) -> SurfaceLight:
-    """Solve for the light at a body's surface.
+class BodySystem:
+    """The linear systems of a body with a medium, ready for any light; each solution starts from the last one.
 
     Parameters
     ----------
     grid : BodyGrid
     medium : Medium
-        That scatters in every channel in which light enters, or not at all in one.
+        In channels in which it does not scatter nothing is found.
     roughness : float
         Of its surface.
-    entering : (s, 3)
-        Flux that enters at the samples from outside, in W/m^2.
-    from_itself : (s, s) csr_array
-        Flux that enters for the fluence at each sample.
-    inside : (cells, 3), optional
-        Power of lights inside each cell, in W.
-
-    Raises
-    ------
-    RenderError
-        If the solver does not get there.
     """
-    interface = diffuse_interface(medium.ior, roughness)
-    ways = _first_ways(grid, medium.ior)
-    fluence, flux = np.zeros_like(entering), entering.copy()
-    steps = 0
-    for channel in range(3):
-        absorption = float(np.asarray(medium.absorption)[channel])
-        scattering = float(np.asarray(medium.scattering)[channel]) * (1.0 - medium.anisotropy)
-        if scattering <= 0.0:
-            continue
-        emission = 4.0 * np.pi * float(np.asarray(medium.emission)[channel]) * grid.volumes
-        power = emission if inside is None else emission + inside[:, channel]
-        solver = _Channel(grid, interface, medium.ior, absorption, scattering, ways)
-        fluence[:, channel], flux[:, channel], taken = solver.solved(entering[:, channel], from_itself, power)
-        steps += taken
-    return SurfaceLight(fluence, flux, steps)
+
+    def __init__(self, grid: BodyGrid, medium: Medium, roughness: float) -> None:
+        self._grid = grid
+        self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
+        reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+        ways = _first_ways(grid, medium.ior)
+        self._channels = {
+            channel: _Channel(grid, medium.ior, roughness, float(absorption), float(scattering), ways)
+            for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
+            if scattering > 0.0
+        }
+
+    def solved(self, entering: Array, from_itself: sparse.csr_array, inside: Array) -> SurfaceLight:
+        """Light at the body's surface.
+
+        Parameters
+        ----------
+        entering : (s, 3)
+            Flux that enters at the samples from outside, in W/m^2.
+        from_itself : (s, s) csr_array
+            Flux that enters for the fluence at each sample.
+        inside : (cells, 3)
+            Power of lights inside each cell, in W.
+
+        Raises
+        ------
+        RenderError
+            If the solver does not get there.
+        """
+        fluence, flux = np.zeros_like(entering), entering.copy()
+        steps = 0
+        for channel, system in self._channels.items():
+            power = self._emitted[channel] * self._grid.volumes + inside[:, channel]
+            fluence[:, channel], flux[:, channel], taken = system.solved(entering[:, channel], from_itself, power)
+            steps += taken
+        return SurfaceLight(fluence, flux, steps)
 
 
 class _Channel:
@@ -155,13 +158,13 @@ class _Channel:
     def __init__(
         self,
         grid: BodyGrid,
-        interface: DiffuseInterface,
         ior: float,
+        roughness: float,
         absorption: float,
         scattering: float,
         ways: Array,
     ) -> None:
-        self._grid = grid
+        self._grid, interface = grid, diffuse_interface(ior, roughness)
         extinction = absorption + scattering
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
@@ -197,7 +200,7 @@ class _Channel:
             path = -(np.log(below) + np.log1p(-quantile)) / extinction
             there = grid.probe(grid.points + path[:, None] * ways)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of cells.
-            share = self._albedo / EVENTS * below * there.around
+            share = self._albedo / DEEP_EVENTS * below * there.around
             deep = deep + sparse.diags_array(share) @ there.weights
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
@@ -256,9 +259,9 @@ def _balance(grid: BodyGrid, d: float, absorption: float, lost: Array) -> sparse
 
 
 def _tails(samples: int) -> Array:
-    """(EVENTS, samples): quantiles of the paths below the depth of reading, other ones for each sample."""
+    """(DEEP_EVENTS, samples): quantiles of the paths below the depth of reading, other ones for each sample."""
     shift = (0.5 + 0.6180339887498949 * np.arange(samples)) % 1.0
-    return np.asarray((np.arange(EVENTS)[:, None] + shift) / EVENTS)
+    return np.asarray((np.arange(DEEP_EVENTS)[:, None] + shift) / DEEP_EVENTS)
 
 
 def _first_ways(grid: BodyGrid, ior: float) -> Array:

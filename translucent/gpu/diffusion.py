@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from typing import TypeVar
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.diffusion.field import DiffusionField, LitBody, diffusion_field, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
 from translucent.media.given_back import DiffusedMedium
+from translucent.media.medium import Medium
 from translucent.planning.scattering import Diffusion
 from translucent.scene.scene import Object, Scene
 
@@ -74,6 +76,7 @@ class DiffusionCache:
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
+        self._diffusing_bodies: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
         self._scenes: OrderedDict[Hashable, DiffusedLight] = OrderedDict()
 
     def of(self, scene: Scene, diffusion: Diffusion) -> DiffusedLight | None:
@@ -85,25 +88,23 @@ class DiffusionCache:
         bodies = tuple((_place(body := scene.objects[i]), m.original, _roughness(body)) for i, m in media.items())
         key = (diffusion, bodies, tuple(_place(item) for item in opaque), scene.environment, tuple(scene.lights))
         if key not in self._scenes:
-            fields = {}
-            for i, medium in media.items():
-                body = scene.objects[i]
-                lit = self._lit(body, opaque, diffusion.cell_size(body))
-                fields[i] = diffusion_field(lit, medium.original, _roughness(body), scene)
+            fields = {
+                i: self._diffusing(scene.objects[i], medium.original, opaque, diffusion).field(scene)
+                for i, medium in media.items()
+            }
             self._scenes[key] = DiffusedLight(self._gl, fields)
             if len(self._scenes) > KEPT_SCENES:
                 self._scenes.popitem(last=False)[1].texture.release()
         self._scenes.move_to_end(key)
         return self._scenes[key]
 
-    def _lit(self, body: Object, opaque: tuple[Object, ...], step: float) -> LitBody:
-        key = (_place(body), tuple(_place(item) for item in opaque), step)
-        if key not in self._bodies:
-            self._bodies[key] = lit_body(body, opaque, step)
-            if len(self._bodies) > KEPT_BODIES:
-                self._bodies.popitem(last=False)
-        self._bodies.move_to_end(key)
-        return self._bodies[key]
+    def _diffusing(
+        self, body: Object, medium: Medium, opaque: tuple[Object, ...], diffusion: Diffusion
+    ) -> DiffusingBody:
+        step, roughness = diffusion.cell_size(body), _roughness(body)
+        place = _place(body), tuple(_place(item) for item in opaque), step
+        lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step))
+        return _kept(self._diffusing_bodies, (place, medium, roughness), lambda: DiffusingBody(lit, medium, roughness))
 
     def release(self) -> None:
         """Free all textures."""
@@ -111,6 +112,7 @@ class DiffusionCache:
             light.texture.release()
         self._scenes.clear()
         self._bodies.clear()
+        self._diffusing_bodies.clear()
 
 
 def _place(item: Object) -> tuple[object, bytes]:
@@ -119,3 +121,16 @@ def _place(item: Object) -> tuple[object, bytes]:
 
 def _roughness(item: Object) -> float:
     return 0.0 if item.surface is None else item.surface.roughness
+
+
+_T = TypeVar("_T")
+
+
+def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T]) -> _T:
+    """What is stored for a key, made if it is missing; what was used longest ago goes."""
+    if key not in store:
+        store[key] = make()
+        if len(store) > KEPT_BODIES:
+            store.popitem(last=False)
+    store.move_to_end(key)
+    return store[key]
