@@ -9,6 +9,7 @@ import numpy as np
 
 from translucent.arrays import Integers
 from translucent.cpu.caster import Caster
+from translucent.cpu.diffused import DiffusedLight
 from translucent.cpu.facets import Spread
 from translucent.cpu.picture import Band
 from translucent.cpu.shading import Arrays, Shader, on_rays
@@ -34,14 +35,16 @@ class BentLight:
     bending: tuple[int, ...]
 
     @classmethod
-    def of(cls, shader: Shader, caster: Caster, size: tuple[int, int], depth: int, forks: int) -> BentLight:
+    def of(
+        cls, shader: Shader, caster: Caster, size: tuple[int, int], tree: tuple[int, int], diffused: DiffusedLight
+    ) -> BentLight:
         """Light for pictures of this size; `caster` has the objects of the shader's scene.
 
-        `depth` and `forks` as of `TracedInterfaces`.
+        `tree`: depth and forks, as of `TracedInterfaces`.
         """
         scene = shader.scene
-        tree = RayTree(scene, shader.sheets, caster, size[0] / size[1], depth, forks)
-        return cls(tree, tuple(i for i, body in enumerate(scene.objects) if body.has_interface))
+        rays = RayTree(scene, shader.sheets, caster, size[0] / size[1], *tree, diffused)
+        return cls(rays, tuple(i for i, body in enumerate(scene.objects) if body.has_interface))
 
     def put_into(self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], band: Band, spread: Spread | None) -> None:
         """Replace radiance and validity of those rays that bend; parameters as for `Shader.shade` and `RayTree.see`."""

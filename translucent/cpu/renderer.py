@@ -13,17 +13,20 @@ import numpy.typing as npt
 
 from translucent.cpu.bending import BentLight
 from translucent.cpu.caster import Caster
+from translucent.cpu.diffused import DiffusedLight
 from translucent.cpu.facets import Spread
 from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.shading import Arrays, Shader
 from translucent.cpu.threads import in_threads, processors
+from translucent.diffusion.cache import FieldCache
 from translucent.errors import RenderError
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.geometry.embree import embree_versions
 from translucent.geometry.mesh import Mesh
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.scattering.choice import shown
 from translucent.reference.refraction import bends
 from translucent.scene.scene import Scene
 
@@ -60,6 +63,7 @@ class CpuRenderer:
         self._embree = embree_versions()
         self._meshes: WeakKeyDictionary[Mesh, TracedMesh] = WeakKeyDictionary()
         self._caster: tuple[_Shapes, Caster] | None = None
+        self._fields = FieldCache()
         self._closed = False
 
     @property
@@ -101,6 +105,7 @@ class CpuRenderer:
         if self._closed:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
         started = time.perf_counter()
+        scene = shown(scene, plan.given_back)
         shader = Shader.of(scene, plan)
         picture = Picture.of(scene.camera, size)
         arrays = _empty(picture.size)
@@ -121,6 +126,7 @@ class CpuRenderer:
         """Free the cached meshes. Closing twice is fine."""
         self._closed = True
         self._meshes.clear()
+        self._fields.clear()
         self._caster = None
 
     def _bent_light(self, shader: Shader, picture: Picture, plan: RenderPlan) -> BentLight | None:
@@ -131,7 +137,8 @@ class CpuRenderer:
         shapes = tuple((body.mesh, body.matrix.tobytes()) for body in scene.objects)
         if self._caster is None or self._caster[0] != shapes:
             self._caster = shapes, Caster(scene.objects, scene.bounds)
-        return BentLight.of(shader, self._caster[1], picture.size, *plan.interfaces.tree)
+        diffused = DiffusedLight(self._fields.of(scene, plan.given_back.diffusion))
+        return BentLight.of(shader, self._caster[1], picture.size, plan.interfaces.tree, diffused)
 
     def _draw(
         self,

@@ -16,6 +16,7 @@ import numpy as np
 from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.beams import Beams, joined
 from translucent.cpu.caster import Caster
+from translucent.cpu.diffused import DiffusedLight
 from translucent.cpu.facets import Spread
 from translucent.cpu.interface_light import InterfaceLight
 from translucent.cpu.legs import LegMedia
@@ -70,12 +71,22 @@ class RayTree:
         Interfaces that a path meets, at most.
     forks : int
         How often a path takes the weaker branch, at most.
+    diffused : DiffusedLight
+        Of the bodies of the scene.
     """
 
     def __init__(
-        self, scene: Scene, sheets: Sequence[float | None], caster: Caster, aspect: float, depth: int, forks: int
+        self,
+        scene: Scene,
+        sheets: Sequence[float | None],
+        caster: Caster,
+        aspect: float,
+        depth: int,
+        forks: int,
+        diffused: DiffusedLight,
     ) -> None:
         self.scene, self.caster, self.depth, self.forks = scene, caster, depth, forks
+        self.diffused = diffused
         self.surroundings = Surroundings(scene, aspect)
         dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
         self._channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
@@ -269,6 +280,11 @@ class _Growth:
         self._add(beams, self.light.radiance(self._rays(beams), met))
         beams = replace(beams, met=beams.met + 1)
         back, on = self._both(beams, there, met, places.before == places.after)
+        if self.tree.diffused:
+            for branch in (back, on):
+                points = self._rays(branch).origins + self.scene.camera.eye
+                body = self.media.dominant(branch.record)
+                self._add(branch, self.tree.diffused.radiance(body, points, branch.directions, met.normals))
         brightness = largest(back.throughput), largest(on.throughput)
         is_back, is_on = (bright > 0.0 for bright in brightness)
         stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import map_coordinates, uniform_filter
 
 from translucent.arrays import Array
 from translucent.diffusion.entering import (
@@ -22,12 +22,17 @@ from translucent.diffusion.entering import (
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem, SurfaceLight
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
+from translucent.formulas.diffusion import emergent_radiance
 from translucent.media.medium import Medium
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Object, Scene
 
 #: Cells by which values at the surface are spread beyond the cells that it crosses.
 SPREAD = 3
+
+#: Share by which light that has entered just now can darken the rest, at most: where the two do not fit together, as
+#: beside the edge of a shadow.
+FRESH = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +57,8 @@ class DiffusionField:
         Iterations of the solver.
     cells : int
         In the system.
+    ior : float
+        Of the medium.
     """
 
     fluence: npt.NDArray[np.float32]
@@ -65,6 +72,35 @@ class DiffusionField:
     fluxes: tuple[float, float, float, float]
     steps: int
     cells: int
+    ior: float
+
+    def radiance(self, points: Array, cosine: Array) -> Array:
+        """(k, 3): basic radiance L / n^2 inside the body, below points of its surface and towards it.
+
+        The same as ``shaders/shade/diffused_light.glsl``.
+
+        Parameters
+        ----------
+        points : (k, 3) float64
+            In metres.
+        cosine : (k,) float64
+            Of the directions there, inside.
+        """
+        place = ((points - self.low) / self.step - 0.5).T
+        fluence, entering = (
+            np.stack([map_coordinates(values[..., i], place, order=1, mode="nearest") for i in range(3)], axis=1)
+            for values in (self.fluence, self.entering)
+        )
+        uniform, rising, fresh, shadowed = self.fluxes
+        steady = uniform + self.conductance * rising
+        with np.errstate(under="ignore"):
+            entering = np.minimum(entering.astype(np.float64), FRESH * steady / shadowed * fluence)
+            light = emergent_radiance(
+                fluence, entering, self.albedo, self.conductance, self.mean_cosine, cosine[:, None]
+            )
+            flux = self.albedo * (fluence * steady - entering * shadowed) + entering * fresh
+            scaled = light * self.exit_share * fluence / np.maximum(flux, 1e-30)
+            return np.asarray(np.maximum(scaled, 0.0) / (4.0 * np.pi * self.ior**2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +187,7 @@ def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight
         fluxes=emergent_fluxes(medium.ior, polished.mean_cosine),
         steps=found.steps,
         cells=grid.count,
+        ior=medium.ior,
     )
 
 

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from typing import TypeVar
-
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
-from translucent.media.given_back import DiffusedMedium
-from translucent.media.medium import Medium
+from translucent.diffusion.cache import FieldCache
+from translucent.diffusion.field import DiffusionField
 from translucent.planning.scattering import Diffusion
-from translucent.scene.scene import Object, Scene
-
-#: Geometries of bodies, and lit scenes, that are kept.
-KEPT_BODIES, KEPT_SCENES = 16, 4
+from translucent.scene.scene import Scene
 
 
 class DiffusedLight:
@@ -71,66 +63,28 @@ class DiffusedLight:
 
 
 class DiffusionCache:
-    """Diffused light of the last scenes."""
+    """Textures of the diffused light of the last scene."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
-        self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
-        self._diffusing_bodies: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
-        self._scenes: OrderedDict[Hashable, DiffusedLight] = OrderedDict()
+        self._fields = FieldCache()
+        self._last: DiffusedLight | None = None
 
     def of(self, scene: Scene, diffusion: Diffusion) -> DiffusedLight | None:
         """Diffused light of a scene whose media are marked, None where there is none."""
-        media = {i: body.medium for i, body in enumerate(scene.objects) if isinstance(body.medium, DiffusedMedium)}
-        if not media:
+        if not (fields := self._fields.of(scene, diffusion)):
             return None
-        opaque = tuple(scene.opaque)
-        bodies = tuple((_place(body := scene.objects[i]), m.original, _roughness(body)) for i, m in media.items())
-        key = (diffusion, bodies, tuple(_place(item) for item in opaque), scene.environment, tuple(scene.lights))
-        if key not in self._scenes:
-            fields = {
-                i: self._diffusing(scene.objects[i], medium.original, opaque, diffusion).field(scene)
-                for i, medium in media.items()
-            }
-            self._scenes[key] = DiffusedLight(self._gl, fields)
-            if len(self._scenes) > KEPT_SCENES:
-                self._scenes.popitem(last=False)[1].texture.release()
-        self._scenes.move_to_end(key)
-        return self._scenes[key]
-
-    def _diffusing(
-        self, body: Object, medium: Medium, opaque: tuple[Object, ...], diffusion: Diffusion
-    ) -> DiffusingBody:
-        step, roughness = diffusion.cell_size(body), _roughness(body)
-        place = _place(body), tuple(_place(item) for item in opaque), step
-        lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step))
-        return _kept(self._diffusing_bodies, (place, medium, roughness), lambda: DiffusingBody(lit, medium, roughness))
+        if self._last is None or self._last.fields is not fields:
+            self._release_last()
+            self._last = DiffusedLight(self._gl, fields)
+        return self._last
 
     def release(self) -> None:
-        """Free all textures."""
-        for light in self._scenes.values():
-            light.texture.release()
-        self._scenes.clear()
-        self._bodies.clear()
-        self._diffusing_bodies.clear()
+        """Free the texture."""
+        self._release_last()
+        self._fields.clear()
 
-
-def _place(item: Object) -> tuple[object, bytes]:
-    return item.mesh, item.matrix.tobytes()
-
-
-def _roughness(item: Object) -> float:
-    return 0.0 if item.surface is None else item.surface.roughness
-
-
-_T = TypeVar("_T")
-
-
-def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T]) -> _T:
-    """What is stored for a key, made if it is missing; what was used longest ago goes."""
-    if key not in store:
-        store[key] = make()
-        if len(store) > KEPT_BODIES:
-            store.popitem(last=False)
-    store.move_to_end(key)
-    return store[key]
+    def _release_last(self) -> None:
+        if self._last is not None:
+            self._last.texture.release()
+            self._last = None

@@ -55,7 +55,7 @@ def plan(
     check_interfaces(interfaces)
     check_scattering(scattering)
     capabilities = capabilities or Capabilities()
-    if capabilities.opengl and (back := given_back(scene, scattering)):
+    if back := given_back(scene, scattering, layers=capabilities.opengl):
         once = SingleScattering()
         found = plan(shown(scene, back), method, capabilities, interfaces=interfaces, scattering=once)
         return with_given_back_told(found, scene, back)

@@ -59,11 +59,11 @@ def check_scattering(scattering: object) -> None:
     )
 
 
-def given_back(scene: Scene, asked: Scattering | None) -> GivenBack:
+def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True) -> GivenBack:
     """Bodies that give back what they scatter many times, and how.
 
     Unless something is asked for, bodies without interfaces, as fog and smoke are, do not, nor do those in which little
-    is scattered.
+    is scattered. Without `layers` nothing is shown as a layer.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def given_back(scene: Scene, asked: Scattering | None) -> GivenBack:
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
     layer = ScatteringLayer()
     layered = tuple(
-        i for i, body in bodies.items() if (i in refused or wanted == layer) and layer.refusal(body) is None
+        i for i, body in bodies.items() if layers and (i in refused or wanted == layer) and layer.refusal(body) is None
     )
     if asked is not None and bodies and len(refused) == len(bodies) and wanted == layer:
         i, why = next(iter(refused.items()))

@@ -1,0 +1,38 @@
+"""Light that leaves bodies in which it has diffused, for rays inside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from translucent.arrays import Array, Integers
+from translucent.cpu.vectors import dot
+from translucent.diffusion.field import DiffusionField
+
+
+class DiffusedLight:
+    """Diffused light of the bodies of a scene.
+
+    Parameters
+    ----------
+    fields : mapping of int to DiffusionField
+        By the number of the object.
+    """
+
+    def __init__(self, fields: Mapping[int, DiffusionField]) -> None:
+        self._fields = dict(fields)
+
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self._fields)
+
+    def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
+        """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,)."""
+        found = np.zeros(points.shape)
+        cosine = np.abs(dot(directions, normals))
+        for number, field in self._fields.items():
+            own = np.flatnonzero(body == number)
+            if own.size:
+                found[own] = field.radiance(points[own], cosine[own])
+        return found

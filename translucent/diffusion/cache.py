@@ -1,0 +1,75 @@
+"""Diffused light of the last scenes, made anew only where the light, a medium or a mesh changes."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import TypeVar
+
+from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
+from translucent.media.given_back import DiffusedMedium
+from translucent.media.medium import Medium
+from translucent.planning.scattering import Diffusion
+from translucent.scene.scene import Object, Scene
+
+#: Bodies, and lit scenes, that are kept.
+KEPT_BODIES, KEPT_SCENES = 16, 4
+
+_T = TypeVar("_T")
+
+
+class FieldCache:
+    """Diffused light of scenes whose media are marked (`DiffusedMedium`)."""
+
+    def __init__(self) -> None:
+        self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
+        self._diffusing: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
+        self._scenes: OrderedDict[Hashable, dict[int, DiffusionField]] = OrderedDict()
+
+    def of(self, scene: Scene, diffusion: Diffusion) -> dict[int, DiffusionField]:
+        """Light of each such body by its number; the same object until something changes it."""
+        media = {i: body.medium for i, body in enumerate(scene.objects) if isinstance(body.medium, DiffusedMedium)}
+        if not media:
+            return {}
+        opaque = tuple(scene.opaque)
+        bodies = tuple((_place(body := scene.objects[i]), m.original, _roughness(body)) for i, m in media.items())
+        lights = scene.environment, tuple(scene.lights)
+        key = (diffusion, tuple(media), bodies, tuple(_place(item) for item in opaque), lights)
+
+        def make() -> dict[int, DiffusionField]:
+            return {
+                i: self._body(scene.objects[i], medium.original, opaque, diffusion).field(scene)
+                for i, medium in media.items()
+            }
+
+        return _kept(self._scenes, key, make, KEPT_SCENES)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        for store in (self._bodies, self._diffusing, self._scenes):
+            store.clear()
+
+    def _body(self, body: Object, medium: Medium, opaque: tuple[Object, ...], diffusion: Diffusion) -> DiffusingBody:
+        step, roughness = diffusion.cell_size(body), _roughness(body)
+        place = _place(body), tuple(_place(item) for item in opaque), step
+        lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
+        key = (place, medium, roughness)
+        return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)
+
+
+def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:
+    """What is stored for a key, made if it is missing; what was used longest ago goes."""
+    if key not in store:
+        store[key] = make()
+        if len(store) > most:
+            store.popitem(last=False)
+    store.move_to_end(key)
+    return store[key]
+
+
+def _place(item: Object) -> tuple[object, bytes]:
+    return item.mesh, item.matrix.tobytes()
+
+
+def _roughness(item: Object) -> float:
+    return 0.0 if item.surface is None else item.surface.roughness
