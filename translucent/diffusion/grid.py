@@ -210,6 +210,11 @@ def plane_points(count: int) -> Array:
     return np.asarray((0.5 + np.arange(count)[:, None] * [0.7548776662466927, 0.5698402909980532]) % 1.0)
 
 
+def other_plane_points(count: int) -> Array:
+    """(count, 2): another such recurrence, to be drawn together with `plane_points`: neither tells of the other."""
+    return np.asarray((0.5 + np.arange(count)[:, None] * [0.6287067210378087, 0.5385972572236101]) % 1.0)
+
+
 def _rows(matrix: sparse.csr_array, taken: npt.NDArray[np.bool_]) -> sparse.csr_array:
     """The matrix with all other rows set to 0."""
     return sparse.csr_array(sparse.diags_array(taken.astype(np.float64)) @ matrix)

@@ -20,7 +20,7 @@ from scipy import sparse
 from scipy.sparse.linalg import cg
 
 from translucent.arrays import Array
-from translucent.diffusion.grid import BodyGrid, plane_points
+from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
@@ -250,7 +250,8 @@ def _balance(grid: BodyGrid, d: float, absorption: float, lost: Array) -> sparse
 
 def _first_ways(grid: BodyGrid, ior: float) -> Array:
     """(s, 3): a direction inside for each sample, as uniform light from outside has them."""
-    first, second = plane_points(len(grid.points)).T
+    # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
+    first, second = other_plane_points(len(grid.points)).T
     cosine = optics.refracted_cosine(np.sqrt(first), ior)
     normal = grid.face_normals
     aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
