@@ -51,8 +51,8 @@ def shares(albedo: float, depth: float, ior: float) -> tuple[float, float]:
     mirror = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
     flux = mu * weight
     found = []
-    unscattered = np.zeros((len(mu), len(mu))), np.diag(np.exp(-depth / mu))
     with np.errstate(under="ignore"):
+        unscattered = np.zeros((len(mu), len(mu))), np.diag(np.exp(-depth / mu))
         for back, on in (bare(albedo, depth, mu, weight), unscattered):
             # Radiance inward at both faces, which are mirrors: d1 = in + m (back d1 + on d2), d2 = m (on d1 + back d2).
             n = len(mu)

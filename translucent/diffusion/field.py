@@ -28,6 +28,9 @@ from translucent.scene.scene import Object, Scene
 #: Cells by which values at the surface are spread beyond the cells that it crosses.
 SPREAD = 3
 
+#: Share of a cell that is inside from which all of it is.
+_WHOLE = 1.0 - 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class DiffusionField:
@@ -89,6 +92,7 @@ def lit_body(body: Object, opaque: tuple[Object, ...], step: float) -> LitBody:
     return LitBody(grid, casters, sky_of(grid, casters))
 
 
+@np.errstate(under="ignore")
 def diffusion_field(lit: LitBody, medium: Medium, roughness: float, scene: Scene) -> DiffusionField:
     """Light that a body with this medium gives back in a scene, for its environment and lights."""
     grid, interface = lit.grid, diffuse_interface(medium.ior, roughness)
@@ -107,10 +111,14 @@ def diffusion_field(lit: LitBody, medium: Medium, roughness: float, scene: Scene
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
-    """Number of the cell at a point, -1 outside."""
+    """Number of the cell at a point, -1 outside the body; where the surface crosses a cell, a sample near tells."""
     place = np.floor((point - grid.cells.low) / grid.cells.step).astype(int)
     if (place < 0).any() or (place >= grid.number.shape).any():
         return -1
+    if grid.cells.inside[tuple(place)] < _WHOLE:
+        nearest = int(((grid.points - point) ** 2).sum(axis=1).argmin())
+        if (point - grid.points[nearest]) @ grid.face_normals[nearest] > 0.0:
+            return -1
     return int(grid.number[tuple(place)])
 
 

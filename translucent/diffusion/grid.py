@@ -127,6 +127,13 @@ class BodyGrid:
             volume += probe.weights.T @ (self.area * depth / len(_LAYER_PLACES))
         return volume
 
+    @cached_property
+    def cores(self) -> Array:
+        """(cells,): volume in m^3 of each cell without its layers; with these, all are the volume of the body."""
+        rest = np.maximum(self.volumes - self.layers, 0.0)
+        wanted = self.volumes.sum() - self.area * self.below[1].sum()
+        return np.asarray(rest * min(max(wanted, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
+
     def probe(self, points: Array) -> Probe:
         """Linear interpolation at points (k, 3), in metres, from the cells around each as far as they are inside."""
         place = (points - self.cells.low) / self.cells.step - 0.5
