@@ -43,15 +43,16 @@ vec3 multiple_reflectance(vec3 absorption_depth, vec3 scattering_depth) {
     return max(two_stream_reflectance(absorption_depth, scattering_depth) - once, vec3(0.0));
 }
 
-// A layer between two interfaces that mirror the share r of diffuse light from inside: (1 - r) (U+ +- U-) / 2.
+// A layer between two interfaces that mirror the share r of diffuse light from inside, any number of times.
 vec3 mirrored_reflectance(vec3 reflectance, vec3 transmittance, float mirrored) {
-    vec3 even = reflectance + transmittance;
-    vec3 odd = reflectance - transmittance;
-    return 0.5 * (1.0 - mirrored) * (even / (1.0 - mirrored * even) + odd / (1.0 - mirrored * odd));
+    vec3 alike = 1.0 - mirrored * (reflectance + transmittance);
+    vec3 opposite = 1.0 - mirrored * (reflectance - transmittance);
+    vec3 turned = reflectance * (1.0 - mirrored * reflectance) + mirrored * transmittance * transmittance;
+    return (1.0 - mirrored) * turned / (alike * opposite);
 }
 
 vec3 mirrored_transmittance(vec3 reflectance, vec3 transmittance, float mirrored) {
-    vec3 even = reflectance + transmittance;
-    vec3 odd = reflectance - transmittance;
-    return 0.5 * (1.0 - mirrored) * (even / (1.0 - mirrored * even) - odd / (1.0 - mirrored * odd));
+    vec3 alike = 1.0 - mirrored * (reflectance + transmittance);
+    vec3 opposite = 1.0 - mirrored * (reflectance - transmittance);
+    return (1.0 - mirrored) * transmittance / (alike * opposite);
 }

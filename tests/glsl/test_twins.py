@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import shader_library
-from translucent.formulas import color, interface, optics, tone, two_stream
+from translucent.formulas import color, diffusion, interface, optics, tone, two_stream
 from translucent.gpu.probe import run_function, signatures
 from translucent.media import density
 from translucent.scene import camera, environment
@@ -19,6 +19,7 @@ MODULES: dict[str, ModuleType] = {
     "optics": optics,
     "interface": interface,
     "two_stream": two_stream,
+    "diffusion": diffusion,
     "color": color,
     "density": density,
     "environment": environment,
@@ -112,6 +113,31 @@ def _layer_arguments() -> list[np.ndarray]:
     return [np.stack([k, np.roll(k, 7), k], axis=1), np.stack([s, np.roll(s, 7), s], axis=1)]
 
 
+def _mirrored_arguments() -> list[np.ndarray]:
+    """Layers with and without losses, between interfaces up to those of ior 4."""
+    lossless = np.array([0.0, 1e-30, 1e-6, 1e-3, 0.1, 0.5, 0.9, 0.999, 1.0])
+    back, kept, mirrored = _mixed(
+        lossless, np.array([0.0, 1e-7, 0.3, 0.99, 1.0]), np.array([0.0, 1e-7, 0.3, 0.6, 0.95])
+    )
+    through = ((1.0 - back.astype(np.float64)) * kept).astype(np.float32)
+    return [
+        np.stack([back, np.roll(back, 225), back], axis=1),
+        np.stack([through, 0 * back, through], axis=1),
+        mirrored,
+    ]
+
+
+def _emergent_arguments() -> list[np.ndarray]:
+    """From darkness to the light of the sun, along the surface and straight out of it."""
+    light = np.array([0.0, 1e-30, 1e-3, 1.0, 1e5])
+    fluence, entering, albedo, cosine = _mixed(
+        light, light, np.array([0.0, 0.3, 1.0]), np.array([0, 1e-6, 0.3, 0.9, 1])
+    )
+    conductance = np.resize(np.float32([0.01, 0.2, 0.5]), len(cosine))
+    mean_cosine = np.resize(np.float32([2 / 3, 0.85, 0.97, 1.0]), len(cosine))
+    return [_triples(fluence), _triples(entering), _triples(albedo), conductance, mean_cosine, cosine]
+
+
 def _turned_arguments() -> list[np.ndarray]:
     directions, turns = _unit_vectors(), np.array([0.0, 0.25, -0.7, 3.0], np.float32)
     directions = np.concatenate([directions, np.float32([[0, 1, 0], [0, -1, 0], [0, 0, -1], [1, 0, 0], [0, 1, 1e-18]])])
@@ -174,6 +200,9 @@ ARGUMENTS = {
         ),
         _layer_arguments(),
     ),
+    "mirrored_reflectance": _mirrored_arguments(),
+    "mirrored_transmittance": _mirrored_arguments(),
+    "emergent_radiance": _emergent_arguments(),
     "srgb_to_linear": [_triples(np.linspace(-1, 2, 301))],
     "linear_to_srgb": [_triples(np.concatenate([np.linspace(-1, 2, 301), np.geomspace(1e-9, 1, 60)]))],
     "luminance": [_triples(UNIT)],
@@ -254,6 +283,16 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     if name == "two_stream_transmittance":
         depth = two_stream.two_stream_depth(*arguments)
         allowed = allowed + eps * np.minimum(depth, 200.0) * exact * 4
+    if name.startswith("mirrored_"):
+        # Each share is divided by 1 - r (R +- T), which is good to a rounding of 1.
+        back, through, mirrored = arguments
+        left = np.stack([1.0 - mirrored * (back + through), 1.0 - mirrored * (back - through)])
+        allowed = allowed + 4 * eps * (np.abs(exact) / left).sum(axis=0)
+    if name == "emergent_radiance":
+        # Terms of both signs: a few roundings of the largest.
+        fluence, entering, albedo, conductance, mean_cosine, cosine = arguments
+        once = entering / (cosine + mean_cosine)
+        allowed = allowed + 8 * eps * (albedo * (fluence * (1.0 + 3.0 * conductance * cosine) + 3.0 * once) + once)
     if name == "emitted_radiance":
         allowed = allowed + 1e-37
     if name.startswith("exponential_density"):
@@ -274,7 +313,7 @@ def test_function_equals_its_twin(renderer: tl.Renderer, library: str, name: str
     with renderer.gpu.context.current() as gl:
         found = run_function(gl, f"lib/{library}.glsl", signature, *arguments).astype(np.float64)
     wide = [a.astype(np.float64) for a in arguments]
-    if (library in {"optics", "two_stream"} or name.startswith("slab_")) and signature.returns == "vec3":
+    if (library in {"optics", "two_stream", "diffusion"} or name.startswith("slab_")) and signature.returns == "vec3":
         wide = [a[:, None] if a.ndim == 1 else a for a in wide]
     with np.errstate(under="ignore"):
         exact = np.asarray(getattr(MODULES[library], name)(*wide))

@@ -109,6 +109,37 @@ def test_coefficients_of_a_medium() -> None:
     assert two_stream.two_stream_scattering([4.0, 8.0], 0.5).tolist() == [1.5, 3.0]
 
 
+@np.errstate(under="ignore")
+@given(st.floats(0, 1), st.floats(0, 1), st.floats(0, 0.95))
+def test_interfaces_mirror_light_back_to_a_layer(back: float, kept: float, mirrored: float) -> None:
+    """Pass by pass: what goes up and down in the layer, of which 1 - r leaves each time."""
+    on = (1.0 - back) * kept
+    up, down = back, on
+    leaving = np.zeros(2)
+    # After n passes r^n (R + T)^n / (1 - r) is left at most: 0.95^700 / 0.05 = 5e-15.
+    for _ in range(700):
+        leaving += (1.0 - mirrored) * np.array([up, down])
+        up, down = (mirrored * (back * a + on * b) for a, b in ((up, down), (down, up)))
+        if up + down < 1e-300:
+            break
+    found = [
+        float(share(back, on, mirrored))
+        for share in (two_stream.mirrored_reflectance, two_stream.mirrored_transmittance)
+    ]
+    # Sums of 700 terms round 700 times, and 1 - r (R + T) is a difference as small as 1 / 20.
+    assert found == pytest.approx(leaving.tolist(), rel=700 * EPS, abs=1e-14)
+    assert sum(found) <= 1 + 40 * EPS
+
+
+@given(st.floats(0, 1), st.floats(0, 0.95))
+def test_lossless_layers_lose_nothing_between_mirrors(back: float, mirrored: float) -> None:
+    shares = [
+        float(share(back, 1.0 - back, mirrored))
+        for share in (two_stream.mirrored_reflectance, two_stream.mirrored_transmittance)
+    ]
+    assert sum(shares) == pytest.approx(1.0, abs=40 * EPS)
+
+
 @pytest.mark.parametrize(("albedo", "reduced", "anisotropy"), [(0.99, 1.0, 0.0), (0.95, 4.0, 0.7), (0.9, 2.0, 0.0)])
 def test_a_wide_slab_in_diffuse_light(albedo: float, reduced: float, anisotropy: float) -> None:
     """Reflectance and transmittance of a slab 1 m thick, by path tracing over the angles of view."""

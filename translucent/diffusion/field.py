@@ -34,6 +34,9 @@ SPREAD = 3
 #: beside the edge of a shadow.
 FRESH = 0.8
 
+#: Share of a cell that is inside from which all of it is.
+_WHOLE = 1.0 - 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class DiffusionField:
@@ -137,6 +140,7 @@ class DiffusingBody:
         Of its surface.
     """
 
+    @np.errstate(under="ignore")
     def __init__(self, lit: LitBody, medium: Medium, roughness: float) -> None:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
@@ -146,6 +150,7 @@ class DiffusingBody:
         self._seen = (shares * lit.sky.seen).astype(np.float32)
         self._system = BodySystem(lit.grid, medium, roughness)
 
+    @np.errstate(under="ignore")
     def field(self, scene: Scene) -> DiffusionField:
         """Light that the body gives back in a scene, for its environment and lights."""
         grid = self._lit.grid
@@ -161,10 +166,14 @@ class DiffusingBody:
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
-    """Number of the cell at a point, -1 outside."""
+    """Number of the cell at a point, -1 outside the body; where the surface crosses a cell, a sample near tells."""
     place = np.floor((point - grid.cells.low) / grid.cells.step).astype(int)
     if (place < 0).any() or (place >= grid.number.shape).any():
         return -1
+    if grid.cells.inside[tuple(place)] < _WHOLE:
+        nearest = int(((grid.points - point) ** 2).sum(axis=1).argmin())
+        if (point - grid.points[nearest]) @ grid.face_normals[nearest] > 0.0:
+            return -1
     return int(grid.number[tuple(place)])
 
 

@@ -137,6 +137,13 @@ class BodyGrid:
         read = np.bincount(part, np.asarray(self.below[0].sum(axis=0)), parts) > 0.0
         return np.asarray(~read[part])
 
+    @cached_property
+    def cores(self) -> Array:
+        """(cells,): volume in m^3 of each cell without its layers; with these, all are the volume of the body."""
+        rest = np.maximum(self.volumes - self.layers, 0.0)
+        wanted = self.volumes.sum() - self.area * self.below[1].sum()
+        return np.asarray(rest * min(max(wanted, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))
+
     def probe(self, points: Array) -> Probe:
         """Linear interpolation at points (k, 3), in metres, from the cells around each as far as they are inside."""
         place = (points - self.cells.low) / self.cells.step - 0.5
@@ -218,6 +225,11 @@ def _surface_samples(triangles: Array, density: float) -> tuple[Array, Array, In
 def plane_points(count: int) -> Array:
     """(count, 2): additive recurrence over the unit square (Roberts 2018, "quasirandom sequences")."""
     return np.asarray((0.5 + np.arange(count)[:, None] * [0.7548776662466927, 0.5698402909980532]) % 1.0)
+
+
+def other_plane_points(count: int) -> Array:
+    """(count, 2): another such recurrence, to be drawn together with `plane_points`: neither tells of the other."""
+    return np.asarray((0.5 + np.arange(count)[:, None] * [0.6287067210378087, 0.5385972572236101]) % 1.0)
 
 
 def _rows(matrix: sparse.csr_array, taken: npt.NDArray[np.bool_]) -> sparse.csr_array:

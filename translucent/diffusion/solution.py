@@ -20,7 +20,7 @@ from scipy import sparse
 from scipy.sparse.linalg import cg
 
 from translucent.arrays import Array
-from translucent.diffusion.grid import BodyGrid, plane_points
+from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
@@ -49,9 +49,6 @@ MOST_BOUNCES, ENOUGH = 24, 1e-3
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
-#: Largest argument of exponentials: beyond it nothing is left.
-_DEEP = 40.0
-
 
 @dataclass(frozen=True)
 class SurfaceLight:
@@ -77,7 +74,8 @@ class _Layer:
     """One-dimensional solutions between the surface (depth 0) and the depth at which the fluence is read, per sample.
 
     u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
-    the flux to the surface D u' / u times it.
+    the flux to the surface D u' / u times it. All are given times exp(-k d), d the depth of reading, so that nothing
+    overflows however dense the medium.
     """
 
     depth: Array
@@ -85,22 +83,28 @@ class _Layer:
     condition: float
 
     def u(self, depth: Array) -> Array:
-        """Solution without a source, 1 at the surface: cosh(k z) + c / D sinh(k z) / k."""
-        return np.asarray(np.cosh(self._bounded(depth)) + self.condition * self.rise(depth))
+        """Solution without a source: cosh(k z) + c / D sinh(k z) / k."""
+        return np.asarray(self._cosh(depth) + self.condition * self.rise(depth))
 
     def slope(self) -> Array:
         """u' at the depth of reading."""
-        return np.asarray(
-            self.attenuation**2 * self.rise(self.depth) + self.condition * np.cosh(self._bounded(self.depth))
-        )
+        return np.asarray(self.attenuation**2 * self.rise(self.depth) + self.condition * self._cosh(self.depth))
 
     def rise(self, depth: Array) -> Array:
         """sinh(k z) / k, z where nothing is absorbed."""
-        x = self._bounded(depth)
-        return np.asarray(np.where(x > 1e-4, np.sinh(x) / np.maximum(x, 1e-4), 1.0 + x * x / 6.0) * depth)
+        both_ways = optics.mean_transmittance(2.0 * self.attenuation * depth)
+        return np.asarray(self._from(depth) * depth * both_ways)
 
-    def _bounded(self, depth: Array) -> Array:
-        return np.minimum(self.attenuation * depth, _DEEP)
+    def bend(self) -> Array:
+        """(cosh(k d) - 1) / k^2 at the depth of reading, d^2 / 2 where nothing is absorbed."""
+        return np.asarray(0.5 * (self.depth * optics.mean_transmittance(self.attenuation * self.depth)) ** 2)
+
+    def _cosh(self, depth: Array) -> Array:
+        return 0.5 * self._from(depth) * (1.0 + optics.transmittance(2.0 * self.attenuation * depth))
+
+    def _from(self, depth: Array) -> Array:
+        """exp(k (z - d))."""
+        return np.asarray(optics.transmittance(self.attenuation * np.maximum(self.depth - depth, 0.0)))
 
 
 class BodySystem:
@@ -115,8 +119,8 @@ class BodySystem:
         Of its surface.
     """
 
+    @np.errstate(under="ignore")
     def __init__(self, grid: BodyGrid, medium: Medium, roughness: float) -> None:
-        self._grid = grid
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         ways = _first_ways(grid, medium.ior)
@@ -126,6 +130,7 @@ class BodySystem:
             if scattering > 0.0
         }
 
+    @np.errstate(under="ignore")
     def solved(self, entering: Array, from_itself: sparse.csr_array, inside: Array) -> SurfaceLight:
         """Light at the body's surface.
 
@@ -146,8 +151,9 @@ class BodySystem:
         fluence, flux = np.zeros_like(entering), entering.copy()
         steps = 0
         for channel, system in self._channels.items():
-            power = self._emitted[channel] * self._grid.volumes + inside[:, channel]
-            fluence[:, channel], flux[:, channel], taken = system.solved(entering[:, channel], from_itself, power)
+            emission = float(self._emitted[channel])
+            found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission)
+            fluence[:, channel], flux[:, channel], taken = found
             steps += taken
         return SurfaceLight(fluence, flux, steps)
 
@@ -170,12 +176,17 @@ class _Channel:
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below
         layer = _Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
-        at_depth = layer.u(depth)
-        self._attenuated = 1.0 / at_depth
+        self._relative = 1.0 / layer.u(depth)
+        self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
         # What of the entering light the exact half-space gives back less than diffusion would.
         self._excess = _half_space_excess(self._albedo, ior) / diffuse_interface(ior).conductance
         self._sources(layer, interface, extinction, ways, d)
-        lost = grid.area * d * layer.slope() * self._attenuated
+        # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
+        # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
+        self._glow_near = layer.bend() / d * self._relative
+        below = grid.area * (layer.rise(depth) + layer.condition * layer.bend()) * self._relative
+        self._glow_cells = grid.cores + self._read.T @ below
+        lost = grid.area * d * layer.slope() * self._relative
         self._matrix = _balance(grid, d, absorption, lost)
         self._scale = 1.0 / np.sqrt(self._matrix.diagonal())
         self._scaled = sparse.csr_array(
@@ -187,17 +198,17 @@ class _Channel:
         """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
         grid, count = self._grid, len(self._grid.points)
         # Shares of the light that is scattered above the depth of reading, and below it.
-        below = np.exp(-np.minimum(extinction * layer.depth / interface.mean_cosine, _DEEP))
-        above = -np.expm1(-np.minimum(extinction * layer.depth / interface.mean_cosine, _DEEP))
+        slant = layer.depth / interface.mean_cosine
+        below, above = optics.transmittance(extinction * slant), optics.opacity(extinction * slant)
         self._near, into_cells = np.zeros(count), np.zeros(count)
         for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
             depth = -np.log1p(-quantile * above) * interface.mean_cosine / extinction
-            share = self._albedo / EVENTS * above * self._attenuated
+            share = self._albedo / EVENTS * above * self._relative
             into_cells += share * layer.u(depth)
             self._near += share * layer.rise(layer.depth - depth) / d
         deep = sparse.csr_array((count, grid.count))
         for quantile in _tails(count) if below.max() > _NOTHING else ():
-            path = -(np.log(below) + np.log1p(-quantile)) / extinction
+            path = slant - np.log1p(-quantile) / extinction
             there = grid.probe(grid.points + path[:, None] * ways)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of cells.
             share = self._albedo / DEEP_EVENTS * below * there.around
@@ -205,19 +216,33 @@ class _Channel:
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
 
-    def solved(self, entering: Array, from_itself: sparse.csr_array, power: Array) -> tuple[Array, Array, int]:
+    def solved(
+        self, entering: Array, from_itself: sparse.csr_array, power: Array, emission: float
+    ) -> tuple[Array, Array, int]:
         """Fluence and flux at the samples, and steps: light of the body falls on it again until little changes."""
         flux, steps = entering, 0
+        before, slowest = None, 1.0
+        inside = self._albedo * (power + emission * self._glow_cells)
+        glow = self._albedo * emission * self._glow_near
         for _ in range(MOST_BOUNCES):
-            cells, taken = self._cells(self._into_cells @ flux + self._albedo * power)
+            cells, taken = self._cells(self._into_cells @ flux + inside)
             steps += taken
-            surface = (self._read @ cells) * self._attenuated + (self._near - self._excess) * flux
+            surface = (self._read @ cells) * self._attenuated + (self._near - self._excess) * flux + glow
             fluence = np.maximum(surface, 0.0)
             again = entering + from_itself @ fluence
-            change = np.abs(again - flux).max(initial=0.0)
-            flux = again
-            if change <= ENOUGH * np.abs(flux).max(initial=0.0):
+            change = again - flux
+            if before is None:
+                step = again
+            else:
+                # In a hollow nearly all light comes back: what the last two rounds changed tells where that ends.
+                bent, moved = change - before[1], np.abs(flux - before[0]).max()
+                slowest = min(slowest, np.abs(bent).max() / max(moved, 1e-300))
+                along = float(change @ bent) / max(float(bent @ bent), 1e-300)
+                step = np.maximum(again - along * (again - before[0] - before[1]), 0.0)
+            if np.abs(change).max(initial=0.0) <= ENOUGH * slowest * np.abs(again).max(initial=0.0):
+                flux = again
                 break
+            before, flux = (flux, change), step
         return fluence, flux, steps
 
     def _cells(self, source: Array) -> tuple[Array, int]:
@@ -266,7 +291,8 @@ def _tails(samples: int) -> Array:
 
 def _first_ways(grid: BodyGrid, ior: float) -> Array:
     """(s, 3): a direction inside for each sample, as uniform light from outside has them."""
-    first, second = plane_points(len(grid.points)).T
+    # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
+    first, second = other_plane_points(len(grid.points)).T
     cosine = optics.refracted_cosine(np.sqrt(first), ior)
     normal = grid.face_normals
     aside = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))

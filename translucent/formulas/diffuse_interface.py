@@ -24,7 +24,7 @@ from translucent.formulas import interface, optics
 NODES, FACETS = 64, 1 << 14
 
 #: Change of Chandrasekhar's function at which its iteration ends, and steps after which it ends anyway.
-H_TOLERANCE, H_STEPS = 1e-10, 4000
+H_TOLERANCE, H_STEPS = 1e-13, 200
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,9 @@ def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
     h = np.ones_like(cosine)
     kernel = 0.5 * albedo * cosine * weight / (cosine[:, None] + cosine)
     for _ in range(H_STEPS):
-        better = 1.0 / (np.sqrt(1.0 - albedo) + kernel @ h)
+        # Halfway by ratio: the equation alone turns what is too large by a factor into what is too small by it, which
+        # would go on for ever where nothing is absorbed. So errors are at least halved.
+        better = np.sqrt(h / (np.sqrt(1.0 - albedo) + kernel @ h))
         done = np.abs(better - h).max() < H_TOLERANCE
         h = better
         if done:

@@ -85,11 +85,12 @@ def multiple_reflectance(absorption_depth: npt.ArrayLike, scattering_depth: npt.
     return np.maximum(two_stream_reflectance(k, s) - once, 0.0)
 
 
+@np.errstate(under="ignore")
 def mirrored_reflectance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
     """Reflectance of a layer between interfaces that mirror the share r of diffuse light (Saunderson 1942).
 
-    Of what the layer sends out, 1 - r leaves: (1 - r) (U+ + U-) / 2 with U+- = (R +- T) / (1 - r (R +- T)), in which
-    light goes back and forth any number of times.
+    Of what the layer sends out, 1 - r leaves, and the rest comes back to it, any number of times:
+    (1 - r) (R (1 - r R) + r T^2) / ((1 - r R)^2 - r^2 T^2).
 
     Parameters
     ----------
@@ -98,17 +99,19 @@ def mirrored_reflectance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLik
     mirrored : array_like
         r, 0 to below 1.
     """
-    even, odd = _mirrored_modes(reflectance, transmittance, mirrored)
-    return np.asarray(0.5 * (even + odd))
-
-
-def mirrored_transmittance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
-    """Transmittance of a layer between two such interfaces; as for `mirrored_reflectance`: (1 - r) (U+ - U-) / 2."""
-    even, odd = _mirrored_modes(reflectance, transmittance, mirrored)
-    return np.asarray(0.5 * (even - odd))
-
-
-def _mirrored_modes(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> list[Array]:
-    """(1 - r) U+ and (1 - r) U-: the layer lit alike from both sides, and oppositely."""
     back, through, r = (np.asarray(x, dtype=np.float64) for x in (reflectance, transmittance, mirrored))
-    return [(1.0 - r) * mode / (1.0 - r * mode) for mode in (back + through, back - through)]
+    turned = back * (1.0 - r * back) + r * through * through
+    return np.asarray((1.0 - r) * turned / _mirrored_denominator(back, through, r))
+
+
+@np.errstate(under="ignore")
+def mirrored_transmittance(reflectance: npt.ArrayLike, transmittance: npt.ArrayLike, mirrored: npt.ArrayLike) -> Array:
+    """Transmittance of a layer between two such interfaces: (1 - r) T / ((1 - r R)^2 - r^2 T^2)."""
+    back, through, r = (np.asarray(x, dtype=np.float64) for x in (reflectance, transmittance, mirrored))
+    return np.asarray((1.0 - r) * through / _mirrored_denominator(back, through, r))
+
+
+def _mirrored_denominator(reflectance: Array, transmittance: Array, mirrored: Array) -> Array:
+    """(1 - r R)^2 - r^2 T^2, by its factors: the layer lit alike from both sides, and oppositely."""
+    alike, opposite = reflectance + transmittance, reflectance - transmittance
+    return np.asarray((1.0 - mirrored * alike) * (1.0 - mirrored * opposite))

@@ -121,7 +121,7 @@ def _crossings(
     pairs = count.prod(axis=1)
     found: list[tuple[Integers, Array, Integers]] = []
     ends = np.cumsum(pairs)
-    cuts = np.searchsorted(ends, np.arange(0, int(ends[-1]) if len(ends) else 0, CHUNK), side="right")
+    cuts = np.searchsorted(ends, np.arange(0, max(int(ends[-1]), 1), CHUNK), side="right")
     for begin, stop in zip(cuts, [*cuts[1:], len(pairs)], strict=True):
         of, inside = _spread(np.zeros(stop - begin, int), pairs[begin:stop])
         face = of + begin
