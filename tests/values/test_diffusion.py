@@ -14,16 +14,18 @@ import translucent as tl
 from tests import slabs
 from translucent.bench.shapes import joined
 from translucent.diffusion.entering import Casters, from_light
-from translucent.diffusion.field import DiffusionField, diffusion_field, lit_body
+from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import BodyGrid, body_grid, other_plane_points, plane_points
 from translucent.diffusion.solution import (
-    QUANTILES,
+    DEEP_EVENTS,
+    EVENTS,
     TOLERANCE,
+    BodySystem,
     SurfaceLight,
     _Channel,
     _first_ways,
     _half_space_excess,
-    surface_light,
+    _tails,
 )
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
 from translucent.geometry.solids import Box, Sphere
@@ -49,7 +51,8 @@ def grid_of(mesh: tl.Mesh, resolution: int) -> BodyGrid:
 def lit(grid: BodyGrid, medium: tl.Medium, entering: npt.ArrayLike = 1.0, inside: Array | None = None) -> SurfaceLight:
     """Light of a body on which none of its light falls again."""
     flux = np.broadcast_to(np.asarray(entering, np.float64), (len(grid.points), 3)).copy()
-    return surface_light(grid, medium, 0.0, flux, sparse.csr_array((len(flux), len(flux))), inside)
+    nothing = sparse.csr_array((len(flux), len(flux)))
+    return BodySystem(grid, medium, 0.0).solved(flux, nothing, np.zeros((grid.count, 3)) if inside is None else inside)
 
 
 def seen_field(
@@ -60,7 +63,8 @@ def seen_field(
 ) -> DiffusionField:
     scene = tl.Scene([body], CAMERA, lights, environment)
     assert body.medium is not None
-    return diffusion_field(lit_body(body, (), Diffusion(resolution).cell_size(body)), body.medium, 0.0, scene)
+    geometry = lit_body(body, (), Diffusion(resolution).cell_size(body))
+    return DiffusingBody(geometry, body.medium, 0.0).field(scene)
 
 
 # A ball, by series
@@ -77,15 +81,18 @@ def ball_truth(grid: BodyGrid, absorption: float, scattering: float, ior: float)
     """Mean fluence for unit flux, of sources as deep as the code has them; without what the exact half-space lacks."""
     interface, d = diffuse_interface(ior), float(diffusion_coefficient(absorption, scattering))
     extinction, (_, depth), ways = absorption + scattering, grid.below, _first_ways(grid, ior)
-    found = np.zeros(len(depth))
-    for quantile in QUANTILES:
-        path = -math.log1p(-quantile) / extinction
-        below = path * interface.mean_cosine
-        deep = np.linalg.norm(grid.points + path * ways, axis=1)
-        at = np.where(below < depth, 1 - below, deep)
-        assert (at < 1).all()
-        found += of_shell(at, math.sqrt(absorption / d), d, interface.conductance)
-    return scattering / extinction * float(found.mean()) / len(QUANTILES)
+    found, k, c = np.zeros(len(depth)), math.sqrt(absorption / d), interface.conductance
+    slant = depth / interface.mean_cosine
+    beyond = np.exp(-extinction * slant)
+    for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
+        at = 1 + np.log1p(-quantile * (1 - beyond)) * interface.mean_cosine / extinction
+        found += (1 - beyond) / EVENTS * of_shell(at, k, d, c)
+    for quantiles in _tails(len(depth)):
+        path = slant - np.log1p(-quantiles) / extinction
+        at = np.linalg.norm(grid.points + path[:, None] * ways, axis=1)
+        # What has left the ball by then is not scattered.
+        found += np.where(at < 1, beyond / DEEP_EVENTS * of_shell(at, k, d, c), 0.0)
+    return scattering / extinction * float(found.mean())
 
 
 def ball_errors(resolution: int, scattering: float, ior: float = 1.5) -> Array:
@@ -106,8 +113,9 @@ def test_a_ball_in_uniform_light() -> None:
     of it is: of order 2.8.
     """
     errors = np.array([ball_errors(resolution, 3.0) for resolution in (10, 20, 40)])
-    # Nothing absorbs: what enters leaves, up to the solver's tolerance.
-    assert np.abs(errors[:, 0]).max() < 3 * TOLERANCE
+    # Nothing absorbs: what is scattered in the body leaves. Paths that end within a cell of the surface count as far as
+    # cells are inside: a few in a thousand paths, and fewer in smaller cells.
+    assert (np.abs(errors[:, 0]) < [0.008, 0.002, 0.001]).all()
     assert (np.abs(errors[:, 2]) < [0.1, 0.02, 0.005]).all()
     assert (np.abs(errors[:, 1]) < [0.02, 0.005, 0.005]).all()
     assert math.log2(errors[0, 2] / errors[1, 2]) > 2
@@ -120,7 +128,7 @@ def test_a_dense_ball_in_uniform_light() -> None:
     of the radius: the layer lacks the curvature, 1 / (k R), until cells are smaller than that.
     """
     errors = np.array([ball_errors(resolution, 30.0) for resolution in (10, 20, 40)])
-    assert np.abs(errors[:, 0]).max() < 3 * TOLERANCE
+    assert np.abs(errors[:, 0]).max() < 1e-3
     assert (np.diff(np.abs(errors[:, 1])) < 0).all()
     assert np.abs(errors[:, 1]).max() < 0.07
     attenuation = math.sqrt(9.0 / float(diffusion_coefficient(9.0, 30.0)))
@@ -242,11 +250,13 @@ def test_lossless_bodies_give_back_what_enters(mesh: tl.Mesh, scattering: float)
     """All that is scattered for the first time in the body: paths that leave it before have a weight of 0."""
     grid, medium = grid_of(mesh, 16), tl.Medium(scattering=scattering, ior=1.5)
     found, interface = lit(grid, medium).fluence[:, 0], diffuse_interface(1.5)
-    depth, scattered = grid.below[1], np.zeros(len(grid.points))
-    for quantile in QUANTILES:
-        path = -math.log1p(-quantile) / scattering
-        reached = grid.probe(grid.points + path * _first_ways(grid, 1.5)).weights.sum(axis=1)
-        scattered += np.where(path * interface.mean_cosine < depth, 1.0, reached) / len(QUANTILES)
+    slant, ways = grid.below[1] / interface.mean_cosine, _first_ways(grid, 1.5)
+    beyond = np.exp(-scattering * slant)
+    scattered = 1 - beyond
+    for quantiles in _tails(len(grid.points)):
+        path = slant - np.log1p(-quantiles) / scattering
+        there = grid.probe(grid.points + path[:, None] * ways)
+        scattered += beyond / DEEP_EVENTS * there.around * (there.weights.sum(axis=1) > 0)
     # The residual is a share of the norm of all sources, weighted by the diagonal: of their sum it may be the root of
     # the number of cells over that of those with sources, three times here.
     assert interface.exit_share * found.sum() == pytest.approx(float(scattered.sum()), rel=5 * TOLERANCE)
@@ -259,7 +269,7 @@ def test_lamps_in_lossless_hollows_light_the_outside() -> None:
     """
     outer, inner = Sphere().tessellate(32), Sphere(radius=0.6).tessellate(32)
     hollow = joined([(outer.vertices, outer.faces), (inner.vertices, inner.faces[:, ::-1])], "hollow")
-    for scattering in (5.0, 500.0):
+    for scattering in (50.0, 500.0):
         body = tl.Object(hollow, tl.Medium(scattering=scattering))
         found = seen_field(body, tl.PointLight((0, 0, 0), (1, 1, 1)), resolution=20)
         assert np.isfinite(found.fluence).all()
@@ -275,7 +285,7 @@ def test_lamps_in_lossless_hollows_light_the_outside() -> None:
 def test_the_system_is_symmetric_and_positive() -> None:
     """So light goes both ways between any two places alike, and conjugate gradients get there."""
     grid = ball_grid(10)
-    channel = _Channel(grid, diffuse_interface(1.4), 1.4, 0.5, 5.0, _first_ways(grid, 1.4))
+    channel = _Channel(grid, 1.4, 0.0, 0.5, 5.0, _first_ways(grid, 1.4))
     matrix = channel._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive

@@ -46,6 +46,9 @@ _NOTHING = 1e-3
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
 MOST_BOUNCES, ENOUGH = 24, 1e-3
 
+#: Largest share of the light that may come back to the surface: of what would, a hundred times as much is to come.
+MOST_SHARE = 0.99
+
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
@@ -221,7 +224,7 @@ class _Channel:
     ) -> tuple[Array, Array, int]:
         """Fluence and flux at the samples, and steps: light of the body falls on it again until little changes."""
         flux, steps = entering, 0
-        before, slowest = None, 1.0
+        before = np.zeros_like(entering)
         inside = self._albedo * (power + emission * self._glow_cells)
         glow = self._albedo * emission * self._glow_near
         for _ in range(MOST_BOUNCES):
@@ -229,20 +232,15 @@ class _Channel:
             steps += taken
             surface = (self._read @ cells) * self._attenuated + (self._near - self._excess) * flux + glow
             fluence = np.maximum(surface, 0.0)
-            again = entering + from_itself @ fluence
-            change = again - flux
-            if before is None:
-                step = again
-            else:
-                # In a hollow nearly all light comes back: what the last two rounds changed tells where that ends.
-                bent, moved = change - before[1], np.abs(flux - before[0]).max()
-                slowest = min(slowest, np.abs(bent).max() / max(moved, 1e-300))
-                along = float(change @ bent) / max(float(bent @ bent), 1e-300)
-                step = np.maximum(again - along * (again - before[0] - before[1]), 0.0)
-            if np.abs(change).max(initial=0.0) <= ENOUGH * slowest * np.abs(again).max(initial=0.0):
-                flux = again
+            change = entering + from_itself @ fluence - flux
+            # Of what changed the last time this share comes back now. In a hollow it is nearly all, and always the same
+            # share: so much is still to come.
+            share = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
+            share = min(max(share, 0.0), MOST_SHARE)
+            flux = np.maximum(flux + change / (1.0 - share), 0.0)
+            if np.abs(change).max(initial=0.0) <= ENOUGH * (1.0 - share) * np.abs(flux).max(initial=0.0):
                 break
-            before, flux = (flux, change), step
+            before = change if share == 0.0 else np.zeros_like(entering)
         return fluence, flux, steps
 
     def _cells(self, source: Array) -> tuple[Array, int]:
