@@ -58,7 +58,7 @@ def read_scene(
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
     from translucent.gltf.load import load_scene
-    from translucent.scene.showcase import filled, with_roughness, showcase
+    from translucent.scene.showcase import filled, showcase, with_roughness
 
     options = options or CameraOptions()
     if options.camera is not None and options.defining:

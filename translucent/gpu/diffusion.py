@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable
+from threading import Lock
 
 import moderngl
 import numpy as np
@@ -73,28 +74,41 @@ class DiffusionCache:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
+        self._lock = Lock()  # of the bodies
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
         self._scenes: OrderedDict[Hashable, DiffusedLight] = OrderedDict()
 
     def of(self, scene: Scene, diffusion: Diffusion) -> DiffusedLight | None:
         """Diffused light of a scene whose media are marked, None where there is none."""
-        media = {i: body.medium for i, body in enumerate(scene.objects) if isinstance(body.medium, DiffusedMedium)}
-        if not media:
+        if not _diffused(scene):
             return None
-        opaque = tuple(scene.opaque)
-        bodies = tuple((_place(body := scene.objects[i]), m.original, _roughness(body)) for i, m in media.items())
-        key = (diffusion, bodies, tuple(_place(item) for item in opaque), scene.environment, tuple(scene.lights))
-        if key not in self._scenes:
-            fields = {}
-            for i, medium in media.items():
-                body = scene.objects[i]
-                lit = self._lit(body, opaque, diffusion.cell_size(body))
-                fields[i] = diffusion_field(lit, medium.original, _roughness(body), scene)
-            self._scenes[key] = DiffusedLight(self._gl, fields)
-            if len(self._scenes) > KEPT_SCENES:
-                self._scenes.popitem(last=False)[1].texture.release()
+        if (key := diffusion_key(scene, diffusion)) not in self._scenes:
+            self.keep(key, self.solved(scene, diffusion))
         self._scenes.move_to_end(key)
         return self._scenes[key]
+
+    def has(self, key: Hashable) -> bool:
+        """Whether the light of this `diffusion_key` is there."""
+        return key in self._scenes
+
+    def solved(self, scene: Scene, diffusion: Diffusion) -> dict[int, DiffusionField]:
+        """Light in the bodies of a scene whose media are marked. Needs no context: a thread may wait for it."""
+        opaque = tuple(scene.opaque)
+        fields = {}
+        for i, medium in _diffused(scene).items():
+            body = scene.objects[i]
+            with self._lock:
+                lit = self._lit(body, opaque, diffusion.cell_size(body))
+            fields[i] = diffusion_field(lit, medium.original, _roughness(body), scene)
+        return fields
+
+    def keep(self, key: Hashable, fields: dict[int, DiffusionField]) -> None:
+        """Keep what `solved` found, as a texture."""
+        if key in self._scenes:
+            return
+        self._scenes[key] = DiffusedLight(self._gl, fields)
+        if len(self._scenes) > KEPT_SCENES:
+            self._scenes.popitem(last=False)[1].texture.release()
 
     def _lit(self, body: Object, opaque: tuple[Object, ...], step: float) -> LitBody:
         key = (_place(body), tuple(_place(item) for item in opaque), step)
@@ -110,7 +124,21 @@ class DiffusionCache:
         for light in self._scenes.values():
             light.texture.release()
         self._scenes.clear()
-        self._bodies.clear()
+        with self._lock:
+            self._bodies.clear()
+
+
+def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
+    """Everything that the diffused light of a scene depends on; the camera is no part of it."""
+    bodies = tuple(
+        (_place(body := scene.objects[i]), m.original, _roughness(body)) for i, m in _diffused(scene).items()
+    )
+    opaque = tuple(_place(item) for item in scene.opaque)
+    return (diffusion, bodies, opaque, scene.environment, tuple(scene.lights))
+
+
+def _diffused(scene: Scene) -> dict[int, DiffusedMedium]:
+    return {i: body.medium for i, body in enumerate(scene.objects) if isinstance(body.medium, DiffusedMedium)}
 
 
 def _place(item: Object) -> tuple[object, bytes]:

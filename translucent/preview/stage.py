@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Hashable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
 from translucent.assets import newest_shader
+from translucent.diffusion.field import DiffusionField
 from translucent.errors import TranslucentError
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
+from translucent.gpu.diffusion import diffusion_key
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Shown, Viewport
@@ -19,9 +22,11 @@ from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import Scattering, ScatteringLayer
+from translucent.planning.scattering.choice import shown
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.measuring import Truth
-from translucent.preview.scenes import method_of
+from translucent.preview.scenes import method_of, scattering_of
 from translucent.preview.tasks import Task
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
@@ -58,6 +63,19 @@ class Timing:
         return sum((self.passes or {}).values())
 
 
+@dataclass(frozen=True)
+class _Solving:
+    """Search for the light of a `diffusion_key`."""
+
+    key: Hashable
+    task: Task
+
+    @property
+    def failed(self) -> bool:
+        """Whether it ended without any, or nobody wants to wait for it."""
+        return self.task.cancelled or self.task.error is not None
+
+
 class Stage:
     """Stage: draws a workspace's scene into a texture.
 
@@ -79,6 +97,8 @@ class Stage:
         The compiler's message, while the last good shaders go on.
     simpler : str
         What is drawn more simply while the picture moves, and why, or nothing.
+    diffusing : str
+        How light that diffuses is shown while it is not known, or nothing.
     drawing : float
         Seconds that the last call of `draw` took.
     """
@@ -97,7 +117,7 @@ class Stage:
             compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
-        self.problem = self.shader_problem = self.simpler = ""
+        self.problem = self.shader_problem = self.simpler = self.diffusing = ""
         self.drawing = 0.0
         self._moving: RenderPlan | None = None
         self._begun = False
@@ -108,6 +128,9 @@ class Stage:
         self._costs: dict[tuple[str, ...], float] = {}
         self._strides = [4, 4]
         self._truth: Truth | None = None
+        self._scattering: Scattering | None = None
+        self._solving: _Solving | None = None
+        self._insoluble: Hashable = None
         self._watched = time.monotonic()
         self._newest = newest_shader()
 
@@ -152,7 +175,8 @@ class Stage:
         material = workspace.document.material
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
         both = display.compare == "method"
-        wanted = (scene, methods[0], methods[1] if both else None, self.viewport.size, self.renderer)
+        scattering = self._scattering = self._known_scattering(workspace, scene, methods[0])
+        wanted = (scene, methods[0], methods[1] if both else None, scattering, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             return True
         fresh = wanted != self._shown
@@ -161,8 +185,8 @@ class Stage:
             self.watch(workspace)
         else:
             self.plans = [
-                self.renderer.plan(scene, methods[0]),
-                self.renderer.plan(scene, methods[1]) if both else None,
+                self.renderer.plan(scene, methods[0], scattering=scattering),
+                self.renderer.plan(scene, methods[1], scattering=scattering) if both else None,
             ]
             self._shown = wanted
             self.viewport.restart()
@@ -182,13 +206,15 @@ class Stage:
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, interfaces = workspace.document.look, self._quick_interfaces(self.plans[0])
+        look, interfaces, scattering = workspace.document.look, self._quick_interfaces(self.plans[0]), self._scattering
         if interfaces is not None:
-            self._moving = self.renderer.plan(scene, method, interfaces=interfaces)
+            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, scattering=self._scattering)
         begun, factor = time.perf_counter(), self._factor(self._moving or self.plans[0], FACTORS)
         try:
             with self.viewport.at_once(factor) as framebuffer:
-                plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces)
+                plan = self.renderer.draw(
+                    scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces, scattering=scattering
+                )
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
@@ -198,6 +224,35 @@ class Stage:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         self._presented = ()
         return True
+
+    def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
+        """What is asked for, or layers until the light that diffuses in the scene is known: a thread solves for it."""
+        asked = scattering_of(workspace.document.display.scattering)
+        back = self.renderer.plan(scene, method, scattering=asked).given_back
+        self.diffusing = ""
+        if not back.diffused:
+            return asked
+        cache, diffusion = self.renderer.gpu.diffusion, back.diffusion
+        marked = shown(scene, back).with_ambient_emitted
+        if cache.has(key := diffusion_key(marked, diffusion)):
+            return asked
+        if self._solving is not None and self._solving.failed:
+            self._insoluble, self._solving = self._solving.key, None
+        if key == self._insoluble:
+            self.diffusing = "light that is scattered many times as of flat layers, since it could not be solved for"
+            return ScatteringLayer()
+        self.diffusing = "light that is scattered many times as of flat layers, until its diffusion is solved for"
+        lane = workspace.lanes["diffuse"]
+        if lane.task is None:
+            work = lane.start(
+                "diffusing light", lambda _: cache.solved(marked, diffusion), partial(self._take_light, key)
+            )
+            self._solving = _Solving(key, work)
+        return ScatteringLayer()
+
+    def _take_light(self, key: Hashable, fields: dict[int, DiffusionField]) -> None:
+        with self.current():
+            self.renderer.gpu.diffusion.keep(key, fields)
 
     def _quick_interfaces(self, plan: RenderPlan | None) -> ScreenInterfaces | None:
         """Interfaces for a picture that moves, if tracing them is known to take too long; else None."""
@@ -361,7 +416,7 @@ class Stage:
                 viewport.resize(FRAME)
                 for plan in self._drawn_plans if scene is not None else ():
                     if scene is not None:
-                        viewport.step(0, scene, fresh.plan(scene, plan.method, interfaces=plan.interfaces), 1)
+                        viewport.step(0, scene, self._planned_anew(fresh, scene, plan), 1)
             except TranslucentError as error:
                 self.shader_problem = str(error)
                 if viewport is not None:
@@ -371,6 +426,9 @@ class Stage:
             viewport.release()
             self._take_over(fresh)
         workspace.tell("info", "shaders reloaded")
+
+    def _planned_anew(self, fresh: Renderer, scene: Scene, plan: RenderPlan) -> RenderPlan:
+        return fresh.plan(scene, plan.method, interfaces=plan.interfaces, scattering=self._scattering)
 
     def _take_over(self, fresh: Renderer) -> None:
         size, self.shader_problem = self.viewport.size, ""
