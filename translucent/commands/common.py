@@ -239,9 +239,7 @@ def read_any_medium(
         given, missing = missing, given
     others = {"--color": color, "--distance": distance, "--preset": preset_name}
     if other := [option for option, value in others.items() if value is not None]:
-        raise InputError(
-            given, f"{other[0]} is given, too", "give one medium: by what it transmits, or by what it scatters"
-        )
+        raise InputError(given, f"{other[0]} is given, too", "give one medium: by what it transmits or scatters")
     if scattering_color is None or mean_free_path is None:
         do = "give both: the color of a body with no end says nothing about how far light gets in it"
         raise InputError(given, f"{missing} is missing", do)

@@ -95,11 +95,11 @@ class DiffusionCache:
         """Light in the bodies of a scene whose media are marked. Needs no context: a thread may wait for it."""
         opaque = tuple(scene.opaque)
         fields = {}
-        for i, medium in _diffused(scene).items():
-            body = scene.objects[i]
-            with self._lock:
+        with self._lock:
+            for i, medium in _diffused(scene).items():
+                body = scene.objects[i]
                 lit = self._lit(body, opaque, diffusion.cell_size(body))
-            fields[i] = diffusion_field(lit, medium.original, _roughness(body), scene)
+                fields[i] = diffusion_field(lit, medium.original, _roughness(body), scene)
         return fields
 
     def keep(self, key: Hashable, fields: dict[int, DiffusionField]) -> None:
