@@ -3,7 +3,8 @@ Soap: a rough surface over a medium, lit from behind
 ====================================================
 
 Light that enters behind spreads in the bar before it leaves in front: edges, where it has a short way, are lighter than
-the middle, and nothing has a hard shadow. The surface is rough, so it shows a soft highlight in place of a mirrored studio.
+the middle, and nothing has a hard shadow. The surface is rough, so it shows a soft highlight in place of a mirrored
+studio.
 """
 
 import os

@@ -215,8 +215,8 @@ def scattering_medium_options(command: F) -> F:
     return click.option(
         "--scattering-color",
         metavar="C",
-        help=f"Diffuse color of a thick, scattering body, with --mean-free-path: '#f2e0b8'; its ior is "
-        f"{SCATTERING_IOR:g}.",
+        help=f"Diffuse color of a body that is thick and scatters, with --mean-free-path; its ior is "
+        f"{SCATTERING_IOR:g}. Wax: --scattering-color '#f2e0b8' --mean-free-path 2mm.",
     )(command)
 
 

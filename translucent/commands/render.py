@@ -41,13 +41,8 @@ from translucent.commands.model import (
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.errors import InputError
 
-EXAMPLES = """\b
-Examples: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm
-  translucent render bear -o wax.png --scattering-color '#f2e0b8' --mean-free-path 2mm --scattering diffusion
-"""
 
-
-@click.command(epilog=EXAMPLES)
+@click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
 @click.argument("model")
 @click.option(
     "-o", "--output", required=True, type=click.Path(path_type=Path), help="A .png, .exr or .npz file; see --turntable."

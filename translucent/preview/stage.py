@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Hashable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
@@ -14,7 +13,6 @@ from translucent.diffusion.field import DiffusionField
 from translucent.errors import TranslucentError
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
-from translucent.gpu.diffusion import diffusion_key
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Shown, Viewport
@@ -22,12 +20,13 @@ from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering import Scattering, ScatteringLayer
-from translucent.planning.scattering.choice import shown
+from translucent.planning.scattering import Scattering
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
+from translucent.preview.diffusing import Diffusing
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of, scattering_of
 from translucent.preview.tasks import Task
+from translucent.preview.timing import Timing, kind
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -47,33 +46,6 @@ WATCH = 0.5
 
 
 Factor = TypeVar("Factor", int, float)
-
-
-@dataclass
-class Timing:
-    """Timing of the last step of a side: seconds, by the clock and per pass on the GPU; and its share of the pixels."""
-
-    wall: float = 0.0
-    passes: dict[str, float] | None = None
-    share: float = 1.0
-
-    @property
-    def gpu(self) -> float:
-        """Sum over the passes."""
-        return sum((self.passes or {}).values())
-
-
-@dataclass(frozen=True)
-class _Solving:
-    """Search for the light of a `diffusion_key`."""
-
-    key: Hashable
-    task: Task
-
-    @property
-    def failed(self) -> bool:
-        """Whether it ended without any, or nobody wants to wait for it."""
-        return self.task.cancelled or self.task.error is not None
 
 
 class Stage:
@@ -97,8 +69,6 @@ class Stage:
         The compiler's message, while the last good shaders go on.
     simpler : str
         What is drawn more simply while the picture moves, and why, or nothing.
-    diffusing : str
-        How light that diffuses is shown while it is not known, or nothing.
     drawing : float
         Seconds that the last call of `draw` took.
     """
@@ -117,7 +87,7 @@ class Stage:
             compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
-        self.problem = self.shader_problem = self.simpler = self.diffusing = ""
+        self.problem = self.shader_problem = self.simpler = ""
         self.drawing = 0.0
         self._moving: RenderPlan | None = None
         self._begun = False
@@ -129,8 +99,7 @@ class Stage:
         self._strides = [4, 4]
         self._truth: Truth | None = None
         self._scattering: Scattering | None = None
-        self._solving: _Solving | None = None
-        self._insoluble: Hashable = None
+        self._diffusing = Diffusing(self._take_light)
         self._watched = time.monotonic()
         self._newest = newest_shader()
 
@@ -226,29 +195,16 @@ class Stage:
         return True
 
     def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
-        """What is asked for, or layers until the light that diffuses in the scene is known: a thread solves for it."""
+        """What is asked for, or layers until the light that diffuses in the scene is known."""
         asked = scattering_of(workspace.document.display.scattering)
         back = self.renderer.plan(scene, method, scattering=asked).given_back
-        self.diffusing = ""
-        if not back.diffused:
-            return asked
-        cache, diffusion = self.renderer.gpu.diffusion, back.diffusion
-        marked = shown(scene, back).with_ambient_emitted
-        if cache.has(key := diffusion_key(marked, diffusion)):
-            return asked
-        if self._solving is not None and self._solving.failed:
-            self._insoluble, self._solving = self._solving.key, None
-        if key == self._insoluble:
-            self.diffusing = "light that is scattered many times as of flat layers, since it could not be solved for"
-            return ScatteringLayer()
-        self.diffusing = "light that is scattered many times as of flat layers, until its diffusion is solved for"
-        lane = workspace.lanes["diffuse"]
-        if lane.task is None:
-            work = lane.start(
-                "diffusing light", lambda _: cache.solved(marked, diffusion), partial(self._take_light, key)
-            )
-            self._solving = _Solving(key, work)
-        return ScatteringLayer()
+        cache, lane = self.renderer.gpu.diffusion, workspace.lanes["diffuse"]
+        return self._diffusing.scattering(scene, asked, back, cache, lane)
+
+    @property
+    def diffusing(self) -> str:
+        """How light that diffuses is shown while it is not known, or nothing."""
+        return self._diffusing.told
 
     def _take_light(self, key: Hashable, fields: dict[int, DiffusionField]) -> None:
         with self.current():
@@ -258,7 +214,7 @@ class Stage:
         """Interfaces for a picture that moves, if tracing them is known to take too long; else None."""
         if plan is None or not plan.has(PassName.TRACED):
             return None
-        slow = self._costs.get(_kind(plan), 0.0) / COARSEST_TRACED**2 > BUDGET
+        slow = self._costs.get(kind(plan), 0.0) / COARSEST_TRACED**2 > BUDGET
         return ScreenInterfaces() if slow else None
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
@@ -276,14 +232,14 @@ class Stage:
         self.renderer.gpu.context.gl.finish()
         wall = time.perf_counter() - begun
         seconds = wall * stride * stride
-        known = self._costs.get(_kind(plan))
+        known = self._costs.get(kind(plan))
         # The first of its kind compiles shaders.
-        self._costs[_kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
+        self._costs[kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
         self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def _factor(self, plan: RenderPlan | None, factors: tuple[Factor, ...]) -> Factor:
         """Smallest factor of reduction at which a picture is expected to be drawn quickly."""
-        known = None if plan is None else self._costs.get(_kind(plan))
+        known = None if plan is None else self._costs.get(kind(plan))
         if known is None:
             return factors[0] if plan is None else factors[-2:][0]
         return next((factor for factor in factors if known / factor**2 <= BUDGET), factors[-1])
@@ -410,13 +366,13 @@ class Stage:
         scene = workspace.scene()
         with self.current():
             fresh = Renderer(context=self._gl)
-            viewport = None
+            anew, viewport = partial(fresh.plan, scattering=self._scattering), None
             try:
                 viewport = Viewport(fresh.gpu)
                 viewport.resize(FRAME)
                 for plan in self._drawn_plans if scene is not None else ():
                     if scene is not None:
-                        viewport.step(0, scene, self._planned_anew(fresh, scene, plan), 1)
+                        viewport.step(0, scene, anew(scene, plan.method, interfaces=plan.interfaces), 1)
             except TranslucentError as error:
                 self.shader_problem = str(error)
                 if viewport is not None:
@@ -426,9 +382,6 @@ class Stage:
             viewport.release()
             self._take_over(fresh)
         workspace.tell("info", "shaders reloaded")
-
-    def _planned_anew(self, fresh: Renderer, scene: Scene, plan: RenderPlan) -> RenderPlan:
-        return fresh.plan(scene, plan.method, interfaces=plan.interfaces, scattering=self._scattering)
 
     def _take_over(self, fresh: Renderer) -> None:
         size, self.shader_problem = self.viewport.size, ""
@@ -446,8 +399,3 @@ class Stage:
             self.renderer.close()
         if self._own is not None:
             self._own.gl.release()
-
-
-def _kind(plan: RenderPlan) -> tuple[str, ...]:
-    """Key of plans that take about the same time."""
-    return (str(plan.method), *(step.name for step in plan.passes))

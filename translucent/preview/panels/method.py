@@ -10,7 +10,7 @@ from translucent.planning.scattering import SCATTERINGS
 from translucent.preview import numbers
 from translucent.preview.desk import ERROR, FAINT, WARNING, Desk, begin_rows, check, choice, fact, slider, wrapped
 from translucent.preview.document import AUTO
-from translucent.preview.stage import Timing
+from translucent.preview.timing import Timing
 
 NAMES = (AUTO, *METHODS)
 
