@@ -3,7 +3,8 @@ A candle: a medium that glows, and a lamp in it
 ===============================================
 
 Three kinds of objects: wax that scatters, a flame that emits, and a wick without a medium, which is opaque. A point
-light in the flame lights the wax from above; a directional one lights it from behind.
+light in the flame lights the wax from above; a directional one lights it from behind. What enters the wax at the top
+spreads downwards in it, which makes the candle glow below its rim.
 """
 
 import os

@@ -3,8 +3,8 @@ A jade bangle: light that scatters many times
 =============================================
 
 ``scattering_medium`` finds the medium that shows a color where it is thick; its second number is the mean free path,
-the length after which light is scattered or absorbed. ``multiple_scattering`` gives back what is scattered more than
-once, as a layer of Kubelka and Munk would.
+the length after which light is scattered or absorbed. Nothing has to be asked for: the planner has light diffuse in
+bodies that scatter much, and the plan says so.
 """
 
 import os
@@ -31,7 +31,8 @@ sun = tl.DirectionalLight((0.5, -0.4, 0.9), irradiance=1.2)
 scene = tl.Scene([bangle], camera, [sun], tl.Environment.studio())
 
 # %%
-# Light from lamps is followed into the stone and scattered once; what scatters more often is added by the surface.
+# Light that enters from the studio and the sun spreads in the stone, and leaves elsewhere: shadows are soft and green.
+# It is solved for before the first picture; further ones, from elsewhere, only look it up.
 
 width = int(os.environ.get("EXAMPLE_WIDTH", "960"))
 with tl.Renderer() as renderer:

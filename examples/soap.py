@@ -2,8 +2,9 @@
 Soap: a rough surface over a medium, lit from behind
 ====================================================
 
-How much light comes through from behind depends on the thickness that each ray really crosses: edges are lighter than
-the middle. The surface is rough, so it shows a soft highlight in place of a mirrored studio.
+Light that enters behind spreads in the bar before it leaves in front: edges, where it has a short way, are lighter than
+the middle, and nothing has a hard shadow. The surface is rough, so it shows a soft highlight in place of a mirrored
+studio.
 """
 
 import os

@@ -97,14 +97,19 @@ vec3 lights_on(vec3 point, vec3 normal) {
 vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3 passed) {
     vec3 absorbed = finish.stream_absorption * thickness;
     vec3 turned = finish.stream_scattering * thickness;
-    vec3 bare_through = max(two_stream_transmittance(absorbed, turned) - passed, vec3(0.0));
+    float mirror = finish.inner_mirror;
+    vec3 bare_through = two_stream_transmittance(absorbed, turned);
     vec3 bare_back = two_stream_reflectance(absorbed, turned);
-    vec3 through = mirrored_transmittance(bare_back, bare_through, finish.inner_mirror);
-    vec3 back = mirrored_reflectance(bare_back, bare_through, finish.inner_mirror);
+    vec3 all_through = mirrored_transmittance(bare_back, bare_through, mirror);
+    vec3 all_back = mirrored_reflectance(bare_back, bare_through, mirror);
+    // Of what enters behind or is mirrored there, the rays see what passes without an event.
+    vec3 seen = min(passed, bare_through);
+    vec3 through = max(all_through - seen * (1.0 - mirror + mirror * all_back), vec3(0.0));
+    vec3 back = max(all_back - seen * mirror * all_through, vec3(0.0));
     vec3 sum = environment_irradiance(normal) * back + environment_irradiance(-normal) * through;
 #if SINGLE_SCATTERING
     // Light of lights that is scattered once is in the emitted radiance.
-    back = max(back - (1.0 - finish.inner_mirror) * (bare_back - multiple_reflectance(absorbed, turned)), vec3(0.0));
+    back = max(back - (1.0 - mirror) * (bare_back - multiple_reflectance(absorbed, turned)), vec3(0.0));
 #endif
     sum += lights_on(point, normal) * back + lights_on(point, -normal) * through;
     return sum / PI;

@@ -12,6 +12,8 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.commands.common import SCATTERING_NAMES
+from translucent.planning.scattering import SCATTERINGS
 
 
 @pytest.mark.parametrize("name", ["folder", "folder.glb"])
@@ -79,6 +81,17 @@ def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
     told = strict_json(run("explain", model, "--interfaces", "screen", "--json").out)
     assert told["plan"]["passes"][-1]["name"] == "surfaces"
     assert told["plan"]["interfaces"] == "ScreenInterfaces()"
+    assert told["plan"]["given_back"] is None
+
+
+def test_explain_says_how_light_scattered_many_times_is_shown(run: Run, cube: Path) -> None:
+    milk = ("explain", cube, "--scattering-color", "white", "--mean-free-path", "1cm", "--json")
+    assert list(SCATTERINGS) == list(SCATTERING_NAMES)
+    told = {name: strict_json(run(*milk, "--scattering", name).out)["plan"] for name in SCATTERINGS}
+    assert told["diffusion"]["given_back"] == "diffuses (Diffusion(resolution=32)) in 1 body"
+    assert told["layer"]["given_back"] == "is given back as by layers in 1 body"
+    assert told["single"]["given_back"] is None
+    assert strict_json(run(*milk).out)["plan"] == told["diffusion"]
 
 
 def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:

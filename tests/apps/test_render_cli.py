@@ -92,6 +92,17 @@ BAD_RENDER_OPTIONS = [
     (["--interfaces", "both"], "Invalid value for '--interfaces': 'both' is not one of 'traced', 'screen', 'front'"),
     (["--interface-depth", "3"], "--interface-depth; only --interfaces traced takes it; add --interfaces traced"),
     (["--interfaces", "traced", "--interface-forks", "9"], "TracedInterfaces forks 9; not a whole number in 0 to 4"),
+    (["--scattering", "many"], "Invalid value for '--scattering': 'many' is not one of 'diffusion', 'layer', 'single'"),
+    (["--diffusion-resolution", "9"], "--diffusion-resolution; only --scattering diffusion takes it; add --scattering"),
+    (["--scattering", "layer", "--diffusion-resolution", "9"], "only --scattering diffusion takes it"),
+    (["--scattering", "diffusion", "--diffusion-resolution", "4"], "Diffusion resolution 4; not a whole number in 8"),
+    (["--scattering", "diffusion", "--diffusion-resolution", "999"], "Diffusion resolution 999; a body would have"),
+    (["--scattering-color", "white"], "--scattering-color; --mean-free-path is missing; give both"),
+    (["--mean-free-path", "1mm"], "--mean-free-path; --scattering-color is missing; give both"),
+    (["--scattering-color", "white", "--color", GREEN], "--scattering-color; --color is given, too; give one medium"),
+    (["--mean-free-path", "1mm", "--preset", "jade"], "--mean-free-path; --preset is given, too; give one medium"),
+    (["--scattering-color", "white", "--mean-free-path", "0mm"], "length '0mm'; not positive and finite"),
+    (["--scattering-color", "reddish", "--mean-free-path", "1mm"], "color 'reddish'; neither a hex color"),
     (["--no-such-option"], "--no-such-option'; see 'translucent render --help'"),
 ]
 
@@ -201,6 +212,29 @@ class TestRendering:
                 frames[interfaces] = arrays["radiance"], arrays["thickness"]
         assert (frames["screen"][0] != frames["front"][0]).any()
         assert (frames["screen"][1] == frames["front"][1]).all()
+
+    def test_render_shows_light_scattered_many_times_as_asked_for(self, run: Run, cube: Path, tmp_path: Path) -> None:
+        """Most of the light that enters leaves again, but for what is scattered once alone."""
+        medium = ("--scattering-color", "linear(0.8,0.6,0.3)", "--mean-free-path", "2cm")
+        radiance, told = {}, {}
+        for name in (None, "diffusion", "layer", "single"):
+            output = tmp_path / f"{name}.npz"
+            asked = ("--scattering", name) if name else ()
+            asked += ("--diffusion-resolution", "16") if name == "diffusion" else ()
+            result = run("render", cube, "-o", output, "--size", "9x5", "--samples", "1", *medium, *asked)
+            assert result.code == 0
+            told[name] = result.out
+            with np.load(output) as arrays:
+                radiance[name] = arrays["radiance"][2, 4]
+        assert "light scattered many times diffuses (Diffusion(resolution=32)) in 1 body" in told[None]
+        assert "Diffusion(resolution=16)" in told["diffusion"]
+        assert "is given back as by layers in 1 body" in told["layer"]
+        assert "many times" not in told["single"].replace("scattered more than once", "")
+        np.testing.assert_allclose(radiance["diffusion"], radiance[None], rtol=0.1)
+        for name in ("diffusion", "layer"):
+            assert (np.diff(radiance[name]) < 0).all()
+            assert (radiance[name] > radiance["single"] + 0.05).all()
+        assert (radiance["layer"] != radiance["diffusion"]).all()
 
     def test_render_as_json_prints_one_object(self, run: Run, cube: Path, tmp_path: Path) -> None:
         output = tmp_path / "cube.exr"

@@ -21,6 +21,7 @@ SIZE = (160, 120)
 WHITE = tl.Environment.constant((1.0, 1.0, 1.0))
 SKY = tl.Environment.gradient((0.2, 0.3, 0.4), (1.4, 1.2, 1.0))
 BALL = Sphere().tessellate(300)
+LAYER = tl.ScatteringLayer()  # loses nothing, whatever the shape
 
 
 def shown(mesh: tl.Mesh, medium: tl.Medium, environment: tl.Environment, **options: Any) -> tl.Scene:
@@ -37,8 +38,8 @@ LOSSLESS = {
     "frosted": (tl.Medium(ior=1.5), tl.Surface(roughness=0.5)),
     "matt": (tl.Medium(ior=1.5), tl.Surface(roughness=1.0)),
     "painted": (tl.Medium(ior=1.5), tl.Surface(transmission=0.4, diffuse_transmission=0.3)),
-    "milk": (tl.Medium(scattering=40.0, ior=1.33), tl.Surface(multiple_scattering=True)),
-    "fog": (tl.Medium(scattering=3.0), tl.Surface(multiple_scattering=True)),
+    "milk": (tl.Medium(scattering=40.0, ior=1.33), tl.Surface()),
+    "fog": (tl.Medium(scattering=3.0), tl.Surface()),
 }
 
 
@@ -46,7 +47,8 @@ LOSSLESS = {
 @pytest.mark.parametrize("kind", LOSSLESS)
 def test_white_furnace(renderer: tl.Renderer, kind: str, mesh: str) -> None:
     medium, surface = LOSSLESS[kind]
-    frame = renderer.render(shown(tl.load_mesh(mesh_path(mesh)), medium, WHITE, surface=surface), SIZE)
+    scene = shown(tl.load_mesh(mesh_path(mesh)), medium, WHITE, surface=surface)
+    frame = renderer.render(scene, SIZE, scattering=LAYER)
     assert frame.coverage.sum() > 1000
     np.testing.assert_allclose(frame.radiance, 1.0, atol=1e-5)
 
@@ -78,7 +80,7 @@ def test_rays_of_an_orthographic_picture_that_cuts_a_body_bend_where_they_leave(
 def test_white_furnace_of_one_interface(renderer: tl.Renderer, kind: str) -> None:
     medium, surface = LOSSLESS[kind]
     scene = shown(tl.load_mesh(mesh_path("knot")), medium, WHITE, surface=surface)
-    frame = renderer.render(scene, SIZE, interfaces=tl.FrontInterface())
+    frame = renderer.render(scene, SIZE, interfaces=tl.FrontInterface(), scattering=LAYER)
     assert frame.coverage.sum() > 1000
     np.testing.assert_allclose(frame.radiance, 1.0, atol=1e-5)
 

@@ -17,7 +17,7 @@ from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
 from translucent.planning.render_plan import RenderPlan
 from translucent.preview import stage as stages
-from translucent.preview.actions import Change, Turn
+from translucent.preview.actions import Change, ChoosePreset, Turn
 from translucent.preview.document import Model
 from translucent.preview.measuring import crossing
 from translucent.preview.stage import Stage
@@ -89,6 +89,47 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     with stage.current():
         frame = stage.renderer.render(scene, SIZE, samples=16)
     assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
+
+
+def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspace) -> None:
+    """Until then, and in every picture for which it is not known, bodies are layers; a camera may move."""
+    work.do(ChoosePreset("whole_milk"))
+    assert stage.draw(work, SIZE)
+    assert "until its diffusion is solved for" in stage.diffusing
+    assert stage.plans[0] is not None
+    assert stage.plans[0].given_back.layered == (0,)
+    finish(stage, work)
+    assert stage.diffusing == ""
+    assert stage.plans[0].given_back.diffused == (0,)
+    scene = work.scene()
+    assert scene is not None
+    with stage.current():
+        frame = stage.renderer.render(scene, SIZE, samples=16)
+    assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
+    work.do(Change("look.light", True))
+    finish(stage, work)
+    for action, known in ((Turn(20.0, 10.0), True), (Change("look.light_yaw", 3.0), False)):
+        work.do(action)
+        stage.draw(work, SIZE)
+        assert (stage.diffusing == "") is known
+    work.do(Change("display.scattering", "single"))
+    finish(stage, work)
+    assert not stage.plans[0].given_back
+
+
+def test_light_that_cannot_be_solved_for_is_told_once(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise tl.RenderError("diffusion in a body", "the solver is not there", "render layers")
+
+    monkeypatch.setattr(stage.renderer.gpu.diffusion, "solve", fail)
+    work.do(ChoosePreset("whole_milk"))
+    finish(stage, work)
+    assert "since it could not be solved for" in stage.diffusing
+    assert [message.kind for message in work.messages] == ["error"]
+    assert stage.plans[0] is not None
+    assert stage.plans[0].given_back.layered == (0,)
 
 
 def test_smooth_edges_are_those_of_many_samples(stage: Stage, work: Workspace) -> None:

@@ -15,7 +15,7 @@ from translucent.preview import numbers, orbiting
 from translucent.preview.actions import Change, ChoosePreset, Open, Pan, SetOrbit, Turn, Zoom, apply
 from translucent.preview.document import RANGES, Document, Material, Orbit
 from translucent.preview.history import MAX_STEPS, History
-from translucent.preview.scenes import material_of, medium_of
+from translucent.preview.scenes import material_of, medium_of, scattering_of
 from translucent.preview.script import read_script
 from translucent.preview.session import load_session, save_session
 from translucent.scene.showcase import framing, showcase
@@ -158,11 +158,23 @@ def test_a_preset_is_the_medium_that_it_names() -> None:
     assert (edited.source, edited.preset) == ("coefficients", "")
 
 
-def test_what_a_preset_scatters_is_not_lost() -> None:
-    """As ``translucent render --preset`` shows it."""
-    milk = apply(Document(), ChoosePreset("whole_milk"))
-    assert milk.material.multiple_scattering
-    assert not apply(milk, ChoosePreset("jade")).material.multiple_scattering
+def test_sessions_with_the_former_switch_of_the_material_are_read(tmp_path: Path) -> None:
+    """What is scattered many times is the planner's choice now, or `display.scattering`."""
+    text = "version = 1\n[material]\nroughness = 0.5\nmultiple_scattering = true\n"
+    (tmp_path / "a.toml").write_text(text)
+    found = load_session(tmp_path / "a.toml")
+    assert found == Document(material=Material(roughness=0.5))
+    (tmp_path / "a.toml").write_text(text.replace("[material]", "[look]").replace("roughness", "exposure"))
+    with pytest.raises(tl.InputError, match="unknown key 'multiple_scattering'"):
+        load_session(tmp_path / "a.toml")
+
+
+def test_the_way_of_scattering_is_one_of_those_of_the_planner() -> None:
+    chosen = apply(Document(), Change("display.scattering", "layer"))
+    assert scattering_of(chosen.display.scattering) == tl.ScatteringLayer()
+    assert scattering_of(Document().display.scattering) is None
+    with pytest.raises(tl.InputError, match="use auto, diffusion, layer, single"):
+        apply(Document(), Change("display.scattering", "many"))
 
 
 def test_the_material_of_a_model_is_its_medium() -> None:

@@ -23,9 +23,10 @@ def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> 
 
 
 def finish(stage: Stage, work: Workspace) -> None:
-    """Draw until nothing is left to draw, or to be compiled for it."""
+    """Draw until nothing is left to draw, or to be compiled or solved for it."""
     end = time.monotonic() + 60.0
-    while (drawn := stage.draw(work, SIZE)) or work.compiler.lane.task is not None:
+    lanes = work.compiler.lane, work.lanes["diffuse"]
+    while (drawn := stage.draw(work, SIZE)) or any(lane.task is not None for lane in lanes):
         assert time.monotonic() < end, "the picture is never done"
         work.update()
         if not drawn:

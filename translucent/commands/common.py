@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from translucent.media.medium import Medium
     from translucent.planning.interfaces import Interfaces
     from translucent.planning.methods import Method
+    from translucent.planning.scattering import Scattering
     from translucent.scene.environment import Environment
 
 #: Names of tone curves, as in `translucent.formulas.tone.TONES`, which only rendering imports.
@@ -26,6 +27,12 @@ TONE_NAMES = ("none", "neutral", "agx")
 
 #: Names of the ways of finding interfaces, as in `translucent.planning.interfaces.INTERFACES`, likewise.
 INTERFACE_NAMES = ("traced", "screen", "front")
+
+#: Names of the ways of showing light that is scattered many times, as in `translucent.planning.scattering.SCATTERINGS`.
+SCATTERING_NAMES = ("diffusion", "layer", "single")
+
+#: Index of refraction of what `scattering_medium_options` choose: that of soap, wax, skin and milk is 1.33 to 1.5.
+SCATTERING_IOR = 1.4
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -166,6 +173,77 @@ def read_interfaces(name: str | None, depth: int | None, forks: int | None) -> I
         asked = f"--interface-{next(iter(given))}"
         raise InputError(asked, "only --interfaces traced takes it", "add --interfaces traced")
     return TracedInterfaces(**given) if given else None if name is None else INTERFACES[name]()
+
+
+def scattering_options(command: F) -> F:
+    """Options for how light is shown that media scatter more than once."""
+    command = click.option(
+        "--diffusion-resolution",
+        type=int,
+        metavar="N",
+        help="Of --scattering diffusion: a body gets about N^3 / 4 cells, 8 to 128. Default: 32.",
+    )(command)
+    return click.option(
+        "--scattering",
+        "scattering_name",
+        type=click.Choice(SCATTERING_NAMES),
+        help="Light that media scatter many times: as it diffuses in the body (wax, milk, jade); as a flat layer gives "
+        "it back (quicker where the light or the medium changes all the time); or not at all, with what is scattered "
+        "once alone (smoke, clear drinks). Default: diffusion in closed bodies with an interface, layers in sheets and "
+        "open meshes, single where there is no interface or little scatters.",
+    )(command)
+
+
+def read_scattering(name: str | None, resolution: int | None) -> Scattering | None:
+    """The way of showing light scattered many times that the options choose, if any."""
+    from translucent.planning.scattering import SCATTERINGS, Diffusion
+
+    if resolution is None:
+        return None if name is None else SCATTERINGS[name]()
+    if name != Diffusion.name:
+        raise InputError("--diffusion-resolution", "only --scattering diffusion takes it", "add --scattering diffusion")
+    return Diffusion(resolution)
+
+
+def scattering_medium_options(command: F) -> F:
+    """Options that choose a medium by the color that it has where it is thick."""
+    command = click.option(
+        "--mean-free-path",
+        metavar="L",
+        help="Length after which light in such a medium is scattered or absorbed, on average: 0.5mm.",
+    )(command)
+    return click.option(
+        "--scattering-color",
+        metavar="C",
+        help=f"Diffuse color of a body that is thick and scatters, with --mean-free-path; its ior is "
+        f"{SCATTERING_IOR:g}. Wax: --scattering-color '#f2e0b8' --mean-free-path 2mm.",
+    )(command)
+
+
+def read_any_medium(
+    color: str | None,
+    distance: str | None,
+    preset_name: str | None,
+    clamp: bool | None,
+    scattering_color: str | None,
+    mean_free_path: str | None,
+) -> Medium | None:
+    """Medium that the options choose by what it transmits, or by the color of what it scatters, if any."""
+    from translucent.media.albedo import scattering_medium
+    from translucent.units import parse_length
+
+    if scattering_color is None and mean_free_path is None:
+        return read_medium(color, distance, preset_name, clamp)
+    given, missing = "--scattering-color", "--mean-free-path"
+    if scattering_color is None:
+        given, missing = missing, given
+    others = {"--color": color, "--distance": distance, "--preset": preset_name}
+    if other := [option for option, value in others.items() if value is not None]:
+        raise InputError(given, f"{other[0]} is given, too", "give one medium: by what it transmits or scatters")
+    if scattering_color is None or mean_free_path is None:
+        do = "give both: the color of a body with no end says nothing about how far light gets in it"
+        raise InputError(given, f"{missing} is missing", do)
+    return scattering_medium(scattering_color, parse_length(mean_free_path), ior=SCATTERING_IOR)
 
 
 def read_medium(

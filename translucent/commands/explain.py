@@ -12,9 +12,12 @@ from translucent.commands.common import (
     interface_options,
     medium_options,
     outside_option,
+    read_any_medium,
     read_interfaces,
-    read_medium,
     read_method,
+    read_scattering,
+    scattering_medium_options,
+    scattering_options,
     unit_option,
 )
 from translucent.commands.console import echo
@@ -29,10 +32,12 @@ if TYPE_CHECKING:
 @click.command(epilog="Example: translucent explain goblet")
 @click.argument("model")
 @medium_options
+@scattering_medium_options
 @unit_option
 @outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
 @interface_options
+@scattering_options
 @common_options
 def explain(
     model: str,
@@ -40,12 +45,16 @@ def explain(
     distance: str | None,
     preset_name: str | None,
     clamp: bool | None,
+    scattering_color: str | None,
+    mean_free_path: str | None,
     unit: str,
     allow_outside: bool,
     method_name: str | None,
     interfaces_name: str | None,
     interface_depth: int | None,
     interface_forks: int | None,
+    scattering_name: str | None,
+    diffusion_resolution: int | None,
     as_json: bool,
 ) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
@@ -54,11 +63,12 @@ def explain(
     """
     from translucent.planning.plan import plan
 
-    medium = read_medium(color, distance, preset_name, clamp)
+    medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     scene = read_scene(model, unit, medium, allow_outside=allow_outside)
     method = read_method(method_name, None)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
-    chosen = plan(scene, method, interfaces=interfaces) if scene.bodies else None
+    scattering = read_scattering(scattering_name, diffusion_resolution)
+    chosen = plan(scene, method, interfaces=interfaces, scattering=scattering) if scene.bodies else None
     if as_json:
         echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):

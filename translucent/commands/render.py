@@ -16,12 +16,15 @@ from translucent.commands.common import (
     method_option,
     outside_option,
     overwrite_option,
+    read_any_medium,
     read_environment,
     read_interfaces,
-    read_medium,
     read_method,
+    read_scattering,
     read_size,
     refuse_overwriting,
+    scattering_medium_options,
+    scattering_options,
     unit_option,
 )
 from translucent.commands.console import echo
@@ -45,6 +48,7 @@ from translucent.errors import InputError
     "-o", "--output", required=True, type=click.Path(path_type=Path), help="A .png, .exr or .npz file; see --turntable."
 )
 @medium_options
+@scattering_medium_options
 @unit_option
 @outside_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
@@ -58,6 +62,7 @@ from translucent.errors import InputError
 @look_options
 @method_option
 @interface_options
+@scattering_options
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -77,6 +82,8 @@ def render(
     distance: str | None,
     preset_name: str | None,
     clamp: bool | None,
+    scattering_color: str | None,
+    mean_free_path: str | None,
     unit: str,
     allow_outside: bool,
     size: str,
@@ -94,6 +101,8 @@ def render(
     interfaces_name: str | None,
     interface_depth: int | None,
     interface_forks: int | None,
+    scattering_name: str | None,
+    diffusion_resolution: int | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -106,8 +115,8 @@ def render(
 ) -> None:
     """Render MODEL, a file or one of the toolkit's own meshes, to a picture with its physical quantities.
 
-    A .glb or .gltf file is rendered as the scene that it is, with the media of its materials; --color or --preset
-    replaces them. All other files are one mesh.
+    A .glb or .gltf file is rendered as the scene that it is, with the media of its materials; --color, --preset or
+    --scattering-color replaces them. All other files are one mesh.
     """
     import translucent as tl
     from translucent.scene.turntable import framed_all_around
@@ -119,11 +128,12 @@ def render(
     if interfaces is not None and not interfaces.finds_exits and opaque_with is not None:
         found = "--opaque-with, whose interfaces are those of the screen"
         raise InputError(f"--interfaces {interfaces.name}", found, "leave out one of the two")
+    scattering = read_scattering(scattering_name, diffusion_resolution)
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
-    medium = read_medium(color, distance, preset_name, clamp)
+    medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     method = read_method(method_name, thickness)
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
@@ -133,12 +143,20 @@ def render(
         scene = framed_all_around(scene, pixels)
     with tl.Renderer(backend) as renderer:
         draw = partial(
-            renderer.render, size=pixels, method=method, samples=samples, transparent=transparent, interfaces=interfaces
+            renderer.render,
+            size=pixels,
+            method=method,
+            samples=samples,
+            transparent=transparent,
+            interfaces=interfaces,
+            scattering=scattering,
         )
         if opaque_with is not None:
             from translucent.interop.pyrender import render_scene
 
-            draw = partial(render_scene, size=pixels, method=method, samples=samples, renderer=renderer)
+            draw = partial(
+                render_scene, size=pixels, method=method, samples=samples, renderer=renderer, scattering=scattering
+            )
         frame = pictures.write(scene, draw)
     warn_if_black(scene, frame, unit, own=is_own(model))
     media = medium_lines(scene)

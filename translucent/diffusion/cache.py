@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from threading import Lock
 from typing import TypeVar
 
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
@@ -19,22 +20,19 @@ _T = TypeVar("_T")
 
 
 class FieldCache:
-    """Diffused light of scenes whose media are marked (`DiffusedMedium`)."""
+    """Diffused light of scenes whose media are marked (`DiffusedMedium`). Threads may share it."""
 
     def __init__(self) -> None:
+        self._lock = Lock()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
         self._diffusing: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
         self._scenes: OrderedDict[Hashable, dict[int, DiffusionField]] = OrderedDict()
 
     def of(self, scene: Scene, diffusion: Diffusion) -> dict[int, DiffusionField]:
         """Light of each such body by its number; the same object until something changes it."""
-        media = {i: body.medium for i, body in enumerate(scene.objects) if isinstance(body.medium, DiffusedMedium)}
-        if not media:
+        if not (media := _diffused(scene)):
             return {}
         opaque = tuple(scene.opaque)
-        bodies = tuple((_place(body := scene.objects[i]), m.original, _roughness(body)) for i, m in media.items())
-        lights = scene.environment, tuple(scene.lights)
-        key = (diffusion, tuple(media), bodies, tuple(_place(item) for item in opaque), lights)
 
         def make() -> dict[int, DiffusionField]:
             return {
@@ -42,12 +40,18 @@ class FieldCache:
                 for i, medium in media.items()
             }
 
-        return _kept(self._scenes, key, make, KEPT_SCENES)
+        with self._lock:
+            return _kept(self._scenes, diffusion_key(scene, diffusion), make, KEPT_SCENES)
+
+    def has(self, key: Hashable) -> bool:
+        """Whether the light of this `diffusion_key` is known."""
+        return key in self._scenes
 
     def clear(self) -> None:
         """Forget everything."""
-        for store in (self._bodies, self._diffusing, self._scenes):
-            store.clear()
+        with self._lock:
+            for store in (self._bodies, self._diffusing, self._scenes):
+                store.clear()
 
     def _body(self, body: Object, medium: Medium, opaque: tuple[Object, ...], diffusion: Diffusion) -> DiffusingBody:
         step, roughness = diffusion.cell_size(body), _roughness(body)
@@ -55,6 +59,20 @@ class FieldCache:
         lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
         key = (place, medium, roughness)
         return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)
+
+
+def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
+    """Everything that the diffused light of a scene depends on; the camera is no part of it."""
+    bodies = tuple(
+        (i, _place(body := scene.objects[i]), medium.original, _roughness(body))
+        for i, medium in _diffused(scene).items()
+    )
+    opaque = tuple(_place(item) for item in scene.opaque)
+    return (diffusion, bodies, opaque, scene.environment, tuple(scene.lights))
+
+
+def _diffused(scene: Scene) -> dict[int, DiffusedMedium]:
+    return {i: body.medium for i, body in enumerate(scene.objects) if isinstance(body.medium, DiffusedMedium)}
 
 
 def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import moderngl
 import numpy as np
 import numpy.typing as npt
@@ -78,6 +80,14 @@ class DiffusionCache:
             self._release_last()
             self._last = DiffusedLight(self._gl, fields)
         return self._last
+
+    def has(self, key: Hashable) -> bool:
+        """Whether the light of this `diffusion_key` is known."""
+        return self._fields.has(key)
+
+    def solve(self, scene: Scene, diffusion: Diffusion) -> None:
+        """Find the light of a scene whose media are marked, to be drawn later. Needs no context: a thread may do it."""
+        self._fields.of(scene, diffusion)
 
     def release(self) -> None:
         """Free the texture."""

@@ -19,6 +19,7 @@ from translucent.frames.frame import Frame
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
+from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.present import PresentPass
@@ -75,6 +76,11 @@ class GpuRenderer:
         self._turn = threading.RLock()
         # A renderer that nobody closed must not keep its memory; the context takes all its objects along.
         self._abandoned = weakref.finalize(self, _release, self.context.gl, os.getpid()) if self.context.owned else None
+
+    @property
+    def diffusion(self) -> DiffusionCache:
+        """Light that diffuses in bodies, as it is known so far."""
+        return self._resources.diffusion
 
     @property
     def provenance(self) -> dict[str, str]:

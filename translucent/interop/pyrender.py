@@ -24,6 +24,7 @@ from translucent.errors import InputError, RenderError
 from translucent.interop._pyrender_shim import load_pyrender
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method
+from translucent.planning.scattering import Scattering
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Overlap, Scene
@@ -212,6 +213,7 @@ def render_scene(
     method: Method | None = None,
     samples: int = 1,
     renderer: Renderer | None = None,
+    scattering: Scattering | None = None,
 ) -> Frame:
     """Render a scene of the toolkit, whose opaque objects pyrender draws.
 
@@ -225,6 +227,8 @@ def render_scene(
         As for `Renderer.render`.
     renderer : Renderer, optional
         Default: a new one for this frame.
+    scattering
+        As for `Renderer.render`.
 
     Raises
     ------
@@ -237,7 +241,7 @@ def render_scene(
 
     if renderer is None:
         with Renderer() as made:
-            return render_scene(scene, size, method, samples, made)
+            return render_scene(scene, size, method, samples, made, scattering)
     _require_opaque(scene)
     context = renderer.gpu.context
     _require_copying("its opaque objects always come so", owned=context.owned, shared=None)
@@ -252,7 +256,8 @@ def render_scene(
     if scene.camera.fov_y is not None and np.isfinite(nearest):
         picture = drawn_apart(written(scene, _NEARER * nearest), size, 0)
     backdrop = picture.before(scene.environment, scene.camera)
-    frame = renderer.render(dataclasses.replace(scene, objects=scene.bodies), size, method, samples, backdrop)
+    bodies = dataclasses.replace(scene, objects=scene.bodies)
+    frame = renderer.render(bodies, size, method, samples, backdrop, scattering=scattering)
     frame.provenance["opaque"] = f"pyrender {pyrender.__version__} through arrays"
     return frame
 

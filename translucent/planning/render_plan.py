@@ -108,6 +108,7 @@ class RenderPlan:
             "method": self.runs,
             "exact": self.exact,
             "interfaces": None if self.interfaces is None else str(self.interfaces),
+            "given_back": str(self.given_back) if self.given_back else None,
             "cost": round(self.cost, 2),
             "passes": [
                 {
@@ -126,6 +127,8 @@ class RenderPlan:
         cost = f", at about the cost of {self.cost:.1f} depth-only draws" if self.cost else ""
         lines = [f"{self.runs}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
+        if self.given_back:
+            lines.append(f"  light scattered many times {self.given_back}")
         lines += [f"  limit: {limit}" for limit in self.limits]
         lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
         return "\n".join(lines)

@@ -194,7 +194,6 @@ def _of_preset(material: Material, name: str) -> Material:
         emission=tuple(np.asarray(medium.emission).tolist()),
         anisotropy=float(medium.anisotropy),
         ior=float(medium.ior),
-        multiple_scattering=medium.scatters,  # as `showcase.finished`: milk would be black
     )
     return _stated(filled)
 

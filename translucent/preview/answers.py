@@ -12,7 +12,7 @@ from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
 from translucent.preview.exports import write_picture, write_turntable
-from translucent.preview.scenes import medium_of, method_of
+from translucent.preview.scenes import medium_of, method_of, scattering_of
 
 
 def take_answers(desk: Desk) -> None:
@@ -55,11 +55,11 @@ def _export(desk: Desk, kind: str, path: str) -> None:
     if scene is None:
         return
     method, size = method_of(document.display.method, document.material), desk.stage.viewport.size
-    look = document.look.exposure, document.look.tone
+    look, scattering = (document.look.exposure, document.look.tone), scattering_of(document.display.scattering)
     if kind == "turntable":
-        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"])
+        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], scattering)
     else:
-        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"])
+        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"], scattering)
 
 
 def _save_medium(desk: Desk, path: str) -> None:

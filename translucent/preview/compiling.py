@@ -29,6 +29,7 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering.diffusion import LEAST_RESOLUTION, Diffusion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
 from translucent.preview.worker import Companion
 from translucent.scene.environment import Environment
@@ -115,7 +116,7 @@ class Compiler:
         for mesh in unsmoothed(scene, plans):
             task.report(None, "normals")
             keep_drawn_normals(mesh, self._companion.call(task, smoothed, mesh.vertices, mesh.faces))
-        return self._companion.call(task, compile_frames, stand_in(scene), tuple(plans), self.device)
+        return self._companion.call(task, compile_frames, stand_in(scene), tuple(map(_quick, plans)), self.device)
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build what is ready, and what was `missing`: if it is not ready, the window tells why."""
@@ -211,6 +212,12 @@ def _engine(written: float, device: str) -> tuple[GpuRenderer, Ledger]:
         raise RenderError("another process", f"it draws with {own}, and the window with {device}", "mend the drivers")
     engine.context.gl.extra = ledger
     return engine, ledger
+
+
+def _quick(plan: RenderPlan) -> RenderPlan:
+    """Plan that needs the same programs, with few cells for light that diffuses."""
+    back = dataclasses.replace(plan.given_back, diffusion=Diffusion(LEAST_RESOLUTION))
+    return dataclasses.replace(plan, given_back=back)
 
 
 def stand_in(scene: Scene) -> Scene:

@@ -12,6 +12,7 @@ from translucent.errors import InputError
 from translucent.formulas.tone import TONES
 from translucent.media.medium import MAX_COEFFICIENT, MAX_EMISSION, MAX_IOR
 from translucent.planning.methods import METHODS
+from translucent.planning.scattering import SCATTERINGS
 from translucent.scene.camera import MAX_COORDINATE
 from translucent.scene.environment import MAX_EXPOSURE
 from translucent.scene.lights import MAX_RADIANCE
@@ -24,7 +25,7 @@ Source = Literal["file", "color", "preset", "coefficients"]
 Mode = Literal["picture", "thickness", "transmittance", "validity"]
 Compare = Literal["off", "method", "reference", "error"]
 
-#: Name of the method that leaves the choice to the planner.
+#: Name of the method, and of the way of scattering, that leaves the choice to the planner.
 AUTO = "auto"
 
 #: Units of length that panels offer.
@@ -63,7 +64,6 @@ class Material:
     anisotropy : float
         Henyey-Greenstein g.
     ior, roughness, transmission, dispersion : float
-    multiple_scattering : bool
     thickness : float
         thicknessFactor in metres, written to files and taken by thin layers.
     """
@@ -80,7 +80,6 @@ class Material:
     roughness: float = 0.0
     transmission: float = 1.0
     dispersion: float = 0.0
-    multiple_scattering: bool = False
     thickness: float = 0.001
 
 
@@ -120,6 +119,8 @@ class Display:
     ----------
     method, method_b : str
         Names of methods, or ``auto``: the planner's choice.
+    scattering : str
+        How light that is scattered many times is shown: ``auto``, or a name of `SCATTERINGS`.
     mode : {"picture", "thickness", "transmittance", "validity"}
     compare : {"off", "method", "reference", "error"}
         What is right of the split: nothing, `method_b`, the float64 reference, or the signed error against it.
@@ -135,6 +136,7 @@ class Display:
 
     method: str = AUTO
     method_b: str = "thin-layer"
+    scattering: str = AUTO
     mode: Mode = "picture"
     compare: Compare = "off"
     split: float = 0.5
@@ -216,6 +218,7 @@ RANGES: dict[str, _Range] = {
     "look.light_irradiance": _Range(0.0, MAX_RADIANCE),
     "display.method": _Range(words=_METHODS),
     "display.method_b": _Range(words=_METHODS),
+    "display.scattering": _Range(words=(AUTO, *SCATTERINGS)),
     "display.mode": _Range(words=get_args(Mode)),
     "display.compare": _Range(words=get_args(Compare)),
     "display.split": _Range(0.0, 1.0),

@@ -13,6 +13,7 @@ from translucent.errors import InputError
 from translucent.frames.animation import check_animation, write_animation
 from translucent.frames.writing import SUFFIXES, check_output
 from translucent.planning.methods import Method
+from translucent.planning.scattering import Scattering
 from translucent.preview.tasks import Report
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -47,11 +48,12 @@ def write_picture(
     size: Size,
     look: Look = (0.0, "none"),
     transparent: bool = False,
+    scattering: Scattering | None = None,
 ) -> None:
     """Write a .png, or an .exr with all quantities; transparent, it lacks what is seen beside and behind the bodies."""
     report(None, "drawing")
     with Renderer() as renderer:
-        frame = renderer.render(scene, size, method, samples=16, transparent=transparent)
+        frame = renderer.render(scene, size, method, samples=16, transparent=transparent, scattering=scattering)
     report(None, "writing")
     frame.save(path, *look)
 
@@ -64,6 +66,7 @@ def write_turntable(
     size: Size,
     look: Look = (0.0, "none"),
     count: int = 48,
+    scattering: Scattering | None = None,
 ) -> None:
     """Write an animation of the model from all around."""
     with Renderer() as renderer:
@@ -71,6 +74,6 @@ def write_turntable(
         def pictures() -> Iterator[npt.NDArray[np.uint8]]:
             for i, seen in enumerate(turntable(scene, count)):
                 report(i / count, f"picture {i + 1} of {count}")
-                yield renderer.render(seen, size, method, samples=4).to_srgb8(*look)
+                yield renderer.render(seen, size, method, samples=4, scattering=scattering).to_srgb8(*look)
 
         write_animation(Path(path), pictures(), FPS)

@@ -15,6 +15,7 @@ from translucent.geometry.normals import drawn_normals
 from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method, method_from_name
+from translucent.planning.scattering import SCATTERINGS, Scattering
 from translucent.preview.document import AUTO, Document, Look, Material, Model
 from translucent.preview.orbiting import camera_of
 from translucent.scene.environment import Environment
@@ -88,7 +89,6 @@ def material_of(scene: Scene) -> Material:
         roughness=surface.roughness,
         transmission=surface.transmission,
         dispersion=surface.dispersion,
-        multiple_scattering=surface.multiple_scattering,
         thickness=body.sheet_thickness or 0.1 * diagonal,
     )
 
@@ -112,7 +112,8 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
     if document.orbit is None:
         raise InputError("a picture", "nobody has framed the model", "frame it first")
     scene, look = loaded.scene, document.look
-    lights = (*scene.lights, _light(look)) if look.light else scene.lights
+    light = _light(look.light_yaw, look.light_pitch, look.light_irradiance) if look.light else None
+    lights = scene.lights if light is None else (*scene.lights, light)
     return dataclasses.replace(
         scene,
         objects=_objects(document.material, scene),
@@ -137,7 +138,6 @@ def _filled(item: Object, material: Material, medium: Medium) -> Object:
         roughness=material.roughness,
         transmission=material.transmission,
         dispersion=material.dispersion,
-        multiple_scattering=material.multiple_scattering,
         opacity=None,
     )
     return dataclasses.replace(item, medium=medium, surface=surface, sheet_thickness=None)
@@ -145,12 +145,18 @@ def _filled(item: Object, material: Material, medium: Medium) -> Object:
 
 def towards_light(look: Look) -> tuple[float, float, float]:
     """Unit vector to the light that the look adds."""
-    yaw, pitch = math.radians(look.light_yaw), math.radians(look.light_pitch)
+    return _direction(look.light_yaw, look.light_pitch)
+
+
+def _direction(yaw: float, pitch: float) -> tuple[float, float, float]:
+    yaw, pitch = math.radians(yaw), math.radians(pitch)
     return math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)
 
 
-def _light(look: Look) -> DirectionalLight:
-    return DirectionalLight([-v for v in towards_light(look)], look.light_irradiance)
+@lru_cache(maxsize=2)
+def _light(yaw: float, pitch: float, irradiance: float) -> DirectionalLight:
+    """Light that the look adds; cached, since what it does in bodies is cached with it."""
+    return DirectionalLight([-v for v in _direction(yaw, pitch)], irradiance)
 
 
 @lru_cache(maxsize=2)
@@ -179,3 +185,8 @@ def method_of(name: str, material: Material) -> Method | None:
     if name == AUTO:
         return None
     return method_from_name(name).with_thickness(material.thickness)
+
+
+def scattering_of(name: str) -> Scattering | None:
+    """Way of showing light that is scattered many times; None leaves it to the planner."""
+    return None if name == AUTO else SCATTERINGS[name]()

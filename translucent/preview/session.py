@@ -15,6 +15,10 @@ from translucent.preview.document import Document, Orbit, checked
 #: Version of the format, raised by changes that older readers cannot read.
 VERSION = 1
 
+#: Keys of older sessions that say nothing any more: what was a switch of the material is left to the planner, or to
+#: ``display.scattering``.
+_FORMER = {"material": ("multiple_scattering",)}
+
 _SECTIONS = ("model", "material", "look", "display", "orbit")
 
 
@@ -30,7 +34,7 @@ def to_table(document: Document) -> dict[str, Any]:
 
 
 def from_table(table: dict[str, Any], where: str) -> Document:
-    """Document of a table; absent fields have their defaults.
+    """Document of a table; absent fields have their defaults, and those of older versions are passed over.
 
     Raises
     ------
@@ -53,6 +57,8 @@ def from_table(table: dict[str, Any], where: str) -> Document:
 def _fields(section: str, default: Any, fields: dict[str, Any], where: str) -> dict[str, Any]:
     found = {}
     for key, value in fields.items():
+        if key in _FORMER.get(section, ()):
+            continue
         if key not in default.__dataclass_fields__:
             raise InputError(f"{where}, [{section}]", f"an unknown key {key!r}", "check the spelling")
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
@@ -19,10 +18,13 @@ from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import Scattering
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
+from translucent.preview.diffusing import Diffusing
 from translucent.preview.measuring import Truth
-from translucent.preview.scenes import method_of
+from translucent.preview.scenes import method_of, scattering_of
 from translucent.preview.tasks import Task
+from translucent.preview.timing import Timing, kind
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -42,20 +44,6 @@ WATCH = 0.5
 
 
 Factor = TypeVar("Factor", int, float)
-
-
-@dataclass
-class Timing:
-    """Timing of the last step of a side: seconds, by the clock and per pass on the GPU; and its share of the pixels."""
-
-    wall: float = 0.0
-    passes: dict[str, float] | None = None
-    share: float = 1.0
-
-    @property
-    def gpu(self) -> float:
-        """Sum over the passes."""
-        return sum((self.passes or {}).values())
 
 
 class Stage:
@@ -108,6 +96,8 @@ class Stage:
         self._costs: dict[tuple[str, ...], float] = {}
         self._strides = [4, 4]
         self._truth: Truth | None = None
+        self._scattering: Scattering | None = None
+        self._diffusing = Diffusing()
         self._watched = time.monotonic()
         self._newest = newest_shader()
 
@@ -152,7 +142,8 @@ class Stage:
         material = workspace.document.material
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
         both = display.compare == "method"
-        wanted = (scene, methods[0], methods[1] if both else None, self.viewport.size, self.renderer)
+        scattering = self._scattering = self._known_scattering(workspace, scene, methods[0])
+        wanted = (scene, methods[0], methods[1] if both else None, scattering, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             return True
         fresh = wanted != self._shown
@@ -161,8 +152,8 @@ class Stage:
             self.watch(workspace)
         else:
             self.plans = [
-                self.renderer.plan(scene, methods[0]),
-                self.renderer.plan(scene, methods[1]) if both else None,
+                self.renderer.plan(scene, methods[0], scattering=scattering),
+                self.renderer.plan(scene, methods[1], scattering=scattering) if both else None,
             ]
             self._shown = wanted
             self.viewport.restart()
@@ -182,13 +173,15 @@ class Stage:
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, interfaces = workspace.document.look, self._quick_interfaces(self.plans[0])
+        look, interfaces, scattering = workspace.document.look, self._quick_interfaces(self.plans[0]), self._scattering
         if interfaces is not None:
-            self._moving = self.renderer.plan(scene, method, interfaces=interfaces)
+            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, scattering=self._scattering)
         begun, factor = time.perf_counter(), self._factor(self._moving or self.plans[0], FACTORS)
         try:
             with self.viewport.at_once(factor) as framebuffer:
-                plan = self.renderer.draw(scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces)
+                plan = self.renderer.draw(
+                    scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces, scattering=scattering
+                )
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
@@ -199,11 +192,23 @@ class Stage:
         self._presented = ()
         return True
 
+    def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
+        """What is asked for, or layers until the light that diffuses in the scene is known."""
+        asked = scattering_of(workspace.document.display.scattering)
+        back = self.renderer.plan(scene, method, scattering=asked).given_back
+        cache, lane = self.renderer.gpu.diffusion, workspace.lanes["diffuse"]
+        return self._diffusing.scattering(scene, asked, back, cache, lane)
+
+    @property
+    def diffusing(self) -> str:
+        """How light that diffuses is shown while it is not known, or nothing."""
+        return self._diffusing.told
+
     def _quick_interfaces(self, plan: RenderPlan | None) -> ScreenInterfaces | None:
         """Interfaces for a picture that moves, if tracing them is known to take too long; else None."""
         if plan is None or not plan.has(PassName.TRACED):
             return None
-        slow = self._costs.get(_kind(plan), 0.0) / COARSEST_TRACED**2 > BUDGET
+        slow = self._costs.get(kind(plan), 0.0) / COARSEST_TRACED**2 > BUDGET
         return ScreenInterfaces() if slow else None
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
@@ -221,14 +226,14 @@ class Stage:
         self.renderer.gpu.context.gl.finish()
         wall = time.perf_counter() - begun
         seconds = wall * stride * stride
-        known = self._costs.get(_kind(plan))
+        known = self._costs.get(kind(plan))
         # The first of its kind compiles shaders.
-        self._costs[_kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
+        self._costs[kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
         self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def _factor(self, plan: RenderPlan | None, factors: tuple[Factor, ...]) -> Factor:
         """Smallest factor of reduction at which a picture is expected to be drawn quickly."""
-        known = None if plan is None else self._costs.get(_kind(plan))
+        known = None if plan is None else self._costs.get(kind(plan))
         if known is None:
             return factors[0] if plan is None else factors[-2:][0]
         return next((factor for factor in factors if known / factor**2 <= BUDGET), factors[-1])
@@ -355,13 +360,13 @@ class Stage:
         scene = workspace.scene()
         with self.current():
             fresh = Renderer(context=self._gl)
-            viewport = None
+            anew, viewport = partial(fresh.plan, scattering=self._scattering), None
             try:
                 viewport = Viewport(fresh.gpu)
                 viewport.resize(FRAME)
                 for plan in self._drawn_plans if scene is not None else ():
                     if scene is not None:
-                        viewport.step(0, scene, fresh.plan(scene, plan.method, interfaces=plan.interfaces), 1)
+                        viewport.step(0, scene, anew(scene, plan.method, interfaces=plan.interfaces), 1)
             except TranslucentError as error:
                 self.shader_problem = str(error)
                 if viewport is not None:
@@ -388,8 +393,3 @@ class Stage:
             self.renderer.close()
         if self._own is not None:
             self._own.gl.release()
-
-
-def _kind(plan: RenderPlan) -> tuple[str, ...]:
-    """Key of plans that take about the same time."""
-    return (str(plan.method), *(step.name for step in plan.passes))

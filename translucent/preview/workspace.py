@@ -96,6 +96,7 @@ class Workspace:
         self.lanes = {
             "load": Lane("load"),
             "draw": Lane("draw"),
+            "diffuse": Lane("diffuse"),
             "truth": Lane("truth"),
             "bake": Lane("bake"),
             "ray": Lane("ray"),

@@ -42,6 +42,12 @@ class GivenBack:
         """Whether there are any."""
         return bool(self.diffused or self.layered)
 
+    def __str__(self) -> str:
+        ways = ((self.diffused, f"diffuses ({self.diffusion})"), (self.layered, "is given back as by layers"))
+        return ", and ".join(
+            f"{way} in {len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}" for bodies, way in ways if bodies
+        )
+
 
 #: Where media show what they scatter once, and no more.
 NOTHING_GIVEN_BACK = GivenBack()

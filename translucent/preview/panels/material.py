@@ -22,7 +22,6 @@ from translucent.preview.desk import (
     WARNING,
     Desk,
     begin_rows,
-    check,
     em,
     fact,
     row,
@@ -72,7 +71,6 @@ def material_panel(desk: Desk) -> None:
     triple(desk, "emission, radiance per m", "material.emission", 0.05)
     if begin_rows("scattering"):
         slider(desk, "anisotropy g", "material.anisotropy", -0.99, 0.99)
-        check(desk, "multiple", "material.multiple_scattering", tip="Light scattered more than once, approximately.")
         imgui.end_table()
     imgui.separator_text("Numbers")
     _numbers(desk, material)

@@ -6,12 +6,16 @@ from imgui_bundle import imgui
 
 from translucent.planning.methods import METHODS
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import SCATTERINGS
 from translucent.preview import numbers
 from translucent.preview.desk import ERROR, FAINT, WARNING, Desk, begin_rows, check, choice, fact, slider, wrapped
 from translucent.preview.document import AUTO
-from translucent.preview.stage import Timing
+from translucent.preview.timing import Timing
 
 NAMES = (AUTO, *METHODS)
+
+SCATTERING_NAMES = (AUTO, *SCATTERINGS)
+SCATTERING_TIP = "Light scattered many times: it diffuses in the body, leaves as from a flat layer, or is left out."
 
 #: Advice about invalid pixels, by a word in the plan's limits or the diagnosis.
 CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
@@ -22,6 +26,7 @@ def method_panel(desk: Desk) -> None:
     display = desk.work.document.display
     if begin_rows("method"):
         choice(desk, "method", "display.method", NAMES, tip="auto: the cheapest one that is exact for the scene.")
+        choice(desk, "scattering", "display.scattering", SCATTERING_NAMES, tip=SCATTERING_TIP)
         choice(desk, "show", "display.mode", ("picture", "thickness", "transmittance", "validity"))
         choice(desk, "right of split", "display.compare", ("off", "method", "reference", "error"))
         if display.compare == "method":

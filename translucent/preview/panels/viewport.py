@@ -259,7 +259,8 @@ def _ask_crossing(desk: Desk, probed: Probed) -> None:
 def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
-    lines = [text for text in (desk.stage.problem, desk.stage.shader_problem, desk.stage.simpler) if text]
+    stage = desk.stage
+    lines = [text for text in (stage.problem, stage.shader_problem, stage.simpler, stage.diffusing) if text]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
     lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]
     for text in lines:
