@@ -169,9 +169,14 @@ def read_interfaces(name: str | None, depth: int | None, forks: int | None) -> I
 
 
 def read_medium(
-    color: str | None, distance: str | None, preset_name: str | None, clamp: bool | None = None
+    color: str | None,
+    distance: str | None,
+    preset_name: str | None,
+    clamp: bool | None = None,
+    *,
+    shows_scattering: bool = False,
 ) -> Medium | None:
-    """Medium that the options choose, if any."""
+    """Medium that the options choose, if any; where scattered light is not shown, presets that live by it are told."""
     from translucent.media.medium import Medium
     from translucent.media.presets import preset
     from translucent.units import parse_length
@@ -180,7 +185,7 @@ def read_medium(
         if color is not None or distance is not None:
             raise InputError(f"--preset {preset_name}", "--color or --distance is given, too", "give one or the other")
         chosen = preset(preset_name)
-        if chosen.warning:
+        if chosen.warning and not shows_scattering:
             echo(f"warning: {chosen.warning}", err=True)
         return chosen.medium
     if (color is None) != (distance is None):
@@ -193,6 +198,13 @@ def read_medium(
     for line in told:
         echo(f"warning: {line}", err=True)
     return medium
+
+
+def read_roughness(roughness: float | None, preset_name: str | None) -> float | None:
+    """Roughness that the options choose, or that the preset's surfaces have; if neither, surfaces keep their own."""
+    from translucent.media.presets import preset
+
+    return (preset(preset_name).roughness or None) if roughness is None and preset_name is not None else roughness
 
 
 def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
@@ -246,7 +258,7 @@ def look_options(command: F) -> F:
         "--roughness",
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
-        help="Of the interfaces of media, 0 (polished) to 1. Default: 0, or that of the file's materials.",
+        help="Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0.",
     )(command)
     command = click.option(
         "--tone",

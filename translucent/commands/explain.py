@@ -15,6 +15,7 @@ from translucent.commands.common import (
     read_interfaces,
     read_medium,
     read_method,
+    read_roughness,
     unit_option,
 )
 from translucent.commands.console import echo
@@ -54,8 +55,9 @@ def explain(
     """
     from translucent.planning.plan import plan
 
-    medium = read_medium(color, distance, preset_name, clamp)
-    scene = read_scene(model, unit, medium, allow_outside=allow_outside)
+    medium = read_medium(color, distance, preset_name, clamp, shows_scattering=True)
+    roughness = read_roughness(None, preset_name)
+    scene = read_scene(model, unit, medium, roughness=roughness, allow_outside=allow_outside)
     method = read_method(method_name, None)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     chosen = plan(scene, method, interfaces=interfaces) if scene.bodies else None

@@ -20,6 +20,7 @@ from translucent.commands.common import (
     read_interfaces,
     read_medium,
     read_method,
+    read_roughness,
     read_size,
     refuse_overwriting,
     unit_option,
@@ -123,7 +124,8 @@ def render(
     pictures.check()
     refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
-    medium = read_medium(color, distance, preset_name, clamp)
+    medium = read_medium(color, distance, preset_name, clamp, shows_scattering=True)
+    roughness = read_roughness(roughness, preset_name)
     method = read_method(method_name, thickness)
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
