@@ -1,8 +1,8 @@
 """Real-time translucent-material shading, with the exact thickness of the mesh along every view ray.
 
 >>> import translucent as tl
->>> jade = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
->>> jade.transmittance(0.02).round(2).tolist()
+>>> green = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
+>>> green.transmittance(0.02).round(2).tolist()
 [0.18, 0.62, 0.35]
 """
 
@@ -55,7 +55,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.fitting import fit_medium as fit_medium
     from translucent.media.fitting import fit_wedge as fit_wedge
     from translucent.media.medium import Medium as Medium
-    from translucent.media.presets import Preset as Preset
+    from translucent.media.preset import Preset as Preset
     from translucent.media.presets import preset as preset
     from translucent.media.presets import presets as presets
     from translucent.mesh_files import load_mesh as load_mesh
@@ -111,7 +111,8 @@ _NAMES = {
     "media.density": "DensityGrid ExponentialDensity LinearDensity",
     "media.fitting": "Fit fit_medium fit_wedge",
     "media.medium": "Medium",
-    "media.presets": "Preset preset presets",
+    "media.preset": "Preset",
+    "media.presets": "preset presets",
     "mesh_files": "load_mesh",
     "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
     "planning.scattering": "Diffusion ScatteringLayer SingleScattering",

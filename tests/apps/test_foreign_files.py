@@ -54,7 +54,7 @@ def test_what_is_printed_goes_through_one_place() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [["explain"], ["material", "apply", "-o", "{}/out.glb", "--preset", "jade"], ["bake", "-o", "{}/t.npy"]],
+    [["explain"], ["material", "apply", "-o", "{}/out.glb", "--preset", "gummy"], ["bake", "-o", "{}/t.npy"]],
 )
 def test_links_lead_outside_only_where_that_is_said(run: Run, tmp_path: Path, arguments: list[str]) -> None:
     (tmp_path / "model").mkdir()

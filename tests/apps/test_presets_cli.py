@@ -39,17 +39,22 @@ def test_the_table_has_every_medium(run: Run) -> None:
     result = run()
     head, *lines = result.out.splitlines()
     assert (result.code, result.err) == (0, "")
-    assert head.split() == ["name", "kind", "regime", *["1", "mm", "1", "cm", "10", "cm"], "source"]
+    assert head.split() == ["name", "kind", "regime", *["1", "mm", "1", "cm", "10", "cm"], "thick", "source"]
     assert [line.split()[0] for line in lines] == list(tl.presets())
     for line, one in zip(lines, tl.presets().values(), strict=True):
         cells = re.split(r" {2,}", line)
-        assert cells == [one.name, one.kind, one.regime, *one.colors().values(), one.source]
+        assert cells == [one.name, one.kind, one.regime, *one.colors().values(), one.diffuse_color() or "-", one.source]
     assert ESCAPE not in result.out
 
 
 def test_the_columns_line_up(run: Run) -> None:
     head, *lines = run().out.splitlines()
-    for column, pattern in (("kind", "measured|estimated"), ("1 mm", "#"), ("source", "Jensen|Narasimhan|by eye")):
+    for column, pattern in (
+        ("kind", "measured|estimated"),
+        ("1 mm", "#"),
+        ("thick", "#|-"),
+        ("source", "Jensen|Narasimhan|by eye"),
+    ):
         at = head.index(column)
         assert all(re.match(pattern, line[at:]) for line in lines), column
 
@@ -58,10 +63,12 @@ def test_the_table_as_json(run: Run) -> None:
     result = run("--json")
     listed = strict_json(result.out)["presets"]
     assert [entry["name"] for entry in listed] == list(tl.presets())
-    assert {tuple(entry) for entry in listed} == {("name", "kind", "regime", "colors", "source")}
+    assert {tuple(entry) for entry in listed} == {("name", "kind", "regime", "colors", "diffuse_color", "source")}
     merlot = next(entry for entry in listed if entry["name"] == "merlot")
     assert merlot["regime"] == "absorbing"
     assert merlot["colors"] == tl.preset("merlot").colors()
+    thick = {entry["name"]: entry["diffuse_color"] for entry in listed}
+    assert (thick["marble"], thick["gummy"]) == (tl.preset("marble").diffuse_color(), None)
 
 
 # One medium
@@ -88,14 +95,22 @@ def test_a_medium_that_scatters_warns(run: Run) -> None:
     assert re.search(r"^warning +scattering dominates.* 8\.51 mm, 5\.57 mm, 3\.95 mm \(red, green, blue\)$", out, re.M)
     assert re.search(r"^scattering\* +2\.19 +2\.62 +3 1/mm", out, re.M)
     assert "* reduced, sigma_s (1 - g)" in out
+    slab = tl.preset("marble").diffuse_color()
+    assert re.search(rf"^thick slab +{slab} +\(scattered back in white light; no mirror image\)$", out, re.M)
 
 
 def test_an_estimated_medium_shows_what_there_is(run: Run) -> None:
-    out = run("show", "jade").out
+    out = run("show", "gummy").out
     assert re.search(r"^source +by eye$", out, re.M)
-    assert re.search(r"^note +absorption only", out, re.M)
-    assert "scattering " not in out
-    assert "absorption alone" not in out
+    assert all(text not in out for text in ("note", "scattering ", "absorption alone", "roughness", "thick slab"))
+
+
+def test_an_estimated_medium_that_scatters_has_a_surface(run: Run) -> None:
+    out = run("show", "jade").out
+    assert re.search(r"^source +by eye, deep green nephrite", out, re.M)
+    assert re.search(r"^scattering\* +0\.4 +0\.45 +0\.45 1/mm", out, re.M)
+    assert re.search(r"^roughness +0\.15$", out, re.M)
+    assert strict_json(run("show", "jade", "--json").out)["roughness"] == 0.15
 
 
 def test_aliases_are_shown(run: Run) -> None:
@@ -113,6 +128,8 @@ def test_every_medium_can_be_shown(run: Run, name: str) -> None:
     assert found["extinction"] == one.medium.extinction.tolist()
     assert np.add(found["absorption"], found["scattering"]).tolist() == found["extinction"]
     assert found["colors"] == one.colors()
+    assert found["diffuse_color"] == (one.diffuse_color() or None)
+    assert (found["diffuse_color"] is None) == (not one.medium.scatters)
 
 
 def test_json_has_no_infinities(run: Run) -> None:
@@ -130,7 +147,8 @@ def test_a_terminal_shows_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) ->
     pretend_a_terminal(monkeypatch)
     assert re.search(r"after 1 cm +\x1b\[48;2;161;120;82m  \x1b\[0m #a17852", run("show", "coke").out)
     head, *lines = run().out.splitlines()
-    assert all(line.count(f"{ESCAPE}48;2;") == line.count("#") == 3 for line in lines)
+    for line, one in zip(lines, tl.presets().values(), strict=True):
+        assert line.count(f"{ESCAPE}48;2;") == line.count("#") == (4 if one.medium.scatters else 3)
     plain = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in lines]
     assert all(re.match("Jensen|Narasimhan|by eye", line[head.index("source") :]) for line in plain)
 

@@ -14,6 +14,7 @@ import trimesh
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
 from tests.command_line import Run, one_error_line, strict_json
+from translucent.commands.common import read_roughness
 from translucent.planning.methods import METHODS
 
 GREEN = "linear(0.18,0.62,0.35)"
@@ -368,7 +369,7 @@ def test_a_body_too_large_for_its_medium_is_said_to_be_black(run: Run, tmp_path:
         "--size",
         "160x160",
         "--preset",
-        "jade",
+        "bottle_glass",
     ]
     result = run(*command)
     assert result.code == 0
@@ -389,7 +390,7 @@ def tower(tmp_path: Path) -> Path:
 SMALL = ("--size", "64x48", "--samples", "1")
 
 
-@pytest.mark.parametrize("medium", ["jade", "merlot", "grape_juice"])  # juice and wine scatter a little, too
+@pytest.mark.parametrize("medium", ["bottle_glass", "merlot", "grape_juice"])  # juice and wine scatter a little, too
 def test_what_is_black_hears_what_size_would_suit_the_medium(
     run: Run, tower: Path, tmp_path: Path, medium: str
 ) -> None:
@@ -411,3 +412,20 @@ def test_no_unit_is_guessed_where_none_would_help(run: Run, tower: Path, tmp_pat
 def test_milk_gives_light_back_and_is_not_black(run: Run, tower: Path, tmp_path: Path) -> None:
     told = run("render", tower, "-o", tmp_path / "a.png", "--preset", "whole_milk", *SMALL).err
     assert "of the light passes" not in told
+
+
+def test_scattering_is_shown_and_not_warned_of(run: Run, tmp_path: Path) -> None:
+    assert run("render", "bear", "-o", tmp_path / "a.png", "--preset", "wax", "--roughness", "0", *SMALL).err == ""
+    assert run("explain", "bear", "--preset", "marble").err == ""
+
+
+def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: Path) -> None:
+    command = ["render", "bear", "-o", tmp_path / "a.png", "--preset"]
+    rough = "rough ones blur both"
+    assert rough in run(*command, "jade", *SMALL).out
+    assert rough not in run(*command, "jade", "--roughness", "0", *SMALL).out
+    assert rough in run("explain", "bear", "--preset", "jade").out
+    assert rough not in run("explain", "bear", "--preset", "marble").out
+    assert (read_roughness(0.5, "jade"), read_roughness(0.0, "jade"), read_roughness(None, "jade")) == (0.5, 0.0, 0.15)
+    # A preset that says nothing of surfaces leaves a file's as they are.
+    assert (read_roughness(None, "marble"), read_roughness(None, None)) == (None, None)

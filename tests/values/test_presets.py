@@ -12,7 +12,9 @@ import pytest
 
 import translucent as tl
 from translucent.formulas.color import to_hex
-from translucent.media.presets import PAPERS, Preset, read_presets
+from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
+from translucent.media.preset import PAPERS, Preset
+from translucent.media.presets import read_presets
 
 NAMES = sorted(tl.presets())
 MEASURED = [name for name in NAMES if tl.preset(name).kind == "measured"]
@@ -24,18 +26,25 @@ FIRST = [
     *("jade", "amber", "honey", "gummy", "bottle_glass", "soap", "crystal"),
 ]
 
-#: Linear colors and distances in m of estimated media, which are not to change.
+#: Linear colors and distances in m of the absorption of estimated media, which are not to change.
 COLORS = {
-    "jade": ((0.18, 0.62, 0.35), 0.02),
+    "jade": ((0.10, 0.58, 0.17), 0.005),
     "amber": ((0.90, 0.42, 0.05), 0.02),
     "honey": ((0.80, 0.40, 0.04), 0.02),
     "gummy": ((0.75, 0.05, 0.04), 0.01),
     "bottle_glass": ((0.25, 0.55, 0.22), 0.01),
-    "soap": ((0.85, 0.55, 0.30), 0.02),
+    "soap": ((0.985, 0.94, 0.65), 0.01),
     "crystal": ((0.93, 0.96, 0.95), 0.01),
-    "wax": ((0.86, 0.68, 0.42), 0.01),
+    "wax": ((0.995, 0.98, 0.90), 0.01),
     "sea_water": ((0.22, 0.74, 0.89), 5.0),
     "whisky": ((0.80, 0.45, 0.12), 0.03),
+}
+
+#: Reduced scattering per mm of those that scatter, and the roughness of their surfaces.
+SCATTERING = {
+    "jade": ((0.4, 0.45, 0.45), 0.15),
+    "soap": ((0.5, 0.5, 0.5), 0.3),
+    "wax": ((0.7, 0.7, 0.7), 0.35),
 }
 
 
@@ -124,12 +133,54 @@ def test_coefficients_are_per_unit(unit: str, metres: float) -> None:
 def test_estimated_presets_have_their_colors_at_their_distances() -> None:
     assert sorted(COLORS) == ESTIMATED
     for name, (color, distance) in COLORS.items():
-        assert tl.preset(name).medium.transmittance(distance) == pytest.approx(color, rel=4e-15), name
-        assert not tl.preset(name).medium.scatters
+        found = tl.preset(name)
+        assert np.exp(-found.absorption * distance) == pytest.approx(color, rel=4e-15), name
+        scattering, roughness = SCATTERING.get(name, ((0, 0, 0), 0))
+        assert found.scattering == pytest.approx(1e3 * np.array(scattering), rel=1e-15), name
+        assert (found.roughness, found.medium.anisotropy) == (roughness, 0), name
+        assert found.reduced == found.medium.scatters == (name in SCATTERING), name
 
 
-def test_what_scatters_in_reality_and_not_here_says_so() -> None:
-    assert all(tl.preset(name).note.startswith("absorption only") for name in ("jade", "wax", "soap"))
+def test_a_solid_that_scatters_is_translucent_over_millimetres() -> None:
+    """Light forgets where it came from within 0.5 to 3 mm, so that bodies of centimetres are no clear glass."""
+    for name in SCATTERING:
+        assert (tl.preset(name).mean_free_path > 5e-4).all()
+        assert (tl.preset(name).mean_free_path < 3e-3).all()
+
+
+# The look of a thick slab
+
+
+def test_a_thick_slab_that_absorbs_nothing_gives_back_what_enters() -> None:
+    """All but Fresnel's 6 % of diffuse light at an index of 1.3; exact, whatever the scattering."""
+    spectralon = tl.preset("spectralon")
+    assert spectralon.diffuse_reflectance == pytest.approx(np.full(3, diffuse_interface(1.3).entering), abs=1e-8)
+    assert diffuse_interface(1.3).entering == pytest.approx(0.939, abs=5e-4)
+
+
+def test_a_thick_slab_goes_by_reduced_albedos() -> None:
+    assert medium(1, 1000, 0.9).diffuse_reflectance == pytest.approx(medium(1, 100).diffuse_reflectance, rel=1e-6)
+    through_air = half_space_reflectance(100 / 101, 1.0)
+    assert medium(1, 100).diffuse_reflectance == pytest.approx(np.full(3, through_air), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["gummy", "amber", "honey", "sea_water"])
+def test_what_does_not_scatter_gives_nothing_back(name: str) -> None:
+    found = tl.preset(name)
+    assert not found.diffuse_reflectance.any()
+    assert found.diffuse_color() == ""
+    assert found.summary()["diffuse_color"] is None
+
+
+def test_what_stone_wax_and_soap_look_like() -> None:
+    red, green, blue = tl.preset("jade").diffuse_reflectance
+    assert green > 2 * blue > 2 * red
+    assert 0.05 < green < 0.2  # deep green
+    for name in ("wax", "soap"):
+        red, green, blue = tl.preset(name).diffuse_reflectance
+        assert 0.9 > red > green > blue > 0.2
+    assert tl.preset("wax").diffuse_color() == to_hex(tl.preset("wax").diffuse_reflectance)
+    assert tl.preset("wax").summary()["diffuse_reflectance"] == tl.preset("wax").diffuse_reflectance.tolist()
 
 
 # Complete
@@ -238,7 +289,10 @@ def test_an_unknown_name_gives_what_it_may_mean(name: str, guess: str) -> None:
         ("merlot", "absorbing"),
         ("beer", "absorbing"),
         ("apple_juice", "absorbing"),  # a sixth of the events scatters, but once in 40 cm
-        ("jade", "absorbing"),
+        ("jade", "scattering dominated"),
+        ("wax", "scattering dominated"),
+        ("soap", "scattering dominated"),
+        ("gummy", "absorbing"),
         ("crystal", "absorbing"),
     ],
 )
@@ -335,6 +389,7 @@ ior = 1.33
 note = "stains"
 """
 COLOR_ENTRY = '[glass]\nkind = "estimated"\nsource = "by eye"\ncolor = [0.5, 0.6, 0.7]\ndistance = "2cm"\nior = 1.5\n'
+STONE_ENTRY = f'{COLOR_ENTRY}unit = "cm"\nreduced_scattering = [0.4, 0.5, 0.6]\nroughness = 0.25\n'
 
 
 def test_an_entry_is_read() -> None:
@@ -346,7 +401,21 @@ def test_an_entry_is_read() -> None:
     assert (ink.note, ink.aliases, ink.channel_anisotropy) == ("stains", ("dye",), (0.8, 0.0, 0.4))
     glass = read_presets(COLOR_ENTRY)["glass"]
     assert glass.medium == tl.Medium.from_color((0.5, 0.6, 0.7), 0.02, ior=1.5)
-    assert (glass.note, glass.aliases, glass.reduced) == ("", (), False)
+    assert (glass.note, glass.aliases, glass.reduced, glass.roughness) == ("", (), False, 0.0)
+
+
+def test_a_color_is_that_of_absorption_alone() -> None:
+    stone = read_presets(STONE_ENTRY)["glass"]
+    assert stone.absorption == pytest.approx(-np.log((0.5, 0.6, 0.7)) / 0.02, rel=1e-15)
+    assert stone.scattering == pytest.approx((40, 50, 60), rel=1e-15)
+    assert stone.reduced_scattering.tolist() == stone.scattering.tolist()
+    assert (stone.reduced, stone.medium.anisotropy, stone.medium.ior) == (True, 0.0, 1.5)
+    assert stone.roughness == stone.summary()["roughness"] == 0.25
+
+
+@pytest.mark.parametrize("roughness", ["0", "1", "0.5"])
+def test_every_entry_may_have_a_roughness(roughness: str) -> None:
+    assert read_presets(f"{ENTRY}roughness = {roughness}")["ink"].roughness == float(roughness)
 
 
 @pytest.mark.parametrize(
@@ -399,12 +468,37 @@ def test_an_entry_that_is_wrong_is_named(old: str, new: str, message: str) -> No
         ),
         ("0.5, 0.6", "0.0, 0.6", "presets.toml, [glass]; color (0.0, 0.6, 0.7); red = 0 is not in 0 < t <= 1"),
         ('"2cm"', '"2 parsec"', "presets.toml, [glass]; unit 'parsec'; not a known unit"),
+        ('unit = "cm"\n', "", "presets.toml, [glass]; no key 'unit'; add it"),
+        ('"cm"', '"furlong"', "presets.toml, [glass]; unit 'furlong'; not a known unit"),
+        (
+            "reduced_scattering = [0.4, 0.5, 0.6]\n",
+            "",
+            "[glass]; 'unit' beside 'color'; leave it out: 'distance' has its own; only scattering needs one",
+        ),
+        (
+            "reduced_scattering",
+            "scattering",
+            "[glass]; 'scattering' beside 'color'; give 'reduced_scattering', sigma_s (1 - g), in its place",
+        ),
+        ("roughness = 0.25", "anisotropy = [0, 0, 0]", "[glass]; 'anisotropy' beside 'color'; give 'reduced_scat"),
+        ("[0.4, 0.5, 0.6]", "[0.4, 0.5]", "[glass]; reduced_scattering = [0.4, 0.5]; give three numbers [r, g, b]"),
+        (
+            "[0.4, 0.5, 0.6]",
+            "[0.4, -1, 0.6]",
+            "presets.toml, [glass]; medium scattering (40.0, -100.0, 60.0); negative",
+        ),
+        ("[0.4, 0.5, 0.6]", "[0.4, inf, 0.6]", "presets.toml, [glass]; medium scattering (40.0, inf, 60.0); negative"),
+        ("0.25", "1.25", "presets.toml, [glass]; roughness = 1.25; give 0 (polished) to 1"),
+        ("0.25", "-0.1", "presets.toml, [glass]; roughness = -0.1; give 0 (polished) to 1"),
+        ("0.25", "nan", "presets.toml, [glass]; roughness = nan; give 0 (polished) to 1"),
+        ("0.25", '"dull"', "presets.toml, [glass]; roughness = 'dull'; give a number"),
+        ("roughness", "rougness", "presets.toml, [glass]; unknown key 'rougness'; did you mean 'roughness'?"),
     ],
 )
 def test_an_entry_with_a_color_that_is_wrong_is_named(old: str, new: str, message: str) -> None:
-    assert old in COLOR_ENTRY
+    assert old in STONE_ENTRY
     with pytest.raises(tl.InputError, match=re.escape(message)):
-        read_presets(COLOR_ENTRY.replace(old, new, 1))
+        read_presets(STONE_ENTRY.replace(old, new, 1))
 
 
 def test_a_notebook_shows_swatches() -> None:

@@ -228,12 +228,12 @@ def read_any_medium(
     scattering_color: str | None,
     mean_free_path: str | None,
 ) -> Medium | None:
-    """Medium that the options choose by what it transmits, or by the color of what it scatters, if any."""
+    """Medium that the options choose by what it transmits, or by the color of what it scatters, if any; all is shown."""
     from translucent.media.albedo import scattering_medium
     from translucent.units import parse_length
 
     if scattering_color is None and mean_free_path is None:
-        return read_medium(color, distance, preset_name, clamp)
+        return read_medium(color, distance, preset_name, clamp, shows_scattering=True)
     given, missing = "--scattering-color", "--mean-free-path"
     if scattering_color is None:
         given, missing = missing, given
@@ -247,9 +247,14 @@ def read_any_medium(
 
 
 def read_medium(
-    color: str | None, distance: str | None, preset_name: str | None, clamp: bool | None = None
+    color: str | None,
+    distance: str | None,
+    preset_name: str | None,
+    clamp: bool | None = None,
+    *,
+    shows_scattering: bool = False,
 ) -> Medium | None:
-    """Medium that the options choose, if any."""
+    """Medium that the options choose, if any; where scattered light is not shown, presets that live by it are told."""
     from translucent.media.medium import Medium
     from translucent.media.presets import preset
     from translucent.units import parse_length
@@ -258,7 +263,7 @@ def read_medium(
         if color is not None or distance is not None:
             raise InputError(f"--preset {preset_name}", "--color or --distance is given, too", "give one or the other")
         chosen = preset(preset_name)
-        if chosen.warning:
+        if chosen.warning and not shows_scattering:
             echo(f"warning: {chosen.warning}", err=True)
         return chosen.medium
     if (color is None) != (distance is None):
@@ -271,6 +276,13 @@ def read_medium(
     for line in told:
         echo(f"warning: {line}", err=True)
     return medium
+
+
+def read_roughness(roughness: float | None, preset_name: str | None) -> float | None:
+    """Roughness that the options choose, or that the preset's surfaces have; if neither, surfaces keep their own."""
+    from translucent.media.presets import preset
+
+    return (preset(preset_name).roughness or None) if roughness is None and preset_name is not None else roughness
 
 
 def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
@@ -324,7 +336,7 @@ def look_options(command: F) -> F:
         "--roughness",
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
-        help="Of the interfaces of media, 0 (polished) to 1. Default: 0, or that of the file's materials.",
+        help="Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0.",
     )(command)
     command = click.option(
         "--tone",

@@ -15,6 +15,7 @@ from translucent.commands.common import (
     read_any_medium,
     read_interfaces,
     read_method,
+    read_roughness,
     read_scattering,
     scattering_medium_options,
     scattering_options,
@@ -64,7 +65,8 @@ def explain(
     from translucent.planning.plan import plan
 
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
-    scene = read_scene(model, unit, medium, allow_outside=allow_outside)
+    roughness = read_roughness(None, preset_name)
+    scene = read_scene(model, unit, medium, roughness=roughness, allow_outside=allow_outside)
     method = read_method(method_name, None)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     scattering = read_scattering(scattering_name, diffusion_resolution)

@@ -14,16 +14,20 @@ from translucent.commands.common import common_options, triple_text
 from translucent.commands.console import echo
 
 if TYPE_CHECKING:
-    from translucent.media.presets import Preset
+    from translucent.media.preset import Preset
 
-_LISTED = ("name", "kind", "regime", "colors", "source")
+_LISTED = ("name", "kind", "regime", "colors", "diffuse_color", "source")
 
 
 @click.group(invoke_without_command=True, epilog="Example: translucent presets show merlot")
 @common_options
 @click.pass_context
 def presets(context: click.Context, as_json: bool) -> None:
-    """List the named media: what they do to light, and their colors after 1 mm, 1 cm and 10 cm."""
+    """List the named media: what they do to light, and their colors.
+
+    Three are what is left of white light after 1 mm, 1 cm and 10 cm; the last is what a thick slab of a medium that
+    scatters looks like in white light.
+    """
     from translucent.media.presets import presets as all_presets
 
     if context.invoked_subcommand is not None:
@@ -56,18 +60,19 @@ def _table(found: list[Preset]) -> str:
     wide = max(len(one.name) for one in found)
     # A swatch and a space go before each hex color.
     pad = 3 if _colorful() else 0
-    head = "  ".join(f"{text:<{7 + pad}}" for text in found[0].colors())
+    head = "  ".join(f"{text:<{7 + pad}}" for text in (*found[0].colors(), "thick"))
     lines = [f"{'name':<{wide}}  {'kind':<9}  {'regime':<20}  {head}  source"]
     lines += [
         f"{one.name:<{wide}}  {one.kind:<9}  {one.regime:<20}  "
-        f"{'  '.join(_swatch(color) + color for color in one.colors().values())}  {one.source}"
+        f"{'  '.join(_swatch(color) + color for color in one.colors().values())}  "
+        f"{_swatch(slab) + slab if (slab := one.diffuse_color()) else '-'.ljust(7 + pad)}  {one.source}"
         for one in found
     ]
     return "\n".join(lines)
 
 
 def _details(one: Preset) -> str:
-    from translucent.media.presets import PAPERS
+    from translucent.media.preset import PAPERS
 
     rows = [
         ("name", ", ".join((one.name, *one.aliases))),
@@ -86,13 +91,16 @@ def _details(one: Preset) -> str:
             ("albedo", triple_text(one.albedo)),
         ]
     rows += [("mean free path", f"{triple_text(1e3 * one.mean_free_path)} mm"), ("ior", f"{one.medium.ior:10g}")]
+    rows.append(("roughness", f"{one.roughness:10g}" if one.roughness else ""))
     alone = one.absorption_colors()
     for text, color in one.colors().items():
         without = f"  (absorption alone {_swatch(alone[text])}{alone[text]})" if one.medium.scatters else ""
         rows.append((f"after {text}", f"{_swatch(color)}{color}{without}"))
+    if slab := one.diffuse_color():
+        rows.append(("thick slab", f"{_swatch(slab)}{slab}  (scattered back in white light; no mirror image)"))
     lines = [f"{label:<15} {text}" for label, text in rows if text]
     if one.reduced:
-        lines.append("* reduced, sigma_s (1 - g), all that was measured: scatters isotropically")
+        lines.append("* reduced, sigma_s (1 - g), all that is known: scatters isotropically")
     return "\n".join(lines)
 
 

@@ -20,6 +20,7 @@ from translucent.commands.common import (
     read_environment,
     read_interfaces,
     read_method,
+    read_roughness,
     read_scattering,
     read_size,
     refuse_overwriting,
@@ -134,6 +135,7 @@ def render(
     refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
+    roughness = read_roughness(roughness, preset_name)
     method = read_method(method_name, thickness)
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)

@@ -4,9 +4,8 @@ References
 ----------
 Walsh 1926, "The reflection factor of a polished glass surface for diffused light"; Haskell et al. 1994, "Boundary
 conditions for the diffusion equation in radiative transfer"; Chandrasekhar 1960, "Radiative transfer", section 34;
-Grosjean 1956, "A high
-accuracy approximation for solving multiple scattering problems in infinite homogeneous media"; Walter et al. 2007,
-"Microfacet models for refraction through rough surfaces".
+Grosjean 1956, "A high accuracy approximation for solving multiple scattering problems in infinite homogeneous media";
+Walter et al. 2007, "Microfacet models for refraction through rough surfaces".
 """
 
 from __future__ import annotations
@@ -132,13 +131,17 @@ def half_space_reflectance(albedo: float, ior: float = 1.0) -> float:
 
 
 def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
-    """H at the nodes: 1 / H = sqrt(1 - w) + w / 2 int mu' H(mu') / (mu + mu') (Chandrasekhar 1960, V 22)."""
+    """H at the nodes: 1 / H = sqrt(1 - w) + w / 2 int mu' H(mu') / (mu + mu') (Chandrasekhar 1960, V 22).
+
+    Whole steps swing about the solution, without end where nothing is absorbed; half ones do not.
+    """
     h = np.ones_like(cosine)
     kernel = 0.5 * albedo * cosine * weight / (cosine[:, None] + cosine)
     for _ in range(H_STEPS):
         # Halfway by ratio: the equation alone turns what is too large by a factor into what is too small by it, which
-        # would go on for ever where nothing is absorbed. So errors are at least halved.
-        better = np.sqrt(h / (np.sqrt(1.0 - albedo) + kernel @ h))
+        # would go on for ever where nothing is absorbed. So errors are at least halved. No product of matrices: the
+        # threads of a BLAS would cost more than they gain.
+        better = np.sqrt(h / (np.sqrt(1.0 - albedo) + (kernel * h).sum(axis=1)))
         done = np.abs(better - h).max() < H_TOLERANCE
         h = better
         if done:
