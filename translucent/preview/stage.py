@@ -42,7 +42,6 @@ COARSEST_TRACED = 3.0
 #: Seconds between checks of the shader files.
 WATCH = 0.5
 
-
 Factor = TypeVar("Factor", int, float)
 
 
