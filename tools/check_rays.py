@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import translucent as tl
 from tests.rays import agreeing, embree_nearest, inside_points, random_rays
 from translucent.assets import mesh_path
-from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.bvh import build_hierarchy, sah_cost
+from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
 from translucent.gpu.ray_probe import RayProbe

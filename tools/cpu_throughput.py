@@ -13,11 +13,11 @@ from collections.abc import Callable
 import numpy as np
 
 from translucent.assets import mesh_path
-from translucent.geometry.embree import starts
 from translucent.cpu.hits import TracedMesh, Tracer
 from translucent.cpu.picture import Band, Picture
 from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.threads import in_threads, processors
+from translucent.geometry.embree import starts
 from translucent.geometry.mesh import Mesh
 from translucent.mesh_files import load_mesh
 from translucent.planning.plan import plan

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 import translucent as tl
 from translucent.cpu import picture
-from translucent.geometry.embree import EmbreeMesh
 from translucent.cpu.hits import TracedMesh, Tracer, embree_hits
 from translucent.cpu.picture import Band, Picture
+from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.reference import Hits, line_hits
 

@@ -53,25 +53,25 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
 
 
 @pytest.mark.parametrize(
-    ("name", "measure", "most"),
+    ("name", "samples", "measure", "most"),
     [
-        ("jade_ring", "nrmse", 0.09),
-        ("soap", "nrmse", 0.08),
-        ("bear_milk", "nrmse", 0.07),
-        ("bear_skim", "nrmse", 0.09),
-        ("sphere_milk_white", "nrmse", 0.03),
-        ("candle", "block", 0.15),
-        ("wax_bear_lamp", "block", 0.27),
+        ("jade_ring", 16, "nrmse", 0.09),
+        ("soap", 4, "nrmse", 0.08),
+        ("bear_milk", 4, "nrmse", 0.07),
+        ("bear_skim", 4, "nrmse", 0.09),
+        ("sphere_milk_white", 4, "nrmse", 0.03),
+        ("candle", 4, "block", 0.15),
+        ("wax_bear_lamp", 4, "block", 0.27),
     ],
 )
 def test_pictures_are_near_full_light_transport(
-    renderer: tl.Renderer, scenes: ModuleType, name: str, measure: str, most: float
+    renderer: tl.Renderer, scenes: ModuleType, name: str, samples: int, measure: str, most: float
 ) -> None:
     """Measured with 16 samples: .082, .075, .050, .078, .023; and of blocks of pixels .091, .252, of lamps that are
-    balls in the truth and points here.
+    balls in the truth and points here. Four samples leave more aliasing, of which the ring alone has much: .104.
     """
     scene, size = scenes.make(name)
-    frame = renderer.render(scene, (size, size), samples=16)
+    frame = renderer.render(scene, (size, size), samples=samples)
     assert frame.plan.given_back.diffused == (0,)
     assert frame.valid.all()
     found = scenes.errors(frame.radiance, scenes.load(name))

@@ -109,6 +109,16 @@ def test_what_is_asked_for_is_done_where_it_can_be(medium: tl.Medium) -> None:
     assert not layered.says(NoteKind.LAYER_INSTEAD)
 
 
+@pytest.mark.parametrize("asked", [tl.Diffusion(), tl.ScatteringLayer()])
+def test_sheets_are_layers_if_asked_for_and_partly_transparent_layers_nothing(asked: Any) -> None:
+    found = plan(scene(sheet(WAX)), scattering=asked).given_back
+    assert (found.diffused, found.layered) == ((), (0,))
+    assert found.refusals == (((0, "it is a sheet"),) if asked == tl.Diffusion() else ())
+    lacquer = body(WAX, surface=tl.Surface(opacity=0.5))
+    assert lacquer.covers
+    assert not plan(scene(lacquer), scattering=asked).given_back
+
+
 def test_each_body_has_its_own_way() -> None:
     """And a plan tells of all of them."""
     asked = scene(body(WAX), body(WAX, OPEN, x=3), body(MILK, x=6), body(GLASS, x=9), body(None, x=12))

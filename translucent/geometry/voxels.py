@@ -100,7 +100,7 @@ def _along_last_axis(
     entered = cell > first[of]
     crossed = np.bincount(place[entered], np.ones(int(entered.sum())), total)
 
-    def averaged(values: npt.NDArray[np.floating]) -> Array:
+    def averaged(values: npt.NDArray[np.number]) -> Array:
         shape = (size[0], LINES, size[1], LINES, deep)
         return np.asarray(values.reshape(shape).mean(axis=(1, 3)))
 
