@@ -228,7 +228,7 @@ def read_any_medium(
     scattering_color: str | None,
     mean_free_path: str | None,
 ) -> Medium | None:
-    """Medium that the options choose by what it transmits, or by the color of what it scatters; scattered light will be shown."""
+    """Medium that the options choose by what it transmits, or by the color of what it scatters, if any."""
     from translucent.media.albedo import scattering_medium
     from translucent.units import parse_length
 

@@ -73,36 +73,44 @@ def with_given_back_told(plan: RenderPlan, scene: Scene, back: GivenBack) -> Ren
 
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
     """Notes on scattered light that is not rendered."""
-    if interfaces and any(isinstance(body.medium, LayeredMedium) for body in scene.bodies):
-        text = (
-            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
-            "path of the ray, which edges and folds are not"
-        )
-        return [Note(NoteKind.SPREAD_INSIDE, text)]
-    if scattering := [body.medium for body in scene.bodies if body.medium is not None and body.medium.scatters]:
+    notes = _given_back_effects(scene) if interfaces else []
+    media = [body.medium for body in scene.bodies if body.medium is not None and body.medium.scatters]
+    if scattering := [medium for medium in media if not (interfaces and medium.gives_back)]:
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in scattering)
             text = (
                 "light scattered more than once, of which there is much in bodies that are thicker than a mean free "
                 f"path, here {1 / densest:.2g} m; light of the environment scattered"
             )
-            return [Note(NoteKind.SCATTERED_AGAIN, text)]
+            return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
         if not scene.lights:
-            return [Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light")]
+            return [*notes, Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light")]
         text = (
             "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
         )
-        return [Note(NoteKind.LIGHTS_LEFT_OUT, text)]
-    if interfaces and (bodies := [body for body in scene.bodies if isinstance(body.medium, DiffusedMedium)]):
+        return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
+    if not notes and scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
+        text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
+        return [Note(NoteKind.UNUSED_LIGHTS, text)]
+    return notes
+
+
+def _given_back_effects(scene: Scene) -> list[Note]:
+    """Notes on bodies that give back what they scatter many times."""
+    notes = []
+    if any(isinstance(body.medium, LayeredMedium) for body in scene.bodies):
+        text = (
+            "how light that is scattered many times spreads inside: it leaves as from a flat layer as thick as the "
+            "path of the ray, which edges and folds are not"
+        )
+        notes.append(Note(NoteKind.SPREAD_INSIDE, text))
+    if bodies := [body for body in scene.bodies if isinstance(body.medium, DiffusedMedium)]:
         text = (
             f"{object_names(bodies)}: light that crosses other bodies on its way to them is not dimmed there, and what "
             "is smaller than a cell has no light of its own"
         )
-        return [Note(NoteKind.DIFFUSED_LIGHT, text)]
-    if scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
-        text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
-        return [Note(NoteKind.UNUSED_LIGHTS, text)]
-    return []
+        notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
+    return notes
 
 
 def _refraction_effects(scene: Scene, interfaces: Interfaces | None) -> list[Note]:

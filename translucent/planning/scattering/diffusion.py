@@ -40,14 +40,14 @@ class Diffusion(Scattering):
     resolution: int = 32
 
     def __post_init__(self) -> None:
-        check_count("Diffusion resolution", self.resolution, 1 << 16, least=LEAST_RESOLUTION, example=32)
-        if self.resolution > MOST_RESOLUTION:
+        if isinstance(self.resolution, int) and self.resolution > MOST_RESOLUTION:
             gigabytes = CELL_BYTES * self.resolution**3 / 4 / 1e9
             raise InputError(
                 f"Diffusion resolution {self.resolution}",
                 f"a body would have {self.resolution**3 / 4:.2g} cells and take about {gigabytes:.0f} GB",
                 f"give at most {MOST_RESOLUTION}; 32 is enough where scattering dominates",
             )
+        check_count("Diffusion resolution", self.resolution, MOST_RESOLUTION, least=LEAST_RESOLUTION, example=32)
 
     def cell_size(self, body: Object) -> float:
         """Side of a cell in metres."""
@@ -55,13 +55,15 @@ class Diffusion(Scattering):
         return float(np.cbrt(4.0 * volume) / self.resolution)
 
     def refusal(self, body: Object) -> str | None:
-        """Reason: no closed solid of one density, or thinner than a cell everywhere."""
+        """Reason: no closed solid of one density, wound outwards, or thinner than a cell everywhere."""
         if body.sheet_thickness is not None:
             return "it is a sheet"
         if body.density is not None:
             return "its density varies"
-        if not body.mesh.diagnosis.sound or not body.mesh.volume > 0.0:
+        if not body.mesh.diagnosis.sound:
             return "its mesh is not closed"
+        if not body.mesh.volume > 0.0:
+            return "its mesh is inside out"
         if body.mean_thickness < self.cell_size(body):
             return f"it is thinner than a cell everywhere, {self.cell_size(body):.2g} m at this resolution"
         return None

@@ -1,0 +1,199 @@
+"""How the planner shows light that is scattered many times: in which bodies it diffuses, which are layers, and why."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from tests.values.plan_scenes import BOX, GLASS, MILK, NO_STORAGE, OPEN, body, names, scene, sheet
+from translucent.geometry.solids import Box
+from translucent.media.given_back import DiffusedMedium, LayeredMedium
+from translucent.planning.notes import NoteKind
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities
+from translucent.planning.scattering.choice import LEAST_DEPTH, shown
+
+WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
+LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
+INSIDE_OUT = tl.Mesh(BOX.vertices, BOX.faces[:, ::-1], name="inside out")
+THIN = tl.Mesh(
+    *(getattr(Box((0, 0, 0), (1, 1, 0.004)).tessellate(), part) for part in ("vertices", "faces")), name="thin"
+)
+VARYING = tl.LinearDensity(0.0, 0.5, 1.0)
+
+
+@pytest.mark.parametrize("lights", [[], LIT])
+def test_light_diffuses_in_closed_bodies_with_an_interface(lights: list[tl.PointLight]) -> None:
+    found = plan(scene(body(WAX), lights=lights))
+    assert (found.given_back.diffused, found.given_back.layered) == ((0,), ())
+    assert found.given_back.diffusion == tl.Diffusion()
+    assert found.says(NoteKind.DIFFUSED_LIGHT)
+    assert not found.says(NoteKind.SPREAD_INSIDE)
+    assert not found.says(NoteKind.LAYER_INSTEAD)
+    assert not found.says(NoteKind.SCATTERED_AGAIN)
+
+
+@pytest.mark.parametrize(
+    ("what", "why"),
+    [
+        (body(WAX, OPEN), "its mesh is not closed"),
+        (body(WAX, INSIDE_OUT), "its mesh is inside out"),
+        (body(tl.Medium(scattering=5e3, ior=1.4), THIN), "it is thinner than a cell everywhere, 0.0079 m at this"),
+    ],
+    ids=["open", "inside out", "thin"],
+)
+def test_bodies_in_which_light_cannot_diffuse_are_layers(what: tl.Object, why: str) -> None:
+    """And the plan tells why."""
+    for asked in (None, tl.Diffusion()):
+        found = plan(scene(what), scattering=asked)
+        assert (found.given_back.diffused, found.given_back.layered) == ((), (0,))
+        (note,) = (note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
+        assert str(note).startswith(f"diffusion in {what.mesh.name!r}: {why}")
+        assert str(note).endswith("; shown as a layer")
+        assert found.says(NoteKind.SPREAD_INSIDE)
+        assert not found.says(NoteKind.DIFFUSED_LIGHT)
+
+
+def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
+    """A slab 16 mm thick: cells are 20 mm wide, and 10 mm at twice the resolution."""
+    slab = Box((0, 0, 0), (1, 1, 0.016)).tessellate()
+    medium = tl.Medium(scattering=5e3, ior=1.4)
+    assert tl.Diffusion(20).cell_size(body(medium, slab)) == pytest.approx(0.02)
+    # Its mean thickness is 2 V / A = 0.032 / 2.064 m.
+    assert body(medium, slab).mean_thickness == pytest.approx(0.032 / 2.064)
+    for resolution, diffused in ((20, ()), (40, (0,))):
+        found = plan(scene(body(medium, slab)), scattering=tl.Diffusion(resolution))
+        assert found.given_back.diffused == diffused
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        body(MILK),
+        sheet(WAX),
+        body(GLASS),
+        body(tl.Medium(absorption=1.0, ior=1.5)),
+        body(MILK, density=VARYING),
+    ],
+    ids=["matched", "sheet", "clear", "clear glass", "cloud"],
+)
+def test_other_bodies_show_what_they_scatter_once(what: tl.Object) -> None:
+    found = plan(scene(what, lights=LIT))
+    assert not found.given_back
+    assert not found.says(NoteKind.DIFFUSED_LIGHT)
+    assert not found.says(NoteKind.SPREAD_INSIDE)
+
+
+def test_little_scattering_is_shown_once() -> None:
+    """By the reduced scattering across the body in its densest channel: of a cube, a third of its side."""
+    assert body().mean_thickness == pytest.approx(1 / 3)
+    for share, diffused in ((0.99, ()), (1.01, (0,))):
+        depth = 3 * LEAST_DEPTH * share
+        for anisotropy in (0.0, 0.8):
+            medium = tl.Medium(scattering=(0, 0, depth / (1 - anisotropy)), anisotropy=anisotropy, ior=1.4)
+            assert plan(scene(body(medium))).given_back.diffused == diffused
+
+
+@pytest.mark.parametrize("medium", [MILK, tl.Medium(scattering=0.01, ior=1.4)], ids=["matched", "shallow"])
+def test_what_is_asked_for_is_done_where_it_can_be(medium: tl.Medium) -> None:
+    diffused = plan(scene(body(medium)), scattering=tl.Diffusion(16))
+    assert (diffused.given_back.diffused, diffused.given_back.layered) == ((0,), ())
+    assert diffused.given_back.diffusion.resolution == 16
+    layered = plan(scene(body(medium)), scattering=tl.ScatteringLayer())
+    assert (layered.given_back.diffused, layered.given_back.layered) == ((), (0,))
+    assert layered.says(NoteKind.SPREAD_INSIDE)
+    assert not layered.says(NoteKind.LAYER_INSTEAD)
+
+
+@pytest.mark.parametrize("asked", [tl.Diffusion(), tl.ScatteringLayer()])
+def test_sheets_are_layers_if_asked_for_and_partly_transparent_layers_nothing(asked: Any) -> None:
+    found = plan(scene(sheet(WAX)), scattering=asked).given_back
+    assert (found.diffused, found.layered) == ((), (0,))
+    assert found.refusals == (((0, "it is a sheet"),) if asked == tl.Diffusion() else ())
+    lacquer = body(WAX, surface=tl.Surface(opacity=0.5))
+    assert lacquer.covers
+    assert not plan(scene(lacquer), scattering=asked).given_back
+
+
+def test_each_body_has_its_own_way() -> None:
+    """And a plan tells of all of them."""
+    asked = scene(body(WAX), body(WAX, OPEN, x=3), body(MILK, x=6), body(GLASS, x=9), body(None, x=12))
+    found = plan(asked)
+    assert (found.given_back.diffused, found.given_back.layered) == ((0,), (1,))
+    assert found.given_back.refusals == ((1, "its mesh is not closed"),)
+    kinds = NoteKind.DIFFUSED_LIGHT, NoteKind.SPREAD_INSIDE, NoteKind.LAYER_INSTEAD, NoteKind.ONLY_REMOVES
+    for kind in kinds:
+        assert found.says(kind)
+    marked = shown(asked, found.given_back)
+    assert [type(item.medium) for item in marked.objects[:2]] == [DiffusedMedium, LayeredMedium]
+    assert marked.objects[2:] == asked.objects[2:]
+    # Along rays, what scatters in them only removes light.
+    seen = marked.objects[0].medium
+    assert seen is not None
+    np.testing.assert_allclose(seen.absorption, 5.1)
+    assert not seen.scatters
+    assert shown(asked, found.given_back) is marked
+
+
+@pytest.mark.parametrize("capabilities", [Capabilities(), NO_STORAGE])
+def test_diffused_light_needs_no_views_from_lights(capabilities: Capabilities) -> None:
+    found = plan(scene(body(WAX), lights=LIT), capabilities=capabilities)
+    assert isinstance(found.method, tl.SignedDepth)
+    assert "light_views" not in names(found)
+    assert not found.says(NoteKind.UNLIT)
+    asked = plan(scene(body(WAX), lights=LIT), tl.SignedDepth(), capabilities)
+    assert asked.given_back.diffused == (0,)
+
+
+@pytest.mark.parametrize("points", [1, 4])
+def test_single_scattering_reaches_the_method(points: int) -> None:
+    found = plan(scene(body(WAX), lights=LIT), scattering=tl.SingleScattering(points))
+    assert found.method == tl.FragmentLists(light_points=points)
+    assert not found.given_back
+    assert found.says(NoteKind.SCATTERED_AGAIN)
+    own = plan(scene(body(WAX), lights=LIT), tl.FragmentLists(light_points=2), scattering=tl.SingleScattering(points))
+    assert own.method == tl.FragmentLists(light_points=2)
+
+
+@pytest.mark.parametrize("asked", ["diffusion", tl.Diffusion, 3, False])
+def test_what_is_no_choice_of_scattering_is_refused(asked: Any) -> None:
+    message = (
+        f"scattering {asked!r}; not a choice of scattering; give tl.Diffusion(resolution=32), tl.ScatteringLayer() or "
+        "tl.SingleScattering(points=8)"
+    )
+    with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
+        plan(scene(body(WAX)), scattering=asked)
+
+
+@pytest.mark.parametrize(
+    ("resolution", "message"),
+    [
+        (4, "Diffusion resolution 4; not a whole number in 8 to 128; give for example 32"),
+        (8.5, "Diffusion resolution 8.5; not a whole number in 8 to 128; give for example 32"),
+        (
+            512,
+            "Diffusion resolution 512; a body would have 3.4e+07 cells and take about 134 GB; give at most 128; 32 is "
+            "enough where scattering dominates",
+        ),
+    ],
+)
+def test_resolutions_out_of_reach_are_refused(resolution: Any, message: str) -> None:
+    with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
+        tl.Diffusion(resolution)
+
+
+def test_layers_of_varying_density_are_refused() -> None:
+    cloud = body(tl.Medium(scattering=5.0, ior=1.4), density=VARYING)
+    message = "ScatteringLayer(); 'box': its density varies; use SingleScattering()"
+    with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
+        plan(scene(cloud), scattering=tl.ScatteringLayer())
+    # Beside another body, which can be a layer, it is what it is.
+    assert plan(scene(cloud, body(WAX, x=3)), scattering=tl.ScatteringLayer()).given_back.layered == (1,)
+
+
+def test_resolutions_at_the_bounds() -> None:
+    assert [tl.Diffusion(count).resolution for count in (8, 128)] == [8, 128]
