@@ -114,7 +114,7 @@ def test_sheets_are_layers_if_asked_for_and_partly_transparent_layers_nothing(as
     found = plan(scene(sheet(WAX)), scattering=asked).given_back
     assert (found.diffused, found.layered) == ((), (0,))
     assert found.refusals == (((0, "it is a sheet"),) if asked == tl.Diffusion() else ())
-    lacquer = body(WAX, surface=tl.Surface(opacity=0.5))
+    lacquer = body(WAX, surface=tl.Surface(opacity=0.5), sheet_thickness=1e-3)
     assert lacquer.covers
     assert not plan(scene(lacquer), scattering=asked).given_back
 
