@@ -263,21 +263,23 @@ def test_lossless_bodies_give_back_what_enters(mesh: tl.Mesh, scattering: float)
     assert interface.exit_share * found.sum() == pytest.approx(float(scattered.sum()), rel=5 * TOLERANCE)
 
 
-def test_lamps_in_lossless_hollows_light_the_outside() -> None:
+@pytest.mark.parametrize(("ior", "off"), [(1.0, 0.05), (1.5, 0.08)])
+def test_lamps_in_lossless_hollows_light_the_outside(ior: float, off: float) -> None:
     """Light goes around in the hollow until it has found its way out, through however thick a wall.
 
-    Matched, so that nothing is mirrored at the surface. Of 500 mean free paths 1 % of the light goes through at a time.
+    Of 500 mean free paths 1 % of the light goes through at a time. What the surface mirrors counts as diffuse light of
+    which 9 % is mirrored, where the lamp's is straight on, of which 4 % is: 6 % too much leaves at the higher index.
     """
     outer, inner = Sphere().tessellate(32), Sphere(radius=0.6).tessellate(32)
     hollow = joined([(outer.vertices, outer.faces), (inner.vertices, inner.faces[:, ::-1])], "hollow")
     for scattering in (50.0, 500.0):
-        body = tl.Object(hollow, tl.Medium(scattering=scattering))
+        body = tl.Object(hollow, tl.Medium(scattering=scattering, ior=ior))
         found = seen_field(body, tl.PointLight((0, 0, 0), (1, 1, 1)), resolution=20)
         assert np.isfinite(found.fluence).all()
         assert found.fluence.min() >= 0
         outside = samples(found, tl.Object(outer, body.medium))[:, 0].mean()
-        # 4 pi W through 4 pi m^2; what a sample on a facet of the hollow sees of it is one of 1000 directions' places.
-        assert found.exit_share * outside == pytest.approx(1.0, rel=0.05)
+        # 4 pi W through 4 pi m^2.
+        assert found.exit_share * outside == pytest.approx(1.0, rel=off)
 
 
 # Symmetries

@@ -143,10 +143,10 @@ def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterf
     return np.asarray(passed * correction[:, None])
 
 
-def from_itself(sky: Sky, shares: Array, solid_angles: Array, interface: DiffuseInterface) -> sparse.csr_array:
-    """(s, s): flux that enters at a sample for the fluence at another that it faces."""
+def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_array:
+    """(s, s): flux that enters at a sample for the flux that leaves another that it faces, alike in all directions."""
     sample, direction, other = sky.facing
-    values = (shares * solid_angles)[sample, direction] * interface.exit_share / np.pi
+    values = (shares * solid_angles)[sample, direction] / np.pi
     return sparse.csr_array((values, (sample, other)), (len(shares), len(shares)))
 
 

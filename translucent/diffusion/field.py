@@ -146,7 +146,7 @@ class DiffusingBody:
         self._interface = diffuse_interface(medium.ior, roughness)
         solid_angles = nearest_parts(lit.sky.directions)[1]
         shares = transfer(lit.sky, solid_angles, medium.ior, self._interface)
-        self._itself = from_itself(lit.sky, shares, solid_angles, self._interface)
+        self._itself = from_itself(lit.sky, shares, solid_angles)
         self._seen = (shares * lit.sky.seen).astype(np.float32)
         self._system = BodySystem(lit.grid, medium, roughness)
 

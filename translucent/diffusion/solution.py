@@ -142,7 +142,7 @@ class BodySystem:
         entering : (s, 3)
             Flux that enters at the samples from outside, in W/m^2.
         from_itself : (s, s) csr_array
-            Flux that enters for the fluence at each sample.
+            Flux that enters for the flux that leaves each sample.
         inside : (cells, 3)
             Power of lights inside each cell, in W.
 
@@ -174,6 +174,8 @@ class _Channel:
         ways: Array,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
+        self._exit_share = interface.exit_share
+        self._mirrored = (1.0 - diffuse_interface(ior).entering) / interface.entering
         extinction = absorption + scattering
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
@@ -232,7 +234,9 @@ class _Channel:
             steps += taken
             surface = (self._read @ cells) * self._attenuated + (self._near - self._excess) * flux + glow
             fluence = np.maximum(surface, 0.0)
-            change = entering + from_itself @ fluence - flux
+            # What the surface mirrors goes on as if it was diffuse.
+            leaving = self._exit_share * fluence + self._mirrored * flux
+            change = entering + from_itself @ leaving - flux
             # Of what changed the last time this share comes back now. In a hollow it is nearly all, and always the same
             # share: so much is still to come.
             share = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
