@@ -13,7 +13,7 @@ from scipy import sparse
 import translucent as tl
 from tests import slabs
 from translucent.bench.shapes import joined
-from translucent.diffusion.entering import Casters, from_light
+from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import BodyGrid, body_grid, other_plane_points, plane_points
 from translucent.diffusion.solution import (
@@ -63,7 +63,7 @@ def seen_field(
 ) -> DiffusionField:
     scene = tl.Scene([body], CAMERA, lights, environment)
     assert body.medium is not None
-    geometry = lit_body(body, (), Diffusion(resolution).cell_size(body))
+    geometry = lit_body(body, None, Diffusion(resolution).cell_size(body))
     return DiffusingBody(geometry, body.medium, 0.0).field(scene)
 
 
@@ -354,7 +354,7 @@ def test_a_turned_body_in_turned_light_is_the_same() -> None:
         matrix = np.eye(4)
         matrix[:3, :3] = turn
         body = tl.Object(mesh, medium, matrix)
-        geometry = lit_body(body, (), Diffusion(20).cell_size(body))
+        geometry = lit_body(body, None, Diffusion(20).cell_size(body))
         entering = from_light(
             geometry.grid, geometry.casters, tl.DirectionalLight(turn @ light, (1, 1, 1)), 1.4, diffuse_interface(1.4)
         )
@@ -385,7 +385,8 @@ def test_opaque_objects_shadow_a_directional_light() -> None:
     plate = tl.Object(Box((-0.5, 2, -3), (3, 2.1, 3)).tessellate(), None)
     grid = ball_grid(16)
     free, shadowed = (
-        from_light(grid, Casters(ball, opaque), light, 1.5, diffuse_interface(1.5)) for opaque in ((), (plate,))
+        from_light(grid, Casters(ball, opaque_surfaces(opaque)), light, 1.5, diffuse_interface(1.5))
+        for opaque in ((), (plate,))
     )
     beside = grid.points[:, 0] < -0.5
     np.testing.assert_array_equal(shadowed[beside], free[beside])

@@ -15,7 +15,7 @@ from translucent.media.given_back import DiffusedMedium, LayeredMedium
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
-from translucent.planning.scattering.choice import LEAST_DEPTH, shown
+from translucent.planning.scattering.choice import LEAST_DEPTH, MOST_DIFFUSED, shown
 
 WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
@@ -53,7 +53,7 @@ def test_bodies_in_which_light_cannot_diffuse_are_layers(what: tl.Object, why: s
         assert (found.given_back.diffused, found.given_back.layered) == ((), (0,))
         (note,) = (note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
         assert str(note).startswith(f"diffusion in {what.mesh.name!r}: {why}")
-        assert str(note).endswith("; shown as a layer")
+        assert str(note).endswith("; shown as layers")
         assert found.says(NoteKind.SPREAD_INSIDE)
         assert not found.says(NoteKind.DIFFUSED_LIGHT)
 
@@ -197,3 +197,17 @@ def test_layers_of_varying_density_are_refused() -> None:
 
 def test_resolutions_at_the_bounds() -> None:
     assert [tl.Diffusion(count).resolution for count in (8, 128)] == [8, 128]
+
+
+def test_many_bodies_are_layers_unless_asked_for() -> None:
+    """A scene of hundreds of scattering bodies would take minutes."""
+    crowd = scene(*(body(WAX, x=3.0 * i) for i in range(MOST_DIFFUSED + 1)))
+    found = plan(crowd)
+    assert found.given_back.diffused == ()
+    assert len(found.given_back.layered) == MOST_DIFFUSED + 1
+    notes = [note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD]
+    assert len(notes) == 1
+    assert "more than 32 bodies" in notes[0]
+    assert len(plan(crowd, scattering=tl.Diffusion()).given_back.diffused) == MOST_DIFFUSED + 1
+    few = scene(*(body(WAX, x=3.0 * i) for i in range(MOST_DIFFUSED)))
+    assert len(plan(few).given_back.diffused) == MOST_DIFFUSED

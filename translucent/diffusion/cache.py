@@ -7,7 +7,9 @@ from collections.abc import Callable, Hashable
 from threading import Lock
 from typing import TypeVar
 
+from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
+from translucent.geometry.embree import EmbreeMesh
 from translucent.media.given_back import DiffusedMedium
 from translucent.media.medium import Medium
 from translucent.planning.scattering import Diffusion
@@ -24,6 +26,7 @@ class FieldCache:
 
     def __init__(self) -> None:
         self._lock = Lock()
+        self._opaque: OrderedDict[Hashable, EmbreeMesh | None] = OrderedDict()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
         self._diffusing: OrderedDict[Hashable, DiffusingBody] = OrderedDict()
         self._scenes: OrderedDict[Hashable, dict[int, DiffusionField]] = OrderedDict()
@@ -32,11 +35,12 @@ class FieldCache:
         """Light of each such body by its number; the same object until something changes it."""
         if not (media := _diffused(scene)):
             return {}
-        opaque = tuple(scene.opaque)
 
         def make() -> dict[int, DiffusionField]:
+            places = tuple(_place(item) for item in scene.opaque)
+            opaque = _kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             return {
-                i: self._body(scene.objects[i], medium.original, opaque, diffusion).field(scene)
+                i: self._body(scene.objects[i], medium.original, places, opaque, diffusion).field(scene)
                 for i, medium in media.items()
             }
 
@@ -50,12 +54,14 @@ class FieldCache:
     def clear(self) -> None:
         """Forget everything."""
         with self._lock:
-            for store in (self._bodies, self._diffusing, self._scenes):
+            for store in (self._opaque, self._bodies, self._diffusing, self._scenes):
                 store.clear()
 
-    def _body(self, body: Object, medium: Medium, opaque: tuple[Object, ...], diffusion: Diffusion) -> DiffusingBody:
+    def _body(
+        self, body: Object, medium: Medium, places: Hashable, opaque: EmbreeMesh | None, diffusion: Diffusion
+    ) -> DiffusingBody:
         step, roughness = diffusion.cell_size(body), _roughness(body)
-        place = _place(body), tuple(_place(item) for item in opaque), step
+        place = _place(body), places, step
         lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
         key = (place, medium, roughness)
         return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)

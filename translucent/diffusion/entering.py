@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -14,6 +15,8 @@ from translucent.diffusion.grid import BodyGrid
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
 from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.triangles import Triangles, joined
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Object
@@ -33,35 +36,50 @@ _CORRECTION = (0.5, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Casters:
-    """Objects that keep light from a body: itself and what is opaque.
+    """Surfaces that keep light from a body.
 
     Parameters
     ----------
     body : Object
-    opaque : tuple of Object
+        Itself.
+    opaque : EmbreeMesh, optional
+        See `opaque_surfaces`.
     """
 
     body: Object
-    opaque: tuple[Object, ...] = ()
+    opaque: EmbreeMesh | None = None
 
     @cached_property
-    def meshes(self) -> list[tuple[Object, EmbreeMesh]]:
-        """All of them, ready for rays; the body first."""
-        return [(item, EmbreeMesh(item.mesh)) for item in (self.body, *self.opaque)]
+    def _mesh(self) -> EmbreeMesh:
+        return EmbreeMesh(self.body.mesh)
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
         """Distance in metres at which rays (k, 3), (k, 3) meet the body, and at which anything opaque; inf for none."""
-        found = np.full((2, len(origins)), np.inf)
-        for number, (item, mesh) in enumerate(self.meshes):
-            into = np.linalg.inv(item.matrix)
-            local = directions @ into[:3, :3].T
-            length = np.linalg.norm(local, axis=1, keepdims=True)
-            start = (origins @ into[:3, :3].T + into[:3, 3] - mesh.center) / mesh.radius
-            face, distance = mesh.first_hits(start, local / length)
-            metres = np.where(face >= 0, distance * mesh.radius / length[:, 0], np.inf)
-            row = min(number, 1)
-            found[row] = np.minimum(found[row], metres)
-        return found[0], found[1]
+        into = np.linalg.inv(self.body.matrix)
+        own = _nearest(self._mesh, origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T)
+        if self.opaque is None:
+            return own, np.full(len(origins), np.inf)
+        return own, _nearest(self.opaque, origins, directions)
+
+
+def opaque_surfaces(objects: Sequence[Object]) -> EmbreeMesh | None:
+    """All opaque objects of a scene as one mesh in world coordinates, ready for rays; None if there are none."""
+    parts: list[Triangles] = [
+        (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3], item.mesh.faces, None)
+        for item in objects
+        if len(item.mesh.faces)
+    ]
+    if not parts:
+        return None
+    vertices, faces, _ = joined(parts, "opaque objects")
+    return EmbreeMesh(Mesh(vertices, faces))
+
+
+def _nearest(mesh: EmbreeMesh, origins: Array, directions: Array) -> Array:
+    """(k,): how often the direction has to be gone until a mesh is met, in its coordinates; inf for never."""
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    face, distance = mesh.first_hits((origins - mesh.center) / mesh.radius, directions / length)
+    return np.where(face >= 0, distance * mesh.radius / length[:, 0], np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem, SurfaceLight
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance
+from translucent.geometry.embree import EmbreeMesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Object, Scene
@@ -122,8 +123,8 @@ class LitBody:
     sky: Sky
 
 
-def lit_body(body: Object, opaque: tuple[Object, ...], step: float) -> LitBody:
-    """Geometry of a body with cells of this side, shadowed by itself and by opaque objects."""
+def lit_body(body: Object, opaque: EmbreeMesh | None, step: float) -> LitBody:
+    """Geometry of a body with cells of this side, shadowed by itself and by `opaque_surfaces`."""
     grid = body_grid(body, step)
     casters = Casters(body, opaque)
     return LitBody(grid, casters, sky_of(grid, casters))

@@ -64,9 +64,12 @@ def with_ambient_told(plan: RenderPlan) -> RenderPlan:
 
 def with_given_back_told(plan: RenderPlan, scene: Scene, back: GivenBack) -> RenderPlan:
     """The plan of what bodies give back, with a note where they are layers though light should diffuse in them."""
+    reasons: dict[str, list[Object]] = {}
+    for i, why in back.refusals:
+        reasons.setdefault(why, []).append(scene.objects[i])
     notes = tuple(
-        Note(NoteKind.LAYER_INSTEAD, f"diffusion in {scene.objects[i].mesh.name!r}: {why}; shown as a layer")
-        for i, why in back.refusals
+        Note(NoteKind.LAYER_INSTEAD, f"diffusion in {object_names(items)}: {why}; shown as layers")
+        for why, items in reasons.items()
     )
     return replace(plan, given_back=back, unmodelled=(*plan.unmodelled, *notes))
 

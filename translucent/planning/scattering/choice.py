@@ -18,6 +18,10 @@ from translucent.scene.scene import Object, Scene
 LEAST_DEPTH = 0.2
 
 
+#: Bodies in which light diffuses unless asked for: each takes its tenths of a second and its share of a texture.
+MOST_DIFFUSED = 32
+
+
 @dataclass(frozen=True)
 class GivenBack:
     """Bodies of a scene that give back light which they scatter many times.
@@ -88,6 +92,9 @@ def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True) -
         and (asked is not None or (body.has_interface and _is_deep(body, body.medium)))
     }
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
+    if asked is None and len(bodies) - len(refused) > MOST_DIFFUSED:
+        many = f"light would diffuse in more than {MOST_DIFFUSED} bodies, which takes long"
+        refused = dict.fromkeys(bodies, many) | refused
     layer = ScatteringLayer()
     layered = tuple(
         i for i, body in bodies.items() if layers and (i in refused or wanted == layer) and layer.refusal(body) is None
