@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -93,20 +92,18 @@ def _along_last_axis(
     low, high = np.clip(height[begin], 0.0, deep - 1e-9), np.clip(height[end], 0.0, deep - 1e-9)
     first, last = low.astype(int), high.astype(int)
     of, cell = _spread(first, last - first + 1)
-    place = line[begin][of] * deep + cell
+    at = line[begin][of]
+    column = at // lines[1] // LINES * size[1] + at % lines[1] // LINES
+    place, shape = column * deep + cell, tuple(size.tolist())
     lower, upper = np.maximum(low[of], cell), np.minimum(high[of], cell + 1)
-    total = int(lines.prod()) * deep
-    lengths = np.bincount(place, upper - lower, total)
-    moments = np.bincount(place, 0.5 * (upper - lower) * (upper + lower), total)
-    entered = cell > first[of]
-    crossed = np.bincount(place[entered], np.ones(int(entered.sum())), total)
 
-    def averaged(values: npt.NDArray[Any]) -> Array:
-        shape = (size[0], LINES, size[1], LINES, deep)
-        return np.asarray(values.reshape(shape).mean(axis=(1, 3)))
+    def summed(values: Array) -> Array:
+        """Mean over the lines of each cell."""
+        return np.asarray(np.bincount(place, values, int(size.prod())).reshape(shape) / LINES**2)
 
-    faces_open = np.minimum(averaged(crossed), 1.0)
-    return averaged(lengths), averaged(moments), np.concatenate([faces_open, np.zeros((*size[:2], 1))], axis=2)
+    lengths, moments = summed(upper - lower), summed(0.5 * (upper - lower) * (upper + lower))
+    crossed = np.minimum(summed((cell > first[of]).astype(np.float64)), 1.0)
+    return lengths, moments, np.concatenate([crossed, np.zeros((*shape[:2], 1))], axis=2)
 
 
 def _crossings(

@@ -15,6 +15,9 @@ from translucent.scene.scene import Object
 #: Resolutions that make sense: below, no body has an inside; above, the memory told in the error is needed.
 LEAST_RESOLUTION, MOST_RESOLUTION = 8, 128
 
+#: Cells in the bounds of a body, most of them empty; each takes about 150 bytes.
+MOST_IN_BOX = 2_000_000
+
 #: Bytes that a cell takes, with its share of samples on the surface and of what they see.
 CELL_BYTES = 4000
 
@@ -64,6 +67,9 @@ class Diffusion(Scattering):
             return "its mesh is not closed"
         if not body.mesh.volume > 0.0:
             return "its mesh is inside out"
+        extent = np.asarray(body.bounds[1]) - np.asarray(body.bounds[0])
+        if (box := float(np.prod(extent / self.cell_size(body) + 2.0))) > MOST_IN_BOX:
+            return f"its bounds, nearly empty, would hold {box:.2g} cells of {self.cell_size(body):.2g} m"
         if body.mean_thickness < self.cell_size(body):
             return f"it is thinner than a cell everywhere, {self.cell_size(body):.2g} m at this resolution"
         return None
