@@ -192,3 +192,22 @@ def test_a_plan_tells_of_diffused_light(renderer: tl.Renderer) -> None:
     plan = renderer.plan(lit_ball())
     assert plan.says(NoteKind.DIFFUSED_LIGHT)
     assert not plan.says(NoteKind.SPREAD_INSIDE)
+
+
+def test_an_eye_in_the_body_sees_the_light_there(renderer: tl.Renderer) -> None:
+    """In a white body in white light all directions are as bright as the environment, as from outside."""
+    white = tl.Medium(scattering=20.0, ior=1.4)
+    scene = tl.Scene([tl.Object(BALL, white)], tl.Camera.look_at((0, 0, 0), (0, 0, 1)), environment=WHITE)
+    frame = renderer.render(scene, (8, 8), scattering=tl.Diffusion(16))
+    # The formula is that of light below a surface: 1 + 3 c where c is 0.19.
+    assert frame.radiance.min() > 0.8
+    assert frame.radiance.max() < 1.6
+
+
+def test_ambient_light_is_seen_in_bodies_in_which_light_diffuses(renderer: tl.Renderer) -> None:
+    """Deep ones give back their albedo of it, but for what Fresnel mirrors and keeps, as where they show it once."""
+    dark = tl.Environment.constant((0, 0, 0))
+    scene = replace(lit_ball(lights=[], environment=dark), ambient=(1.0, 1.0, 1.0))
+    diffused, once = (renderer.render(scene, (16, 16), scattering=asked) for asked in (COARSE, tl.SingleScattering()))
+    assert once.radiance.max() > 0.5
+    np.testing.assert_allclose(diffused.radiance, once.radiance, atol=1e-4)

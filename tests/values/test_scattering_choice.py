@@ -10,7 +10,8 @@ import pytest
 
 import translucent as tl
 from tests.values.plan_scenes import BOX, GLASS, MILK, NO_STORAGE, OPEN, body, names, scene, sheet
-from translucent.geometry.solids import Box
+from translucent.bench.shapes import joined
+from translucent.geometry.solids import Box, Sphere
 from translucent.media.given_back import DiffusedMedium, LayeredMedium
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
@@ -211,3 +212,12 @@ def test_many_bodies_are_layers_unless_asked_for() -> None:
     assert len(plan(crowd, scattering=tl.Diffusion()).given_back.diffused) == MOST_DIFFUSED + 1
     few = scene(*(body(WAX, x=3.0 * i) for i in range(MOST_DIFFUSED)))
     assert len(plan(few).given_back.diffused) == MOST_DIFFUSED
+
+
+def test_a_body_whose_bounds_are_nearly_empty_is_a_layer() -> None:
+    """Two balls far apart in one mesh: cells that fit them would fill more memory than a frame may take."""
+    ball = Sphere().tessellate(16)
+    pair = joined([(ball.vertices, ball.faces), (ball.vertices + [2000, 2000, 2000], ball.faces)], "pair")
+    found = plan(scene(body(WAX, pair)))
+    assert found.given_back.layered == (0,)
+    assert "nearly empty" in found.given_back.refusals[0][1]

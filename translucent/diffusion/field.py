@@ -184,7 +184,8 @@ def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
     interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
     values = np.concatenate([found.fluence, albedo * found.entering], axis=1)
-    volume = _spread(grid, values).astype(np.float32)
+    deep = np.concatenate([found.inside, np.zeros_like(found.inside)], axis=1)
+    volume = _spread(grid, values, deep).astype(np.float32)
     return DiffusionField(
         fluence=np.ascontiguousarray(volume[..., :3]),
         entering=np.ascontiguousarray(volume[..., 3:]),
@@ -201,8 +202,11 @@ def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight
     )
 
 
-def _spread(grid: BodyGrid, values: Array) -> Array:
-    """(x, y, z, n): means of samples' values (s, n) in the cells where they lie, spread to cells around."""
+def _spread(grid: BodyGrid, values: Array, deep: Array) -> Array:
+    """(x, y, z, n): means of samples' values (s, n) in the cells where they lie, spread to cells around.
+
+    Cells farther inside have those of `deep` (cells, n), for eyes there.
+    """
     size = grid.number.shape
     place = np.floor((grid.points - grid.cells.low) / grid.cells.step).astype(int)
     at = np.ravel_multi_index(tuple(np.clip(place, 0, np.array(size) - 1).T), size)
@@ -217,4 +221,6 @@ def _spread(grid: BodyGrid, values: Array) -> Array:
         new = ~known & (near > 1e-9)
         filled[new] = mean[new] / near[new][:, None]
         known |= new
+    rest = ~known & (grid.number >= 0)
+    filled[rest] = deep[grid.number[rest]]
     return np.asarray(filled)

@@ -63,12 +63,15 @@ class SurfaceLight:
         Of light that has been scattered, below the surface.
     entering : (s, 3) float64
         Flux that enters, that of the body itself included.
+    inside : (cells, 3) float64
+        Fluence in the cells.
     steps : int
         Iterations that the solver took, in all.
     """
 
     fluence: Array
     entering: Array
+    inside: Array
     steps: int
 
 
@@ -151,14 +154,14 @@ class BodySystem:
         RenderError
             If the solver does not get there.
         """
-        fluence, flux = np.zeros_like(entering), entering.copy()
+        fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
         steps = 0
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
             found = system.solved(entering[:, channel], from_itself, inside[:, channel], emission)
-            fluence[:, channel], flux[:, channel], taken = found
+            fluence[:, channel], flux[:, channel], cells[:, channel], taken = found
             steps += taken
-        return SurfaceLight(fluence, flux, steps)
+        return SurfaceLight(fluence, flux, cells, steps)
 
 
 class _Channel:
@@ -223,8 +226,11 @@ class _Channel:
 
     def solved(
         self, entering: Array, from_itself: sparse.csr_array, power: Array, emission: float
-    ) -> tuple[Array, Array, int]:
-        """Fluence and flux at the samples, and steps: light of the body falls on it again until little changes."""
+    ) -> tuple[Array, Array, Array, int]:
+        """Fluence and flux at the samples, fluence in the cells, and steps.
+
+        Light of the body falls on it again until little changes.
+        """
         flux, steps = entering, 0
         before = np.zeros_like(entering)
         inside = self._albedo * (power + emission * self._glow_cells)
@@ -245,7 +251,7 @@ class _Channel:
             if np.abs(change).max(initial=0.0) <= ENOUGH * (1.0 - share) * np.abs(flux).max(initial=0.0):
                 break
             before = change if share == 0.0 else np.zeros_like(entering)
-        return fluence, flux, steps
+        return fluence, flux, np.maximum(cells, 0.0), steps
 
     def _cells(self, source: Array) -> tuple[Array, int]:
         """Fluence in the cells, and iterations; warm from the last one."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
+import numpy.typing as npt
+
 from translucent.media.medium import Medium
 
 
@@ -35,6 +37,6 @@ class DiffusedMedium(Medium):
     original: Medium = field(default_factory=Medium)
 
     @classmethod
-    def of(cls, medium: Medium) -> Self:
-        """The medium, marked."""
-        return cls(medium.extinction, 0.0, medium.emission, 0.0, medium.ior, medium)
+    def of(cls, medium: Medium, emission: npt.ArrayLike) -> Self:
+        """The medium, marked; `emission` (3,) is what it emits along rays, with the ambient light that it scatters."""
+        return cls(medium.extinction, 0.0, emission, 0.0, medium.ior, medium)

@@ -126,7 +126,7 @@ def shown(scene: Scene, back: GivenBack | None) -> Scene:
         for i in back.layered:
             objects[i] = replace(objects[i], medium=LayeredMedium.of(_medium(objects[i])))
         for i in back.diffused:
-            objects[i] = replace(objects[i], medium=DiffusedMedium.of(_medium(objects[i])))
+            objects[i] = replace(objects[i], medium=DiffusedMedium.of(_medium(objects[i]), scene.source(objects[i])))
         known[back] = replace(scene, objects=objects)
     return known[back]
 
