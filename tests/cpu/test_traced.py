@@ -15,6 +15,7 @@ from translucent.arrays import Array
 from translucent.assets import mesh_path
 from translucent.cpu import traced
 from translucent.cpu.caster import Caster
+from translucent.cpu.diffused import DiffusedLight
 from translucent.cpu.facets import Spread
 from translucent.cpu.renderer import CpuRenderer
 from translucent.cpu.traced import RayTree, TracedLight
@@ -46,7 +47,7 @@ def moved(x: float, scale: float = 1.0) -> Array:
 
 def tree_of(scene: tl.Scene, size: tuple[int, int], depth: int, forks: int) -> RayTree:
     caster = Caster(scene.objects, scene.bounds)
-    return RayTree(scene, sheet_thicknesses(scene), caster, size[0] / size[1], depth, forks)
+    return RayTree(scene, sheet_thicknesses(scene), caster, size[0] / size[1], depth, forks, DiffusedLight({}))
 
 
 def traced_light(
@@ -248,3 +249,17 @@ def test_pictures_are_near_full_light_transport(name: str, most: float, assets: 
     scene, side = scenes.make(name)
     frame = CpuRenderer().render(scene, (side, side), tl.plan(scene), samples=16)
     assert scenes.errors(frame.radiance, scenes.load(name))["nrmse"] < most
+
+
+def test_light_that_diffuses_is_that_of_opengl(renderer: tl.Renderer) -> None:
+    """The same light at the surface, and the same formula: the rays alone differ, where they graze."""
+    wax = tl.Medium(absorption=(0.2, 0.5, 1.0), scattering=20.0, ior=1.4)
+    ball = tl.Object(Sphere().tessellate(32), wax)
+    camera = tl.Camera.look_at((1, 0.8, 4), (0, 0, 0), fov_y=30.0)
+    scene = tl.Scene([ball], camera, environment=tl.Environment.gradient((0, 0, 0), (1, 1, 1)))
+    with tl.Renderer("cpu") as other:
+        found, expected = (one.render(scene, (24, 24), scattering=tl.Diffusion(16)) for one in (other, renderer))
+    assert found.plan.given_back.diffused == (0,)
+    seen = found.coverage & expected.coverage & (expected.thickness > 0.5)
+    assert seen.sum() > 100
+    np.testing.assert_allclose(found.radiance[seen], expected.radiance[seen], rtol=0.01, atol=2e-3)
