@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import shutil
 import subprocess
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -62,6 +64,19 @@ def assets() -> Path:
     if not ASSETS.is_dir():
         pytest.skip(f"third-party test data is absent: no folder {ASSETS}")
     return ASSETS
+
+
+@pytest.fixture(scope="session")
+def transport(assets: Path) -> ModuleType:
+    """Scenes with path-traced truth images: `make`, `load` and `errors`."""
+    if not (file := assets / "transport" / "scenes.py").is_file():
+        pytest.skip(f"truth images are absent: no file {file}")
+    spec = importlib.util.spec_from_file_location("transport_scenes", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""How right rays through hierarchies on the GPU are, how fast, and how long building takes.
+"""Correctness and speed of rays through hierarchies on the GPU, and the time that building them takes.
 
 ``python tools/check_rays.py [--rays N] [--quick] [MESH ...]`` prints a line of JSON for each mesh (default: four of the
 toolkit): triangles, seconds to build and to pack, how many random rays meet another surface than Embree says, how many

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -237,18 +236,10 @@ def test_frames_show_the_tree_where_interfaces_are() -> None:
 @pytest.mark.parametrize(
     ("name", "most"), [("sphere_glass", 0.02), ("knot_glass", 0.08), ("goblet_wine", 0.10), ("sphere_rough", 0.11)]
 )
-def test_pictures_are_near_full_light_transport(name: str, most: float, assets: Path) -> None:
-    path = assets / "transport" / "scenes.py"
-    if not path.is_file():
-        pytest.skip(f"truth images are absent: no file {path}")
-    spec = importlib.util.spec_from_file_location("transport_scenes", path)
-    assert spec is not None
-    assert spec.loader is not None
-    scenes = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(scenes)
-    scene, side = scenes.make(name)
+def test_pictures_are_near_full_light_transport(name: str, most: float, transport: ModuleType) -> None:
+    scene, side = transport.make(name)
     frame = CpuRenderer().render(scene, (side, side), tl.plan(scene), samples=16)
-    assert scenes.errors(frame.radiance, scenes.load(name))["nrmse"] < most
+    assert transport.errors(frame.radiance, transport.load(name))["nrmse"] < most
 
 
 def test_light_that_diffuses_is_that_of_opengl(renderer: tl.Renderer) -> None:

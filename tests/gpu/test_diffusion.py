@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -23,19 +21,6 @@ CAMERA = tl.Camera.look_at((1.0, 0.8, 4.0), (0, 0, 0), fov_y=30.0)
 WHITE = tl.Environment.constant((1.0, 1.0, 1.0))
 WAX = tl.Medium(absorption=(0.2, 0.5, 1.0), scattering=20.0, ior=1.4)
 COARSE = tl.Diffusion(12)
-
-
-@pytest.fixture(scope="module")
-def scenes() -> ModuleType:
-    file = Path(__file__).parents[3] / "shared" / "assets" / "transport" / "scenes.py"
-    if not file.is_file():
-        pytest.skip(f"truth images are absent: no file {file}")
-    spec = importlib.util.spec_from_file_location("transport_scenes", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture
@@ -65,16 +50,16 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
     ],
 )
 def test_pictures_are_near_full_light_transport(
-    renderer: tl.Renderer, scenes: ModuleType, name: str, samples: int, measure: str, most: float
+    renderer: tl.Renderer, transport: ModuleType, name: str, samples: int, measure: str, most: float
 ) -> None:
     """Measured with 16 samples: .083, .061, .044, .054, .023; and of blocks of pixels .118, .270, of lamps that are
     balls in the truth and points here. Four samples leave more aliasing, of which the ring alone has much: .104.
     """
-    scene, size = scenes.make(name)
+    scene, size = transport.make(name)
     frame = renderer.render(scene, (size, size), samples=samples)
     assert frame.plan.given_back.diffused == (0,)
     assert frame.valid.all()
-    found = scenes.errors(frame.radiance, scenes.load(name))
+    found = transport.errors(frame.radiance, transport.load(name))
     assert found[measure] < most, found
 
 
@@ -123,6 +108,9 @@ def test_only_what_changes_the_light_is_solved_for_again(renderer: tl.Renderer, 
     assert times(replace(scene, camera=tl.Camera.look_at((3, 0, 3), (0, 0, 0)))) == 0
     assert times(replace(scene, lights=[tl.DirectionalLight((1, -2, -1), (2, 2, 2))])) == 1
     assert times(scene) == 0  # of the last scenes all are kept
+    again = [tl.DirectionalLight((-1, -2, -1), (2, 2, 2))]
+    before_red = tl.Environment.constant((1, 1, 1)).with_background(tl.Environment.constant((1, 0, 0)))
+    assert times(replace(scene, lights=again, environment=before_red)) == 0  # the same light, whatever is behind
     assert times(replace(scene, environment=tl.Environment.studio())) == 1
     item = scene.objects[0]
     assert times(replace(scene, objects=[replace(item, medium=replace(WAX, scattering=22.0))])) == 1
@@ -160,7 +148,7 @@ def test_bodies_keep_their_own_light(renderer: tl.Renderer, solved: list[tl.Medi
 
 
 def test_a_lamp_at_the_surface_is_no_brighter_than_its_light(renderer: tl.Renderer) -> None:
-    """Where more enters than has diffused there, the factor that keeps the flux has a bound."""
+    """Bound of the factor that keeps the flux, beside a lamp where more enters than has diffused."""
     dense = tl.Medium(absorption=(80, 160, 350), scattering=(870, 800, 550), anisotropy=0.2, ior=1.44)
     lamp = tl.PointLight((0.0, 0.0, 1.002), (1.0, 1.0, 1.0))
     scene = lit_ball(dense, lights=[lamp], environment=tl.Environment.constant((0, 0, 0)))

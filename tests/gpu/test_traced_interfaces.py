@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import warnings
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -304,27 +302,15 @@ def test_light_scattered_once_is_added_as_in_screen_space(thorough: tl.Renderer)
 # Truth, by full light transport
 
 
-def scenes(assets: Path) -> ModuleType:
-    if not (file := assets / "transport" / "scenes.py").is_file():
-        pytest.skip(f"truth images are absent: no file {file}")
-    spec = importlib.util.spec_from_file_location("transport_scenes", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.parametrize(("name", "most"), [("sphere_glass", 0.03), ("goblet_wine", 0.13)])
 def test_pictures_are_those_of_full_light_transport(
-    assets: Path, renderer: tl.Renderer, name: str, most: float
+    transport: ModuleType, renderer: tl.Renderer, name: str, most: float
 ) -> None:
     """Bars of 16 samples are .02 and .10; four leave some more aliasing."""
-    module = scenes(assets)
-    scene, size = module.make(name)
+    scene, size = transport.make(name)
     frame = renderer.render(scene, (size, size), samples=4)
     assert isinstance(frame.plan.interfaces, tl.TracedInterfaces)
-    found = module.errors(frame.radiance, module.load(name))
+    found = transport.errors(frame.radiance, transport.load(name))
     print(f"{name}: {found}")
     assert found["nrmse"] < most
     assert np.abs(found["bias"]).max() < 0.02

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from dataclasses import astuple
 from threading import Lock
 from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
 
 from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
@@ -74,7 +78,21 @@ def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
         for i, medium in _diffused(scene).items()
     )
     opaque = tuple(_place(item) for item in scene.opaque)
-    return (diffusion, bodies, opaque, scene.environment, tuple(scene.lights))
+    around = scene.environment  # what is seen behind everything lights nothing
+    lighting = (
+        around.kind,
+        around.first.tobytes(),
+        around.second.tobytes(),
+        around.map,
+        around.rotation,
+        around.exposure,
+    )
+    lights = tuple((type(light), *map(_bytes, astuple(light))) for light in scene.lights)
+    return (diffusion, bodies, opaque, lighting, lights)
+
+
+def _bytes(value: npt.ArrayLike) -> bytes:
+    return np.asarray(value, np.float64).tobytes()
 
 
 def _diffused(scene: Scene) -> dict[int, DiffusedMedium]:
@@ -82,7 +100,7 @@ def _diffused(scene: Scene) -> dict[int, DiffusedMedium]:
 
 
 def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:
-    """What is stored for a key, made if it is missing; what was used longest ago goes."""
+    """Entry of a store, made if it is missing; beyond `most`, that which was used longest ago is dropped."""
     if key not in store:
         store[key] = make()
         if len(store) > most:

@@ -18,6 +18,7 @@ from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.triangles import Triangles, joined
 from translucent.scene.environment import Environment
+from translucent.scene.environment_map import row_solid_angles, texel_directions
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Object
 
@@ -103,7 +104,7 @@ class Sky:
 
 
 def sky_of(grid: BodyGrid, casters: Casters) -> Sky:
-    """What each sample of a body sees in each direction."""
+    """Sky of a body: the directions that each of its samples sees."""
     directions = even_directions(DIRECTIONS)
     cosine = np.maximum(grid.normals @ directions.T, 0.0)
     cosine[grid.face_normals @ directions.T <= 0.0] = 0.0
@@ -144,12 +145,8 @@ def nearest_parts(directions: Array) -> tuple[Integers, Array]:
 @cache
 def _map_directions() -> tuple[Array, Array]:
     """Directions and solid angles of the texels of an equirectangular map."""
-    polar = (np.arange(MAP_HEIGHT) + 0.5) / MAP_HEIGHT * np.pi
-    around = (np.arange(2 * MAP_HEIGHT) + 0.5) / MAP_HEIGHT * np.pi
-    up, level = np.cos(polar)[:, None], np.sin(polar)[:, None]
-    ways = np.stack(np.broadcast_arrays(level * np.cos(around), up, level * np.sin(around)), axis=-1).reshape(-1, 3)
-    angle = np.repeat(np.sin(polar[:, None]) * (np.pi / MAP_HEIGHT) ** 2, 2 * MAP_HEIGHT, axis=1).ravel()
-    return ways, angle
+    angle = np.repeat(row_solid_angles(MAP_HEIGHT, 2 * MAP_HEIGHT), 2 * MAP_HEIGHT)
+    return texel_directions(MAP_HEIGHT, 2 * MAP_HEIGHT).reshape(-1, 3), angle
 
 
 def transfer(sky: Sky, solid_angles: Array, ior: float, interface: DiffuseInterface) -> Array:

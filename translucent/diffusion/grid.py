@@ -104,7 +104,7 @@ class BodyGrid:
 
     @cached_property
     def below(self) -> tuple[sparse.csr_array, Array]:
-        """How the fluence somewhat below each sample is read, and how far below it is in m, (s,)."""
+        """Interpolation of the fluence somewhat below each sample, and its depth there in m, (s,)."""
         weights = sparse.csr_array((len(self.points), self.count))
         depth = np.zeros(len(self.points))
         missing = np.ones(len(self.points), bool)

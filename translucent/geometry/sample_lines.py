@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.geometry.line_crossings import line_crossings
 
 #: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
 #: What is smaller than a cell can slip through.
@@ -15,9 +14,6 @@ LINES = (12, 96)
 
 #: Share of the diagonal on which rounding and welding may wind a surface negatively.
 NEGATIVE = 1e-5
-
-#: Pairs of a triangle and a line that are tested at a time: the working arrays stay below 100 MB.
-CHUNK = 1 << 20
 
 #: Axes (columns) off those along which meshes tend to be built; and the same with each of them as the last, along which
 #: the lines run.
@@ -47,52 +43,13 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     # One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
     points = (unit @ _TURNS).reshape(-1, 3)
     copies = (faces + len(unit) * np.arange(3)[:, None, None]).reshape(-1, 3)
-    found = list(_chunks(points, copies, lines, np.repeat(np.arange(3), len(faces))))
+    scaled = (points[:, :2] + 0.5) * lines - 0.5
+    direction = np.repeat(np.arange(3), len(faces))
+    found = list(line_crossings(scaled, points[:, 2], copies, (lines, lines), direction))
     if not found:
         return False  # no face is as large as a cell
     line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return _winds_below_zero(line, height, sign)
-
-
-def _chunks(
-    points: Array, faces: npt.NDArray[np.integer], lines: int, direction: Integers
-) -> Iterator[tuple[Integers, Array, Integers]]:
-    """Crossings, in chunks, of the lines along the last axis with faces within -0.5 to 0.5; see `_crossings`."""
-    scaled = (points[:, :2] + 0.5) * lines - 0.5
-    first, count = zip(*(_span(column[faces]) for column in scaled.T), strict=True)
-    pairs = count[0] * count[1]
-    near = np.flatnonzero(pairs)
-    ends = np.cumsum(pairs[near])
-    for begin in range(0, int(ends[-1]) if len(ends) else 0, CHUNK):
-        pair = np.arange(begin, min(begin + CHUNK, int(ends[-1])))
-        entry = np.searchsorted(ends, pair, side="right")
-        face = near[entry]
-        inside = pair - (ends[entry] - pairs[face])
-        rows = count[1][face]
-        cell = np.stack([first[0][face] + inside // rows, first[1][face] + inside % rows], axis=1)
-        corners = faces[face]
-        line = (direction[face] * lines + cell[:, 0]) * lines + cell[:, 1]
-        yield _crossings(scaled[corners], points[corners, 2], cell, line)
-
-
-def _span(coordinate: Array) -> tuple[Integers, Integers]:
-    """(m,), (m,): the first line that triangles (m, 3) may meet along one axis, and how many."""
-    a, b, c = coordinate.T
-    first = np.ceil(np.minimum(np.minimum(a, b), c)).astype(np.int64)
-    last = np.floor(np.maximum(np.maximum(a, b), c)).astype(np.int64)
-    return first, np.maximum(last - first + 1, 0)
-
-
-def _crossings(triangles: Array, heights: Array, cell: Integers, line: Integers) -> tuple[Integers, Array, Integers]:
-    """Line, height and sign (+1 upwards into the body) of the triangles (k, 3, 2) that the lines at the cells meet."""
-    relative = triangles - cell[:, None, :]
-    x, y = relative[..., 0], relative[..., 1]
-    area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]
-    total = area.sum(axis=1)
-    met = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
-    weights = area[met] / total[met, None]
-    # Counter-clockwise seen from above: the outside is up there, and a line that goes up leaves.
-    return line[met], (weights * heights[met]).sum(axis=1), -np.sign(total[met]).astype(np.int64)
 
 
 def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:

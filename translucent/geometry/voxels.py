@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.geometry.line_crossings import line_crossings
 
 #: Lines through each cell along each axis, on a square of this side.
 LINES = 4
@@ -15,8 +16,8 @@ LINES = 4
 #: Shift of the lines, as a share of the distance between them, so that they miss what is modelled on a grid.
 _SHIFT = (0.0312, 0.0187)
 
-#: Pairs of a triangle and a line that are tested at a time.
-CHUNK = 1 << 20
+#: Of lines that meet nothing.
+_NO_CROSSINGS: tuple[Integers, Array, Integers] = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,11 @@ def _along_last_axis(
 ) -> tuple[Array, Array, Array]:
     """Length inside each cell, its first moment, and share of each cell's lower and upper face that is inside."""
     lines = size[:2] * LINES
-    line, height, sign = _crossings(points, faces, lines)
+    scaled = points[:, :2] * LINES - 0.5 - np.array(_SHIFT)
+    found = [_NO_CROSSINGS, *line_crossings(scaled, points[:, 2], faces, (int(lines[0]), int(lines[1])))]
+    line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.lexsort((height, line))
+    line, height, sign = line[order], height[order], sign[order]
     begin, end = _intervals(line, height, sign)
     deep = int(size[2])
     low, high = np.clip(height[begin], 0.0, deep - 1e-9), np.clip(height[end], 0.0, deep - 1e-9)
@@ -104,35 +109,6 @@ def _along_last_axis(
     lengths, moments = summed(upper - lower), summed(0.5 * (upper - lower) * (upper + lower))
     crossed = np.minimum(summed((cell > first[of]).astype(np.float64)), 1.0)
     return lengths, moments, np.concatenate([crossed, np.zeros((*shape[:2], 1))], axis=2)
-
-
-def _crossings(
-    points: Array, faces: npt.NDArray[np.integer], lines: npt.NDArray[np.integer]
-) -> tuple[Integers, Array, Integers]:
-    """Line, height and sign (+1 into the body) of all crossings, in order along each line."""
-    scaled = points[:, :2] * LINES - 0.5 - np.array(_SHIFT)
-    corners = scaled[faces]
-    first = np.maximum(np.ceil(corners.min(axis=1)).astype(int), 0)
-    last = np.minimum(np.floor(corners.max(axis=1)).astype(int), lines - 1)
-    count = np.maximum(last - first + 1, 0)
-    pairs = count.prod(axis=1)
-    found: list[tuple[Integers, Array, Integers]] = []
-    ends = np.cumsum(pairs)
-    cuts = np.searchsorted(ends, np.arange(0, max(int(ends[-1]), 1), CHUNK), side="right")
-    for begin, stop in zip(cuts, [*cuts[1:], len(pairs)], strict=True):
-        of, inside = _spread(np.zeros(stop - begin, int), pairs[begin:stop])
-        face = of + begin
-        at = first[face] + np.stack([inside // count[face, 1], inside % count[face, 1]], axis=1)
-        relative = corners[face] - at[:, None, :]
-        x, y = relative[..., 0], relative[..., 1]
-        area = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - y[:, [1, 2, 0]] * x[:, [2, 0, 1]]
-        total = area.sum(axis=1)
-        met = ((area > 0).all(axis=1) | (area < 0).all(axis=1)) & (total != 0)
-        height = (area[met] / total[met, None] * points[faces[face[met]], 2]).sum(axis=1)
-        found.append((at[met, 0] * lines[1] + at[met, 1], height, -np.sign(total[met]).astype(np.int64)))
-    line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    order = np.lexsort((height, line))
-    return line[order], height[order], sign[order]
 
 
 def _intervals(line: Integers, height: Array, sign: Integers) -> tuple[Integers, Integers]:

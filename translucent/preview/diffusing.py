@@ -46,7 +46,7 @@ class Diffusing:
     def scattering(
         self, scene: Scene, asked: Scattering | None, back: GivenBack, cache: DiffusionCache, lane: Lane
     ) -> Scattering | None:
-        """What is asked for if the light is known, or layers, and the search for it goes on.
+        """Scattering to draw with: that asked for if its light is known, else layers, while the search goes on.
 
         Parameters
         ----------

@@ -192,7 +192,7 @@ class Stage:
         return True
 
     def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
-        """What is asked for, or layers until the light that diffuses in the scene is known."""
+        """Scattering to draw with: that asked for, or layers until the light that diffuses in the scene is known."""
         asked = scattering_of(workspace.document.display.scattering)
         back = self.renderer.plan(scene, method, scattering=asked).given_back
         cache, lane = self.renderer.gpu.diffusion, workspace.lanes["diffuse"]
@@ -200,7 +200,7 @@ class Stage:
 
     @property
     def diffusing(self) -> str:
-        """How light that diffuses is shown while it is not known, or nothing."""
+        """Remark on how diffused light is shown while it is not known; empty if it is known."""
         return self._diffusing.told
 
     def _quick_interfaces(self, plan: RenderPlan | None) -> ScreenInterfaces | None:
