@@ -137,6 +137,12 @@ def environment_parts(environment: Environment, directions: Array) -> Array:
 
 def nearest_parts(directions: Array) -> tuple[Integers, Array]:
     """Which direction is nearest to each texel of a map of all, and the solid angle of the texels of each, (k,)."""
+    return _nearest_parts(directions.tobytes())
+
+
+@cache
+def _nearest_parts(packed: bytes) -> tuple[Integers, Array]:
+    directions = np.frombuffer(packed).reshape(-1, 3)
     ways, angle = _map_directions()
     nearest = np.asarray(cKDTree(directions).query(ways)[1])
     return nearest, np.asarray(np.bincount(nearest, angle, len(directions)), np.float64)

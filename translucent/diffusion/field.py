@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+from scipy import sparse
 from scipy.ndimage import map_coordinates, uniform_filter
 
 from translucent.arrays import Array
@@ -108,6 +109,22 @@ class DiffusionField:
 
 
 @dataclass(frozen=True, eq=False)
+class Entrance:
+    """Shares of light that enter a body through its interface.
+
+    Attributes
+    ----------
+    seen : (s, k) float32
+        For each radiance over the solid angle of a direction, see `transfer`; 0 where the sky is hidden.
+    itself : (s, s) csr_array
+        For the flux that leaves each sample, see `from_itself`.
+    """
+
+    seen: npt.NDArray[np.float32]
+    itself: sparse.csr_array
+
+
+@dataclass(frozen=True, eq=False)
 class LitBody:
     """Geometry of a body in which light diffuses; the same for all media and lights.
 
@@ -121,6 +138,17 @@ class LitBody:
     grid: BodyGrid
     casters: Casters
     sky: Sky
+    _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
+
+    def entrance(self, ior: float, roughness: float) -> Entrance:
+        """Light that enters through this interface; that of the last one is kept."""
+        if (ior, roughness) not in self._entrances:
+            solid_angles = nearest_parts(self.sky.directions)[1]
+            shares = transfer(self.sky, solid_angles, ior, diffuse_interface(ior, roughness))
+            itself = from_itself(self.sky, shares, solid_angles)
+            self._entrances.clear()
+            self._entrances[ior, roughness] = Entrance((shares * self.sky.seen).astype(np.float32), itself)
+        return self._entrances[ior, roughness]
 
 
 def lit_body(body: Object, opaque: EmbreeMesh | None, step: float) -> LitBody:
@@ -145,24 +173,21 @@ class DiffusingBody:
     def __init__(self, lit: LitBody, medium: Medium, roughness: float) -> None:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
-        solid_angles = nearest_parts(lit.sky.directions)[1]
-        shares = transfer(lit.sky, solid_angles, medium.ior, self._interface)
-        self._itself = from_itself(lit.sky, shares, solid_angles)
-        self._seen = (shares * lit.sky.seen).astype(np.float32)
+        self._entrance = lit.entrance(medium.ior, roughness)
         self._system = BodySystem(lit.grid, medium, roughness)
 
     @np.errstate(under="ignore")
     def field(self, scene: Scene) -> DiffusionField:
         """Light that the body gives back in a scene, for its environment and lights."""
         grid = self._lit.grid
-        entering = self._seen @ environment_parts(scene.environment, self._lit.sky.directions)
+        entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
         inside = np.zeros((grid.count, 3))
         for light in scene.lights:
             if isinstance(light, PointLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * np.asarray(light.intensity)
             else:
                 entering = entering + from_light(grid, self._lit.casters, light, self._medium.ior, self._interface)
-        found = self._system.solved(entering, self._itself, inside)
+        found = self._system.solved(entering, self._entrance.itself, inside)
         return _field(grid, self._medium, self._roughness, found)
 
 

@@ -169,6 +169,14 @@ class BodyGrid:
         weights = sparse.csr_array((value / scale[row], (row, np.concatenate(columns))), (len(points), self.count))
         return Probe(weights, center / scale[:, None], around)
 
+    def cell_at(self, points: Array) -> tuple[Integers, Array]:
+        """(k,), (k,): number of the cell at points (k, 3) in metres, and its share inside; 0 outside the system."""
+        place = np.floor((points - self.cells.low) / self.cells.step).astype(int)
+        within = np.all((place >= 0) & (place < np.array(self.number.shape)), axis=1)
+        x, y, z = np.where(np.asarray(within)[:, None], place, 0).T
+        number = self.number[x, y, z]
+        return np.maximum(number, 0), np.where(number >= 0, self.cells.inside[x, y, z], 0.0)
+
     def _depth(self, probe: Probe) -> Array:
         """(s,): depth of what is read below the samples, in cells."""
         places = (self.points - self.cells.low) / self.cells.step
@@ -230,6 +238,12 @@ def plane_points(count: int) -> Array:
 def other_plane_points(count: int) -> Array:
     """(count, 2): another such recurrence, to be drawn together with `plane_points`: neither tells of the other."""
     return np.asarray((0.5 + np.arange(count)[:, None] * [0.6287067210378087, 0.5385972572236101]) % 1.0)
+
+
+def box_points(count: int) -> Array:
+    """(count, 3): the same recurrence in the unit cube."""
+    shifts = [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]
+    return np.asarray((0.5 + np.arange(count)[:, None] * shifts) % 1.0)
 
 
 def _rows(matrix: sparse.csr_array, taken: npt.NDArray[np.bool_]) -> sparse.csr_array:

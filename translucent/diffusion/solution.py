@@ -20,7 +20,8 @@ from scipy import sparse
 from scipy.sparse.linalg import cg
 
 from translucent.arrays import Array
-from translucent.diffusion.grid import BodyGrid, other_plane_points
+from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
+from translucent.diffusion.known_solutions import KnownSolutions
 from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
@@ -200,7 +201,7 @@ class _Channel:
         self._scaled = sparse.csr_array(
             sparse.diags_array(self._scale) @ self._matrix @ sparse.diags_array(self._scale)
         )
-        self._guess = np.zeros(grid.count)
+        self._known = KnownSolutions(self._scaled)
 
     def _sources(self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: Array, d: float) -> None:
         """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
@@ -215,12 +216,14 @@ class _Channel:
             into_cells += share * layer.u(depth)
             self._near += share * layer.rise(layer.depth - depth) / d
         deep = sparse.csr_array((count, grid.count))
+        # Interpolation by chance: each place stands for the cell around it.
+        spread = grid.cells.step * (box_points(count) - 0.5)
         for quantile in _tails(count) if below.max() > _NOTHING else ():
             path = slant - np.log1p(-quantile) / extinction
-            there = grid.probe(grid.points + path[:, None] * ways)
-            # Where the path has left the body nothing is scattered; near its end, as much as is inside of cells.
-            share = self._albedo / DEEP_EVENTS * below * there.around
-            deep = deep + sparse.diags_array(share) @ there.weights
+            # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
+            cell, inside = grid.cell_at(grid.points + path[:, None] * ways + spread)
+            share = self._albedo / DEEP_EVENTS * below * inside
+            deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
 
@@ -254,23 +257,24 @@ class _Channel:
         return fluence, flux, np.maximum(cells, 0.0), steps
 
     def _cells(self, source: Array) -> tuple[Array, int]:
-        """Fluence in the cells, and iterations; warm from the last one."""
+        """Fluence in the cells, and iterations; none where lights of before are mixed anew."""
         steps = 0
 
         def count(_: Array) -> None:
             nonlocal steps
             steps += 1
 
-        found, failed = cg(
-            self._scaled, source * self._scale, x0=self._guess, rtol=TOLERANCE, maxiter=MOST_STEPS, callback=count
-        )
+        wanted = source * self._scale
+        near = self._known.nearest(wanted)
+        found, failed = cg(self._scaled, wanted, x0=near, rtol=TOLERANCE, maxiter=MOST_STEPS, callback=count)
         if failed:
             raise RenderError(
                 "diffusion in a body",
                 f"the solver is not there after {MOST_STEPS} steps in {self._grid.count} cells",
                 "render with scattering=tl.ScatteringLayer()",
             )
-        self._guess = found
+        if steps:
+            self._known.add(found)
         return np.asarray(found * self._scale), steps
 
 

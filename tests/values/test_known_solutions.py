@@ -1,0 +1,50 @@
+"""Solutions of earlier lights, from which that for the next one starts."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+import translucent as tl
+from translucent.diffusion.grid import body_grid
+from translucent.diffusion.known_solutions import MOST, KnownSolutions
+from translucent.diffusion.solution import TOLERANCE, BodySystem
+from translucent.geometry.solids import Sphere
+from translucent.planning.scattering import Diffusion
+
+MILK = tl.Medium(absorption=0.1, scattering=20.0, ior=1.33)
+
+
+def test_mixed_lights_take_no_steps() -> None:
+    """Dimmed, tinted, and both together, once each has been solved for; and solutions are those from nothing."""
+    body = tl.Object(Sphere().tessellate(24), MILK)
+    grid = body_grid(body, Diffusion(12).cell_size(body))
+    count, itself = len(grid.points), sparse.csr_array((len(grid.points),) * 2)
+    system = BodySystem(grid, MILK, 0.0)
+    dark = np.zeros((grid.count, 3))
+    above = np.maximum(grid.normals[:, :1], 0.0) * np.ones(3)
+    even, steps = np.ones((count, 3)), []
+    for entering in (even, above, 0.2 * above, 3.0 * even + 0.5 * above, even * (0.1, 1.0, 2.0)):
+        found = system.solved(entering, itself, dark)
+        alone = BodySystem(grid, MILK, 0.0).solved(entering, itself, dark)
+        np.testing.assert_allclose(found.fluence, alone.fluence, atol=20 * TOLERANCE * alone.fluence.max())
+        steps.append(found.steps)
+    assert min(steps[:2]) > 10
+    assert max(steps[2:]) <= 3
+
+
+def test_many_lights_are_no_worse_than_none_before() -> None:
+    """Those of long ago are dropped, one by one; what is dropped is found again."""
+    rng = np.random.default_rng(3)
+    n = 40
+    matrix = sparse.csr_array(np.diag(np.linspace(1.0, 50.0, n)) + 0.1)
+    known = KnownSolutions(matrix)
+    right = rng.normal(size=(3 * MOST, n))
+    for wanted in right:
+        exact = np.linalg.solve(matrix.toarray(), wanted)
+        near = known.nearest(wanted)
+        assert (exact - near) @ (matrix @ (exact - near)) <= exact @ (matrix @ exact) * (1 + 1e-9)
+        known.add(exact)
+    again = 0.3 * right[-1] - 2.0 * right[-MOST + 1]
+    np.testing.assert_allclose(known.nearest(again), np.linalg.solve(matrix.toarray(), again), atol=1e-6)
+    known.add(np.zeros(n))  # says nothing
