@@ -2,6 +2,9 @@
 // begin to end with its sample at s adds S(s) w e^(-sigma_t (s - begin)), seen through the segment up to its beginning.
 
 #include "volume/in_scatter.glsl"
+#if SCATTERS_AGAIN
+#include "volume/scattered_light.glsl"
+#endif
 
 uniform int march_steps;
 uniform int march_rule;
@@ -71,6 +74,11 @@ Marched march_pass(float turns[SLOTS], int variable, ViewRay ray, float metres, 
             }
             sigma += here[slot] * slot_extinction[slot].rgb;
             source += here[slot] * slot_emission[slot].rgb;
+#if SCATTERS_AGAIN
+            if (here[slot] > 0.0) {
+                source += here[slot] * slot_scattering[slot].rgb * scattered_before(slot, ray.start + at.x * ray.direction);
+            }
+#endif
         }
         vec3 through = transmittance(sum.depth);
 #else

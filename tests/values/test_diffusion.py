@@ -13,13 +13,13 @@ from scipy import sparse
 import translucent as tl
 from tests import slabs
 from translucent.bench.shapes import joined
+from translucent.diffusion.cells import TOLERANCE
 from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import BodyGrid, body_grid, box_points, other_plane_points, plane_points
 from translucent.diffusion.solution import (
     DEEP_EVENTS,
     EVENTS,
-    TOLERANCE,
     BodySystem,
     SurfaceLight,
     _Channel,
@@ -289,7 +289,7 @@ def test_the_system_is_symmetric_and_positive() -> None:
     """So light goes both ways between any two places alike, and conjugate gradients get there."""
     grid = ball_grid(10)
     channel = _Channel(grid, 1.4, 0.0, 0.5, 5.0, _first_ways(grid, 1.4))
-    matrix = channel._matrix.toarray()
+    matrix = channel._cells._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive
 

@@ -6,9 +6,10 @@ import numpy as np
 from scipy import sparse
 
 import translucent as tl
+from translucent.diffusion.cells import TOLERANCE
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.known_solutions import MOST, KnownSolutions
-from translucent.diffusion.solution import TOLERANCE, BodySystem
+from translucent.diffusion.solution import BodySystem
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion
 

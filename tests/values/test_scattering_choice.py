@@ -12,7 +12,7 @@ import translucent as tl
 from tests.values.plan_scenes import BOX, GLASS, MILK, NO_STORAGE, OPEN, body, names, scene, sheet
 from translucent.bench.shapes import joined
 from translucent.geometry.solids import Box, Sphere
-from translucent.media.given_back import DiffusedMedium, LayeredMedium
+from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
@@ -78,9 +78,9 @@ def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
         sheet(WAX),
         body(GLASS),
         body(tl.Medium(absorption=1.0, ior=1.5)),
-        body(MILK, density=VARYING),
+        body(tl.Medium(scattering=0.01), density=VARYING),
     ],
-    ids=["matched", "sheet", "clear", "clear glass", "cloud"],
+    ids=["matched", "sheet", "clear", "clear glass", "haze"],
 )
 def test_other_bodies_show_what_they_scatter_once(what: tl.Object) -> None:
     found = plan(scene(what, lights=LIT))
@@ -221,3 +221,36 @@ def test_a_body_whose_bounds_are_nearly_empty_is_a_layer() -> None:
     found = plan(scene(body(WAX, pair)))
     assert found.given_back.layered == (0,)
     assert "nearly empty" in found.given_back.refusals[0][1]
+
+
+CLOUD = body(MILK, density=VARYING)
+
+
+@pytest.mark.parametrize("lights", [[], LIT])
+def test_light_is_scattered_on_where_density_varies(lights: list[tl.PointLight]) -> None:
+    found = plan(scene(CLOUD, lights=lights))
+    back = found.given_back
+    assert (back.diffused, back.layered, back.volumes) == ((), (), (0,))
+    assert back.solved
+    assert isinstance(found.method, tl.RayMarched)
+    assert "is scattered on (Diffusion(resolution=32)) in 1 body" in str(found)
+    assert found.says(NoteKind.DIFFUSED_LIGHT)
+    assert not found.says(NoteKind.SCATTERED_AGAIN)
+    assert not found.says(NoteKind.ONLY_REMOVES)
+    marked = shown(scene(CLOUD), back)
+    assert isinstance(marked.objects[0].medium, DiffusedVolume)
+    assert not marked.objects[0].has_interface
+
+
+def test_a_march_that_is_asked_for_has_light_scattered_once() -> None:
+    """As `tl.reference.march` does; unless diffusion is asked for, too."""
+    march = tl.RayMarched(steps=8)
+    assert not plan(scene(CLOUD, lights=LIT), march).given_back
+    assert plan(scene(CLOUD, lights=LIT), march, scattering=tl.Diffusion(8)).given_back.volumes == (0,)
+    assert not plan(scene(CLOUD), scattering=tl.SingleScattering()).given_back
+
+
+def test_a_density_behind_an_interface_is_refused() -> None:
+    marbled = body(WAX, density=VARYING)
+    assert tl.Diffusion().refusal(marbled) == "its density varies, and it has an interface"
+    assert not plan(scene(marbled)).given_back

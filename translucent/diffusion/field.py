@@ -79,6 +79,11 @@ class DiffusionField:
     cells: int
     ior: float
 
+    @property
+    def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
+        """Arrays (x, y, z, 3) that pictures look up."""
+        return self.fluence, self.entering
+
     def radiance(self, points: Array, cosine: Array) -> Array:
         """(k, 3): basic radiance L / n^2 inside the body, below points of its surface and towards it.
 

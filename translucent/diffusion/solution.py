@@ -17,12 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import cg
 
 from translucent.arrays import Array
+from translucent.diffusion.cells import CellSystem
 from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
-from translucent.diffusion.known_solutions import KnownSolutions
-from translucent.errors import RenderError
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
     DiffuseInterface,
@@ -31,12 +29,6 @@ from translucent.formulas.diffuse_interface import (
     half_space_reflectance,
 )
 from translucent.media.medium import Medium
-
-#: Relative residual at which a solution is good enough: far below what diffusion itself gets wrong.
-TOLERANCE = 1e-4
-
-#: Steps after which conjugate gradients are given up.
-MOST_STEPS = 4000
 
 #: First events above the depth at which the fluence is read, and below it, for each sample.
 EVENTS, DEEP_EVENTS = 4, 2
@@ -196,12 +188,8 @@ class _Channel:
         below = grid.area * (layer.rise(depth) + layer.condition * layer.bend()) * self._relative
         self._glow_cells = grid.cores + self._read.T @ below
         lost = grid.area * d * layer.slope() * self._relative
-        self._matrix = _balance(grid, d, absorption, lost)
-        self._scale = 1.0 / np.sqrt(self._matrix.diagonal())
-        self._scaled = sparse.csr_array(
-            sparse.diags_array(self._scale) @ self._matrix @ sparse.diags_array(self._scale)
-        )
-        self._known = KnownSolutions(self._scaled)
+        absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
+        self._cells = CellSystem(grid, np.full(grid.count, d), absorption * absorbing, lost)
 
     def _sources(self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: Array, d: float) -> None:
         """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
@@ -239,7 +227,7 @@ class _Channel:
         inside = self._albedo * (power + emission * self._glow_cells)
         glow = self._albedo * emission * self._glow_near
         for _ in range(MOST_BOUNCES):
-            cells, taken = self._cells(self._into_cells @ flux + inside)
+            cells, taken = self._cells.solved(self._into_cells @ flux + inside)
             steps += taken
             surface = (self._read @ cells) * self._attenuated + (self._near - self._excess) * flux + glow
             fluence = np.maximum(surface, 0.0)
@@ -255,44 +243,6 @@ class _Channel:
                 break
             before = change if share == 0.0 else np.zeros_like(entering)
         return fluence, flux, np.maximum(cells, 0.0), steps
-
-    def _cells(self, source: Array) -> tuple[Array, int]:
-        """Fluence in the cells, and iterations; none where lights of before are mixed anew."""
-        steps = 0
-
-        def count(_: Array) -> None:
-            nonlocal steps
-            steps += 1
-
-        wanted = source * self._scale
-        near = self._known.nearest(wanted)
-        found, failed = cg(self._scaled, wanted, x0=near, rtol=TOLERANCE, maxiter=MOST_STEPS, callback=count)
-        if failed:
-            raise RenderError(
-                "diffusion in a body",
-                f"the solver is not there after {MOST_STEPS} steps in {self._grid.count} cells",
-                "render with scattering=tl.ScatteringLayer()",
-            )
-        if steps:
-            self._known.add(found)
-        return np.asarray(found * self._scale), steps
-
-
-def _balance(grid: BodyGrid, d: float, absorption: float, lost: Array) -> sparse.csr_array:
-    """Symmetric matrix of what flows between cells, is absorbed in them, and leaves through the surface."""
-    first, second, ratio = grid.faces
-    flow = d * ratio
-    absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
-    # Crumbs that no sample reads would otherwise keep all of the light that is put into them.
-    diagonal = absorption * absorbing + np.where(grid.crumbs, d * grid.cells.step, 0.0)
-    diagonal += np.bincount(first, flow, grid.count) + np.bincount(second, flow, grid.count)
-    between = sparse.coo_array(
-        (np.concatenate([-flow, -flow]), (np.concatenate([first, second]), np.concatenate([second, first]))),
-        (grid.count, grid.count),
-    )
-    read, _ = grid.below
-    leaving = read.T @ sparse.diags_array(lost) @ read
-    return sparse.csr_array(between + sparse.diags_array(diagonal) + leaving)
 
 
 def _tails(samples: int) -> Array:

@@ -11,10 +11,11 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.diffusion import DiffusedLight, slot_grids
 from translucent.gpu.layout import DENSITY
 from translucent.media.density import DensityGrid, ExponentialDensity, LinearDensity
 from translucent.planning.slots import MAX_SLOTS, Slot
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Scene
 
 
 class GridTexture:
@@ -82,7 +83,7 @@ def scene_grids(scene: Scene, slots: Sequence[Slot]) -> list[DensityGrid]:
     return [density for density in densities if isinstance(density, DensityGrid)]
 
 
-def density_uniforms(scene: Scene, slots: Sequence[Slot], center: Array) -> bytes:
+def density_uniforms(scene: Scene, slots: Sequence[Slot], center: Array, light: DiffusedLight | None) -> bytes:
     """Contents of the Density block; `center` (3,) is where the points of shaders count from, in metres."""
     rows = np.zeros((3 * MAX_SLOTS, 4))
     profile, grid = np.zeros((2, MAX_SLOTS, 4))
@@ -92,7 +93,7 @@ def density_uniforms(scene: Scene, slots: Sequence[Slot], center: Array) -> byte
         density = body.density
         if density is None:
             continue
-        rows[3 * i : 3 * i + 3] = unit_box_rows(body, center)
+        rows[3 * i : 3 * i + 3] = body.to_unit_box(center)
         if isinstance(density, DensityGrid):
             shape = np.shape(density.values)
             profile[i, 0] = float(CONSTANTS["DENSITY_GRID"])
@@ -103,15 +104,5 @@ def density_uniforms(scene: Scene, slots: Sequence[Slot], center: Array) -> byte
         elif isinstance(density, ExponentialDensity):
             kind = float(CONSTANTS["DENSITY_EXPONENTIAL"])
             profile[i] = [kind, density.axis, density.maximum, density.log_ratio]
-    return DENSITY.pack(density_rows=rows, density_profile=profile, density_grid=grid)
-
-
-def unit_box_rows(body: Object, center: Array) -> Array:
-    """(3, 4): from points, given from `center` in metres, to the unit box of a body; taken in float64."""
-    low, high = body.mesh.bounds
-    extent = high - low
-    # All of a flat mesh is in the middle of its box.
-    scale = np.where(extent > 0, 1.0 / np.where(extent > 0, extent, 1.0), 0.0)
-    linear = scale[:, None] * np.linalg.inv(body.matrix[:3, :3])
-    middle = body.matrix[:3, :3] @ (0.5 * (low + high)) + body.matrix[:3, 3]
-    return np.column_stack([linear, 0.5 + linear @ (center - middle)])
+    scattered = slot_grids(light, slots, center)
+    return DENSITY.pack(density_rows=rows, density_profile=profile, density_grid=grid, **scattered)

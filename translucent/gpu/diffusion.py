@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.diffusion.cache import FieldCache
-from translucent.diffusion.field import DiffusionField
+from translucent.diffusion.cache import FieldCache, Fields
 from translucent.planning.scattering import Diffusion
+from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.scene import Scene
 
 
@@ -21,23 +21,23 @@ class DiffusedLight:
     Attributes
     ----------
     texture : moderngl.Texture3D
-        See ``shaders/shade/diffused_light.glsl``.
-    fields : dict of int to DiffusionField
-        By the number of the object.
+        See ``shaders/shade/diffused_light.glsl`` and ``shaders/volume/scattered_light.glsl``.
+    fields : Fields
     first_layers : dict of int to int
-        Of each in the texture.
+        Of each object in the texture.
     """
 
-    def __init__(self, gl: moderngl.Context, fields: dict[int, DiffusionField]) -> None:
+    def __init__(self, gl: moderngl.Context, fields: Fields) -> None:
         self.fields = fields
         self.first_layers: dict[int, int] = {}
-        width, height = (max(field.fluence.shape[axis] for field in fields.values()) for axis in (0, 1))
-        layers = sum(2 * field.fluence.shape[2] for field in fields.values())
+        volumes = {number: field.volumes for number, field in (fields.surfaces | fields.volumes).items()}
+        shapes = np.array([values.shape for arrays in volumes.values() for values in arrays])
+        width, height, layers = int(shapes[:, 0].max()), int(shapes[:, 1].max()), int(shapes[:, 2].sum())
         texels = np.zeros((layers, height, width, 4), np.float32)
         first = 0
-        for number, field in fields.items():
+        for number, arrays in volumes.items():
             self.first_layers[number] = first
-            for values in (field.fluence, field.entering):
+            for values in arrays:
                 across, up, deep = values.shape[:3]
                 texels[first : first + deep, :up, :across, :3] = values.transpose(2, 1, 0, 3)
                 first += deep
@@ -60,8 +60,18 @@ class DiffusedLight:
                 "exit_share": field.exit_share,
                 "mean_cosine": field.mean_cosine,
             }
-            for number, field in self.fields.items()
+            for number, field in self.fields.surfaces.items()
         }
+
+
+def slot_grids(light: DiffusedLight | None, slots: Sequence[Slot], center: Array) -> dict[str, Array]:
+    """Fields of the Density block: grids of the slots whose light is known, for positions from `center`."""
+    low, grid = np.zeros((2, MAX_SLOTS, 4))
+    for i, slot in enumerate(slots):
+        if light is not None and (field := light.fields.volumes.get(slot.objects[0])) is not None:
+            low[i] = *(field.low - center), 1.0 / field.step
+            grid[i] = *field.mean_radiance.shape[:3], light.first_layers[slot.objects[0]]
+    return {"scattered_low": low, "scattered_grid": grid}
 
 
 class DiffusionCache:

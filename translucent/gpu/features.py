@@ -64,6 +64,11 @@ class FrameFeatures:
         return self.plan.has(PassName.LIGHT_VIEWS)
 
     @property
+    def scatters_again(self) -> bool:
+        """Whether light that was scattered before is scattered into the rays."""
+        return bool(self.plan.given_back.volumes)
+
+    @property
     def last_pass(self) -> str:
         """Name of the pass after which a sample's radiance is complete and can be summed."""
         return self.plan.passes[-1].name

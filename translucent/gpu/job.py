@@ -76,6 +76,9 @@ class FrameJob(SceneView):
         placed = PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
+        if scene.varies:
+            light = resources.diffusion.of(scene, plan.given_back.diffusion)
+            contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
         super().__init__(gl, placed, body_roles(self.features, counts), contents, targets, resources)
         self._cleared: set[str] = set()
         self._lit = False
@@ -157,10 +160,12 @@ class FrameJob(SceneView):
         if self.features.has_opaque:
             self.targets.opaque().color_attachments[0].use(unit)
 
-    def bind_grids(self, unit: int) -> None:
-        """Bind the density grids for the shader that reads texture `unit`, if a density varies."""
+    def bind_grids(self, unit: int, light_unit: int) -> None:
+        """Bind density grids, and grids of light scattered before, for the shader that reads these textures, if any."""
         if self.scene.varies:
             self.resources.grids.use(unit, scene_grids(self.scene, self.features.slots))
+        if self.features.scatters_again and self.diffused_light is not None:
+            self.diffused_light.texture.use(light_unit)
 
 
 def _contents(
@@ -177,6 +182,4 @@ def _contents(
     }
     if features.has_surfaces:
         contents[SURFACES] = surface_uniforms(placed, size)
-    if scene.varies:
-        contents[DENSITY] = density_uniforms(scene, features.slots, media_sphere(scene)[0])
     return contents

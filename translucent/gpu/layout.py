@@ -304,6 +304,8 @@ DENSITY = UniformBlock(
         # Kind; axis, density at its start and end, or the densest and the logarithm of their ratio
         ("density_profile", "f4", (MAX_SLOTS, 4)),
         ("density_grid", "f4", (MAX_SLOTS, 4)),  # voxels along x, y and z; the first layer in the texture of all grids
+        ("scattered_low", "f4", (MAX_SLOTS, 4)),  # corner of the cells of light scattered before; cells in a metre
+        ("scattered_grid", "f4", (MAX_SLOTS, 4)),  # cells along x, y and z; the first layer in the texture of all
     ),
 )
 

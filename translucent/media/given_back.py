@@ -23,6 +23,16 @@ class LayeredMedium(Medium):
 
 
 @dataclass(frozen=True, eq=False)
+class DiffusedVolume(Medium):
+    """Medium of varying density into whose rays light is scattered that was scattered before; see `Diffusion`."""
+
+    @classmethod
+    def of(cls, medium: Medium) -> Self:
+        """The medium, marked."""
+        return cls(medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior)
+
+
+@dataclass(frozen=True, eq=False)
 class DiffusedMedium(Medium):
     """Medium in which light diffuses; see `Diffusion`. Along rays its scattering only removes light, like absorption.
 

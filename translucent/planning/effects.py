@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from translucent.media.given_back import DiffusedMedium, LayeredMedium
+from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.layers import layer_effects
 from translucent.planning.notes import Note, NoteKind
@@ -78,6 +78,13 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     """Notes on scattered light that is not rendered."""
     notes = _given_back_effects(scene) if interfaces else []
     media = [body.medium for body in scene.bodies if body.medium is not None and body.medium.scatters]
+    if any(isinstance(medium, DiffusedVolume) for medium in media):
+        text = (
+            "what is scattered more than once: what opaque objects and other bodies keep from it, and where it goes on "
+            "ahead, as around lights behind media that scatter ahead"
+        )
+        notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
+        media = [medium for medium in media if not isinstance(medium, DiffusedVolume)]
     if scattering := [medium for medium in media if not (interfaces and medium.gives_back)]:
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in scattering)

@@ -55,7 +55,9 @@ def plan(
     check_interfaces(interfaces)
     check_scattering(scattering)
     capabilities = capabilities or Capabilities()
-    if back := given_back(scene, scattering, layers=capabilities.opengl):
+    # A march that is asked for is the sum that is asked for, of light scattered once.
+    volumes = capabilities.shader_storage and (method is None or scattering is not None)
+    if back := given_back(scene, scattering, layers=capabilities.opengl, volumes=volumes):
         once = SingleScattering()
         found = plan(shown(scene, back), method, capabilities, interfaces=interfaces, scattering=once)
         return with_given_back_told(found, scene, back)

@@ -1,4 +1,4 @@
-"""Light that diffuses in bodies, solved for in a thread while the picture shows layers."""
+"""Light that is scattered many times, solved for in a thread while the picture shows it more simply."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from translucent.diffusion.cache import diffusion_key
 from translucent.gpu.diffusion import DiffusionCache
-from translucent.planning.scattering import Scattering, ScatteringLayer
+from translucent.planning.scattering import Scattering, ScatteringLayer, SingleScattering
 from translucent.planning.scattering.choice import GivenBack, shown
 from translucent.preview.tasks import Lane, Task
 from translucent.scene.scene import Scene
 
-UNTIL = "light that is scattered many times as of flat layers, until its diffusion is solved for"
-NEVER = "light that is scattered many times as of flat layers, since it could not be solved for"
+UNTIL = "light that is scattered many times {}, until its diffusion is solved for"
+NEVER = "light that is scattered many times {}, since it could not be solved for"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Diffusing:
     def scattering(
         self, scene: Scene, asked: Scattering | None, back: GivenBack, cache: DiffusionCache, lane: Lane
     ) -> Scattering | None:
-        """Scattering to draw with: that asked for if its light is known, else layers, while the search goes on.
+        """Scattering to draw with: that asked for if its light is known, else a simpler one, while the search goes on.
 
         Parameters
         ----------
@@ -60,17 +60,19 @@ class Diffusing:
             For the search.
         """
         self.told = ""
-        if not back.diffused:
+        if not back.solved:
             return asked
+        instead = ScatteringLayer() if back.diffused else SingleScattering()
+        simply = "as of flat layers" if back.diffused else "once alone"
         marked, diffusion = shown(scene, back).with_ambient_emitted, back.diffusion
         if cache.has(key := diffusion_key(marked, diffusion)):
             return asked
         if self._solving is not None and self._solving.failed:
             self._insoluble, self._solving = self._solving.key, None
         if key == self._insoluble:
-            self.told = NEVER
-            return ScatteringLayer()
-        self.told = UNTIL
+            self.told = NEVER.format(simply)
+            return instead
+        self.told = UNTIL.format(simply)
         if lane.task is None:
             task = lane.start(
                 "diffusing light",
@@ -78,4 +80,4 @@ class Diffusing:
                 lambda _: None,
             )
             self._solving = _Solving(key, task)
-        return ScatteringLayer()
+        return instead

@@ -129,6 +129,16 @@ class Object(Frozen):
             return False
         return self.medium.ior != 1.0 or self.medium.gives_back or not self.plain
 
+    def to_unit_box(self, center: Array) -> Array:
+        """(3, 4): from points of the world, given from `center` (3,) in metres, to the box of a `Density`; float64."""
+        low, high = self.mesh.bounds
+        extent = high - low
+        # All of a flat mesh is in the middle of its box.
+        scale = np.where(extent > 0, 1.0 / np.where(extent > 0, extent, 1.0), 0.0)
+        linear = scale[:, None] * np.linalg.inv(self.matrix[:3, :3])
+        middle = self.matrix[:3, :3] @ (0.5 * (low + high)) + self.matrix[:3, 3]
+        return np.column_stack([linear, 0.5 + linear @ (center - middle)])
+
     @cached_property
     def mean_thickness(self) -> float:
         """Twice the volume over the area, in metres: of a wide slab its thickness, of a ball two thirds of the radius.

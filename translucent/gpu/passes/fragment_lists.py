@@ -38,6 +38,7 @@ class FragmentListsPass:
             opaque_axial_depth=0,
             density_grids=1,
             steepest=2,
+            scattered_light=3,
         )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
@@ -103,7 +104,7 @@ class FragmentListsPass:
 
     def _walk(self, job: FrameJob, first: int, last: int) -> None:
         job.bind_opaque(0)
-        job.bind_grids(1)
+        job.bind_grids(1, 3)
         job.targets.steepest().color_attachments[0].use(2)
         switches = {"OPAQUE": job.features.has_opaque, "INTERFACES": job.features.finds_exits}
         program = self._resolve.program(**walk_switches(job.features), GRADIENT=0, **switches)

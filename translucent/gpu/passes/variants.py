@@ -111,6 +111,7 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
         "SCATTER": features.scatters or features.marches,
         "MARCH": features.marches,
         "VARIES": features.scene.varies,
+        "SCATTERS_AGAIN": features.scatters_again,
         # One set of points serves all channels where light fares alike in them.
         "GRAY": all(_is_gray(slot.medium.extinction) for slot in features.slots),
         "SHADOWS": bool(features.scene.opaque),

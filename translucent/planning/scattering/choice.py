@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.media.given_back import DiffusedMedium, LayeredMedium
+from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.media.medium import Medium
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.scene.scene import Object, Scene
@@ -32,6 +32,8 @@ class GivenBack:
         Numbers of the objects in which light diffuses.
     layered : tuple of int
         Of those that give back light as layers.
+    volumes : tuple of int
+        Of those whose density varies, into whose rays light is scattered again.
     diffusion : Diffusion
     refusals : tuple of (int, str)
         Objects that are layers since light cannot diffuse in them, and why.
@@ -39,15 +41,25 @@ class GivenBack:
 
     diffused: tuple[int, ...] = ()
     layered: tuple[int, ...] = ()
+    volumes: tuple[int, ...] = ()
     diffusion: Diffusion = field(default_factory=Diffusion)
     refusals: tuple[tuple[int, str], ...] = ()
 
     def __bool__(self) -> bool:
         """Whether there are any."""
-        return bool(self.diffused or self.layered)
+        return bool(self.diffused or self.layered or self.volumes)
+
+    @property
+    def solved(self) -> bool:
+        """Whether light is solved for on a grid."""
+        return bool(self.diffused or self.volumes)
 
     def __str__(self) -> str:
-        ways = ((self.diffused, f"diffuses ({self.diffusion})"), (self.layered, "is given back as by layers"))
+        ways = (
+            (self.diffused, f"diffuses ({self.diffusion})"),
+            (self.volumes, f"is scattered on ({self.diffusion})"),
+            (self.layered, "is given back as by layers"),
+        )
         return ", and ".join(
             f"{way} in {len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}" for bodies, way in ways if bodies
         )
@@ -69,11 +81,12 @@ def check_scattering(scattering: object) -> None:
     )
 
 
-def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True) -> GivenBack:
+def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True, volumes: bool = True) -> GivenBack:
     """Bodies that give back what they scatter many times, and how.
 
-    Unless something is asked for, bodies without interfaces, as fog and smoke are, do not, nor do those in which little
-    is scattered. Without `layers` nothing is shown as a layer.
+    Unless something is asked for, bodies of one density without interfaces, as fog is, do not, nor do those in which
+    little is scattered. Without `layers` nothing is shown as a layer, without `volumes` none whose density varies is
+    shown with more than single scattering.
 
     Raises
     ------
@@ -89,7 +102,8 @@ def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True) -
         if body.medium is not None
         and body.medium.scatters
         and not body.covers
-        and (asked is not None or (body.has_interface and _is_deep(body, body.medium)))
+        and (body.density is None or volumes)
+        and (asked is not None or ((body.has_interface or body.density is not None) and _is_deep(body, body.medium)))
     }
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
     if asked is None and len(bodies) - len(refused) > MOST_DIFFUSED:
@@ -104,13 +118,20 @@ def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True) -
         raise InputError(str(asked), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering()")
     if not isinstance(wanted, Diffusion):
         return GivenBack(layered=layered)
-    diffused = tuple(i for i in bodies if i not in refused)
-    return GivenBack(diffused, layered, wanted, tuple((i, why) for i, why in refused.items() if i in layered))
+    solved = [i for i in bodies if i not in refused]
+    return GivenBack(
+        tuple(i for i in solved if bodies[i].density is None),
+        layered,
+        tuple(i for i in solved if bodies[i].density is not None),
+        wanted,
+        tuple((i, why) for i, why in refused.items() if i in layered),
+    )
 
 
 def _is_deep(body: Object, medium: Medium) -> bool:
     reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
-    return bool(reduced.max() * body.mean_thickness > LEAST_DEPTH)
+    densest = 1.0 if body.density is None else body.density.maximum
+    return bool(reduced.max() * densest * body.mean_thickness > LEAST_DEPTH)
 
 
 _SHOWN: WeakKeyDictionary[Scene, dict[GivenBack, Scene]] = WeakKeyDictionary()
@@ -125,6 +146,8 @@ def shown(scene: Scene, back: GivenBack | None) -> Scene:
         objects = list(scene.objects)
         for i in back.layered:
             objects[i] = replace(objects[i], medium=LayeredMedium.of(_medium(objects[i])))
+        for i in back.volumes:
+            objects[i] = replace(objects[i], medium=DiffusedVolume.of(_medium(objects[i])))
         for i in back.diffused:
             objects[i] = replace(objects[i], medium=DiffusedMedium.of(_medium(objects[i]), scene.source(objects[i])))
         known[back] = replace(scene, objects=objects)

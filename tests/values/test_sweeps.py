@@ -1,0 +1,68 @@
+"""Sweeps through a grid: beams that are known, uniform light, and turned grids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from translucent.diffusion.entering import even_directions, nearest_parts
+from translucent.diffusion.sweeps import swept
+
+STEP = 0.25
+SHAPE = (6, 5, 7)
+#: Of float32, added up over the cells and directions of a sweep.
+ROUNDING = 1e-5
+
+
+def one_beam(direction: tuple[float, float, float], extinction: np.ndarray) -> np.ndarray:
+    way = np.array([direction]) / np.linalg.norm(direction)
+    return swept(extinction, np.zeros_like(extinction), np.ones((1, 3)), way, np.ones(1), STEP)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_beam_along_an_axis_loses_what_it_passes(axis: int, sign: float) -> None:
+    """On the mean over each cell."""
+    extinction = np.random.default_rng(1).uniform(0.0, 4.0, (*SHAPE, 3))
+    direction = [0.0, 0.0, 0.0]
+    direction[axis] = sign
+    along = np.moveaxis(extinction, axis, 0)[:: -int(sign)]
+    before = STEP * (np.cumsum(along, axis=0) - along)
+    mean = np.exp(-before) * -np.expm1(-STEP * along) / (STEP * along)
+    expected = np.moveaxis(mean[:: -int(sign)], 0, axis)
+    found = one_beam((direction[0], direction[1], direction[2]), extinction)
+    np.testing.assert_allclose(found, expected, rtol=ROUNDING)
+
+
+def test_a_beam_aslant_loses_more() -> None:
+    """In uniform matter, away from where it has come in at the sides."""
+    extinction = np.full((9, 9, 9, 3), 2.0)
+    found = one_beam((0.2, 0.1, 1.0), extinction)
+    slant = np.linalg.norm((0.2, 0.1, 1.0))
+    depth = STEP * np.arange(9)[::-1] * slant * 2.0
+    mean = -np.expm1(-STEP * slant * 2.0) / (STEP * slant * 2.0)
+    np.testing.assert_allclose(found[0, 0, :, 0], np.exp(-depth) * mean, rtol=ROUNDING)
+
+
+def test_what_sends_out_as_much_as_it_takes_is_invisible() -> None:
+    """In uniform light, whatever there is, in every direction."""
+    extinction = np.random.default_rng(2).uniform(0.0, 30.0, (*SHAPE, 3))
+    extinction[2:4] = 0.0
+    directions = even_directions(48)
+    weights = nearest_parts(directions)[1]
+    found = swept(extinction, extinction, np.ones((48, 3)), directions, weights, STEP)
+    # Between cells, light and matter are interpolated each by themselves.
+    np.testing.assert_allclose(found, 4.0 * np.pi, rtol=ROUNDING)
+
+
+def test_a_turned_grid_has_turned_light() -> None:
+    rng = np.random.default_rng(3)
+    extinction, emission = rng.uniform(0.0, 3.0, (2, *SHAPE, 3))
+    directions = even_directions(32)
+    arriving, weights = rng.uniform(0.0, 1.0, (32, 3)), np.ones(32)
+    plain = swept(extinction, emission, arriving, directions, weights, STEP)
+    order, signs = [2, 0, 1], np.array([1.0, -1.0, -1.0])
+    turned = directions[:, order] * signs
+    grids = [np.flip(values.transpose(*order, 3), (1, 2)) for values in (extinction, emission, plain)]
+    found = swept(grids[0], grids[1], arriving, turned, weights, STEP)
+    np.testing.assert_allclose(found, grids[2], rtol=ROUNDING)

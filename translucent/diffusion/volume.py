@@ -1,0 +1,240 @@
+"""Light that is scattered many times in media whose density varies, as rays find it at each point inside.
+
+Discrete ordinates on a grid of cells, from a start by diffusion, which also finds what each round leaves over: a few
+rounds are enough however often light is scattered (diffusion synthetic acceleration, Alcouffe 1977; Adams & Larsen
+2002). Directions matter to what is scattered once alone, so that isotropic events with reduced coefficients do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import distance_transform_edt, map_coordinates
+
+from translucent.arrays import Array
+from translucent.diffusion.cells import CellSystem
+from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts
+from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.sweeps import swept
+from translucent.formulas import optics
+from translucent.formulas.diffuse_interface import diffusion_coefficient
+from translucent.media.medium import Medium
+from translucent.scene.lights import PointLight
+from translucent.scene.scene import Object, Scene
+
+#: Directions of the rounds: what has been scattered depends on directions little.
+ORDINATES = 48
+
+#: Rounds, and the change at which they are enough.
+MOST_ROUNDS, ENOUGH = 8, 2e-2
+
+#: Optical depth across a cell beyond which its medium counts as no denser.
+MOST_DEPTH = 2.0
+
+#: Points in each cell that light of a lamp passes.
+POINTS_A_CELL = 1.5
+
+#: Cells that count as none of a way.
+_STILL = 1e-9
+
+#: Points in each cell, along each axis, at which its density is looked at.
+_PLACES = (0.25, 0.75)
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeField:
+    """Light that comes from everywhere to the points of a medium, on a grid of cells in world coordinates.
+
+    Attributes
+    ----------
+    mean_radiance : (x, y, z, 3) float32
+        Of what has been scattered, and of the unscattered environment: a medium scatters sigma_s times as much of it
+        into each metre of a ray. Spread beyond the body.
+    low : (3,) float64
+        Corner of the grid in metres.
+    step : float
+        Side of a cell in metres.
+    steps : int
+        Iterations of the solver.
+    """
+
+    mean_radiance: npt.NDArray[np.float32]
+    low: Array
+    step: float
+    steps: int
+
+    @property
+    def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
+        """Arrays (x, y, z, 3) that pictures look up."""
+        return (self.mean_radiance,)
+
+
+class VolumeGrid:
+    """Cells of a body with the density in them; the same for all media and lights.
+
+    Parameters
+    ----------
+    body : Object
+        Closed, with a density.
+    step : float
+        Side of a cell in metres.
+    """
+
+    def __init__(self, body: Object, step: float) -> None:
+        self.grid: BodyGrid = body_grid(body, step)
+        self.density = self.grid.cells.inside * _cell_means(body, self.grid)
+        self.thickness = body.mean_thickness
+
+    @property
+    def inside(self) -> npt.NDArray[np.bool_]:
+        """(x, y, z): cells of the system."""
+        return np.asarray(self.grid.number >= 0)
+
+
+class DiffusingVolume:
+    """A body whose density varies with its medium, ready for any light.
+
+    Parameters
+    ----------
+    volume : VolumeGrid
+    medium : Medium
+    """
+
+    @np.errstate(under="ignore")
+    def __init__(self, volume: VolumeGrid, medium: Medium) -> None:
+        self._volume, self._medium = volume, medium
+        self._reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+        reduced = np.asarray(medium.absorption) + self._reduced
+        # What is denser looks the same, and its skin would be lost in a cell.
+        most = MOST_DEPTH / max(float(reduced.max()) * volume.grid.cells.step, np.finfo(np.float64).tiny)
+        self._density = np.minimum(volume.density, most)
+        self._extinction = self._density[..., None] * reduced
+        # Sweeps are right in cells that light gets through; in others diffusion is, and rounds would not end.
+        self._resolved = 1.0 / (1.0 + (self._extinction * volume.grid.cells.step) ** 2)
+        self._directions = even_directions(ORDINATES)
+        self._solid_angles = nearest_parts(self._directions)[1]
+        self._systems = [
+            None if scattering == 0.0 else _system(volume, self._density, absorption, scattering)
+            for absorption, scattering in zip(np.asarray(medium.absorption), self._reduced, strict=True)
+        ]
+
+    @np.errstate(under="ignore")
+    def field(self, scene: Scene) -> VolumeField:
+        """Light in the body in a scene, from its environment and lights and what the medium emits."""
+        volume, medium = self._volume, self._medium
+        sky = self._sky(scene)
+        unturned, ahead = _from_lights(volume.grid, self._density, scene, medium)
+        emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
+        scattered, steps = self._scattered(sky + unturned, emission)
+        found = sky + scattered + (1.0 - medium.anisotropy) * ahead
+        # Beyond the body each cell has what the nearest inside has, for what is interpolated at its surface.
+        nearest = distance_transform_edt(~volume.inside, return_distances=False, return_indices=True)
+        mean = found[tuple(nearest)] / (4.0 * np.pi)
+        cells = volume.grid.cells
+        return VolumeField(np.ascontiguousarray(mean, np.float32), cells.low, cells.step, steps)
+
+    def _sky(self, scene: Scene) -> Array:
+        """(x, y, z, 3): fluence of the environment's light that nothing has scattered."""
+        directions = even_directions(DIRECTIONS)
+        solid_angles = nearest_parts(directions)[1]
+        radiance = environment_parts(scene.environment, directions) / solid_angles[:, None]
+        if not radiance.any():
+            return np.zeros(self._extinction.shape)
+        nothing = np.zeros(self._extinction.shape)
+        return swept(self._extinction, nothing, radiance, directions, solid_angles, self._volume.grid.cells.step)
+
+    def _scattered(self, first: Array, emission: Array) -> tuple[Array, int]:
+        """Fluence of light that has been scattered or emitted, (x, y, z, 3), and steps of the solver."""
+        step, density = self._volume.grid.cells.step, self._density[..., None]
+        dark = np.zeros((ORDINATES, 3))
+        fluence, steps = self._diffused(density * self._reduced * first + emission)
+        for _ in range(MOST_ROUNDS):
+            source = density * self._reduced * (first + fluence) + emission
+            better = swept(self._extinction, source / (4.0 * np.pi), dark, self._directions, self._solid_angles, step)
+            changed = self._resolved * (better - fluence)
+            # What the round has changed scatters again: diffusion finds where that goes.
+            rest, taken = self._diffused(density * self._reduced * changed)
+            better = np.maximum(fluence + changed + rest, 0.0)
+            change = np.abs(better - fluence).max(initial=0.0)
+            fluence, steps = better, steps + taken
+            if change <= ENOUGH * fluence.max(initial=0.0):
+                break
+        return fluence, steps
+
+    def _diffused(self, power: Array) -> tuple[Array, int]:
+        """Fluence (x, y, z, 3) by diffusion, for powers per volume, and steps; 0 outside."""
+        inside, fluence, steps = self._volume.inside, np.zeros(power.shape), 0
+        for channel, system in enumerate(self._systems):
+            if system is not None:
+                found, taken = system.solved(power[inside, channel] * self._volume.grid.cells.step**3)
+                fluence[inside, channel] = found
+                steps += taken
+        return fluence, steps
+
+
+def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: float) -> CellSystem:
+    """Diffusion in one channel; where hardly anything is, no free path is longer than the body is thick."""
+    grid, density = volume.grid, dense[volume.inside]
+    there = density * grid.cells.step**3 / grid.volumes
+    d = 1.0 / (there / float(diffusion_coefficient(absorption, scattering)) + 1.0 / volume.thickness)
+    read, depth = grid.below
+    # Half of the fluence leaves, as much as gets there.
+    lost = grid.area / (2.0 + depth / np.maximum(read @ d, np.finfo(np.float64).tiny))
+    return CellSystem(grid, d, absorption * density * grid.cells.step**3, lost)
+
+
+def _cell_means(body: Object, grid: BodyGrid) -> Array:
+    """(x, y, z): mean density of the body in each cell."""
+    assert body.density is not None
+    corner = np.stack(np.meshgrid(*(np.arange(n) for n in grid.number.shape), indexing="ij"), axis=-1)
+    rows = body.to_unit_box(grid.cells.low)
+    total = np.zeros(grid.number.shape)
+    for place in np.stack(np.meshgrid(_PLACES, _PLACES, _PLACES), axis=-1).reshape(-1, 3):
+        total += body.density.at((corner + place) * grid.cells.step @ rows[:, :3].T + rows[:, 3])
+    return total / len(_PLACES) ** 3
+
+
+def _from_lights(grid: BodyGrid, density: Array, scene: Scene, medium: Medium) -> tuple[Array, Array]:
+    """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead."""
+    unturned, ahead = np.zeros((2, *density.shape, 3))
+    reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+    cells, inside = grid.cells, grid.number >= 0
+    points = cells.low + cells.step * cells.center[inside]
+    for light in scene.lights:
+        if isinstance(light, PointLight):
+            place = np.broadcast_to(np.asarray(light.position), points.shape)
+            # In a lamp's own cell the mean of 1 / r^2 is that of a ball as large, 3 / R^2.
+            nearest = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0) * cells.step / np.sqrt(3.0)
+            power = np.asarray(light.intensity) / np.maximum(((place - points) ** 2).sum(axis=1), nearest**2)[:, None]
+        else:
+            place = points - np.asarray(light.direction) * cells.step * sum(density.shape)
+            power = np.broadcast_to(np.asarray(light.irradiance), points.shape)
+        # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
+        way = np.abs(place - points)
+        own = density[inside] * cells.step * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
+        before = np.maximum(_column(grid, density, points, place) - 0.5 * own, 0.0)
+        turned, all_turned = (
+            power * optics.transmittance(sigma * before[:, None]) * optics.mean_transmittance(sigma * own[:, None])
+            for sigma in (reduced, np.asarray(medium.extinction))
+        )
+        unturned[inside] += turned
+        ahead[inside] += turned - all_turned
+    return unturned, ahead
+
+
+def _column(grid: BodyGrid, density: Array, points: Array, places: Array) -> Array:
+    """(k,): integral of the density in metres between points (k, 3) and places (k, 3), as far as in the grid."""
+    cells, size = grid.cells, np.array(density.shape)
+    begin, end = ((where - cells.low) / cells.step - 0.5 for where in (points, places))
+    along = end - begin
+    slow = np.where(np.abs(along) > _STILL, along, _STILL)
+    leaves = np.where(slow > 0.0, size - begin, -1.0 - begin) / slow
+    share = np.clip(leaves.min(axis=1), 0.0, 1.0)
+    count = max(int(POINTS_A_CELL * size.max()), 1)
+    total = np.zeros(len(points))
+    for t in (np.arange(count) + 0.5) / count:
+        at = begin + (t * share)[:, None] * along
+        total += map_coordinates(density, at.T, order=1, mode="constant")
+    return np.asarray(total * np.linalg.norm(along, axis=1) * share * cells.step / count)
