@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import shader_library
-from translucent.formulas import color, diffusion, interface, optics, tone, two_stream
+from translucent.formulas import color, diffusion, interface, optics, spherical_harmonics, tone, two_stream
 from translucent.gpu.probe import run_function, signatures
 from translucent.media import density
 from translucent.scene import camera, environment
@@ -20,6 +20,7 @@ MODULES: dict[str, ModuleType] = {
     "interface": interface,
     "two_stream": two_stream,
     "diffusion": diffusion,
+    "spherical_harmonics": spherical_harmonics,
     "color": color,
     "density": density,
     "environment": environment,
@@ -138,6 +139,14 @@ def _emergent_arguments() -> list[np.ndarray]:
     return [_triples(fluence), _triples(entering), _triples(albedo), conductance, mean_cosine, cosine]
 
 
+def _harmonic_arguments() -> list[np.ndarray]:
+    """Transfer and light of both signs, some of whose products cancel or sum to less than nothing."""
+    rng = np.random.default_rng(8)
+    transfer, light = rng.normal(size=(2, 400, 9, 3)) * 10.0 ** rng.integers(-6, 7, (2, 400, 1, 1))
+    light[:20] = 0.0
+    return [transfer.astype(np.float32), light.astype(np.float32)]
+
+
 def _turned_arguments() -> list[np.ndarray]:
     directions, turns = _unit_vectors(), np.array([0.0, 0.25, -0.7, 3.0], np.float32)
     directions = np.concatenate([directions, np.float32([[0, 1, 0], [0, -1, 0], [0, 0, -1], [1, 0, 0], [0, 1, 1e-18]])])
@@ -203,6 +212,9 @@ ARGUMENTS = {
     "mirrored_reflectance": _mirrored_arguments(),
     "mirrored_transmittance": _mirrored_arguments(),
     "emergent_radiance": _emergent_arguments(),
+    "real_harmonics": [np.concatenate([_unit_vectors(), np.eye(3, dtype=np.float32), -np.eye(3, dtype=np.float32)])],
+    "scattered_radiance": _harmonic_arguments(),
+    "exit_lobe": _mixed(UNIT, np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.5, 0.91, 1.0])),
     "srgb_to_linear": [_triples(np.linspace(-1, 2, 301))],
     "linear_to_srgb": [_triples(np.concatenate([np.linspace(-1, 2, 301), np.geomspace(1e-9, 1, 60)]))],
     "luminance": [_triples(UNIT)],
@@ -231,6 +243,8 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
 FLOOR = {
     "fresnel_dielectric": 2e-7,
     "refracted_cosine": 1e-7,
+    "exit_lobe": 4e-7,  # that of Fresnel's reflectance, over half
+    "real_harmonics": 4e-7,  # differences of squares up to 1
     "composite_over": 1e-7,
     "gradient_share": 1e-7,
     "view_ray": 1e-7,
@@ -293,6 +307,9 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
         fluence, entering, albedo, conductance, mean_cosine, cosine = arguments
         once = entering / (cosine + mean_cosine)
         allowed = allowed + 8 * eps * (albedo * (fluence * (1.0 + 3.0 * conductance * cosine) + 3.0 * once) + once)
+    if name == "scattered_radiance":
+        # Of both signs, too.
+        allowed = allowed + 8 * eps * np.abs(arguments[0] * arguments[1]).sum(axis=1)
     if name == "emitted_radiance":
         allowed = allowed + 1e-37
     if name.startswith("exponential_density"):

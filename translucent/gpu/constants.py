@@ -7,6 +7,7 @@ from typing import get_args
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
+from translucent.formulas.spherical_harmonics import BAND_0, BAND_1, BAND_2, BAND_2_ZONAL
 from translucent.formulas.tone import (
     AGX_DISPLAY,
     AGX_MIDDLE_GRAY,
@@ -84,6 +85,10 @@ CONSTANTS: dict[str, str] = {
     "AGX_SHOULDER": repr(AGX_SHOULDER),
     "AGX_SLOPE": repr(AGX_SLOPE),
     "AGX_DISPLAY": repr(AGX_DISPLAY),
+    "HARMONIC_0": repr(BAND_0),
+    "HARMONIC_1": repr(BAND_1),
+    "HARMONIC_2": repr(BAND_2),
+    "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
     "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "RECORD_SIZE": "8",  # bodies that a ray can be in

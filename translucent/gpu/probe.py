@@ -12,25 +12,29 @@ import numpy.typing as npt
 
 from translucent.gpu.shaders import preprocess
 
-_SIGNATURE = re.compile(r"^(float|vec[234])\s+(\w+)\s*\(([^)]*)\)\s*\{", re.MULTILINE)
+_SIGNATURE = re.compile(r"^((?:float|vec[234])(?:\[\d+\])?)\s+(\w+)\s*\(([^)]*)\)\s*\{", re.MULTILINE)
+_PARAMETER = re.compile(r"(\w+)\s+(\w+)(?:\[(\d+)\])?")
 _WIDTH = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 
 
 @dataclass(frozen=True)
 class Signature:
-    """Signature of a GLSL function: its name, the type it returns, and its parameters as (type, name)."""
+    """Signature of a GLSL function: its name, the type it returns, and its parameters as (type, name, length).
+
+    The length is that of an array, 0 of what is none.
+    """
 
     name: str
     returns: str
-    parameters: tuple[tuple[str, str], ...]
+    parameters: tuple[tuple[str, str, int], ...]
 
 
 def signatures(path: Path) -> dict[str, Signature]:
     """The functions that a library file defines, by name."""
     found = {}
     for returns, name, parameters in _SIGNATURE.findall(path.read_text(encoding="utf-8")):
-        pairs = tuple(tuple(part.split()) for part in parameters.split(","))
-        found[name] = Signature(name, returns, pairs)
+        parts = tuple((kind, part, int(length or 0)) for kind, part, length in _PARAMETER.findall(parameters))
+        found[name] = Signature(name, returns, parts)
     return found
 
 
@@ -46,25 +50,25 @@ def run_function(
         File under ``shaders/`` that defines it.
     signature : Signature
     arguments : array_like
-        One for each parameter: (n,) for a float, (n, k) for a vector.
+        One for each parameter: (n,) for a float, (n, k) for a vector, (n, m, k) for an array of m vectors.
 
     Returns
     -------
     (n,) or (n, k) float32
     """
-    inputs = "".join(f"in {kind} argument_{name};\n" for kind, name in signature.parameters)
-    call = ", ".join(f"argument_{name}" for _, name in signature.parameters)
-    source = preprocess(library).text
-    text = f"{source}\n{inputs}out {signature.returns} result;\nvoid main() {{ result = {signature.name}({call}); }}\n"
-    program = gl.program(vertex_shader=text, varyings=["result"])
     arrays = [np.ascontiguousarray(argument, dtype=np.float32) for argument in arguments]
-    count, width = len(arrays[0]), _WIDTH[signature.returns]
-    buffers = [gl.buffer(array) for array in arrays]
+    count, width = len(arrays[0]), _width(signature.returns)
+    program = gl.program(vertex_shader=_program(preprocess(library).text, signature), varyings=["result"])
+    content: list[tuple[moderngl.Buffer, str, str]] = []
+    tables: list[moderngl.Texture] = []
+    for array, (kind, name, length) in zip(arrays, signature.parameters, strict=True):
+        if not length:
+            content.append((gl.buffer(array), f"{_WIDTH[kind]}f", f"argument_{name}"))
+            continue
+        tables.append(gl.texture((length, count), _WIDTH[kind], array, dtype="f4"))
+        tables[-1].use(len(tables))
+        program[f"argument_{name}"] = len(tables)
     output = gl.buffer(reserve=4 * count * width)
-    content = [
-        (buffer, f"{_WIDTH[kind]}f", f"argument_{name}")
-        for buffer, (kind, name) in zip(buffers, signature.parameters, strict=True)
-    ]
     vertex_array = gl.vertex_array(program, content)
     # Nothing is drawn, yet OpenGL asks for a complete framebuffer, which a context without a window lacks.
     texture = gl.texture((1, 1), 1)
@@ -72,6 +76,32 @@ def run_function(
     framebuffer.use()
     vertex_array.transform(output, moderngl.POINTS, count)
     values = np.frombuffer(output.read(), dtype=np.float32).copy()
-    for resource in (vertex_array, program, output, framebuffer, texture, *buffers):
+    buffers = [buffer for buffer, _, _ in content]
+    for resource in (vertex_array, program, output, framebuffer, texture, *tables, *buffers):
         resource.release()
     return values if width == 1 else values.reshape(count, width)
+
+
+def _width(kind: str) -> int:
+    """Numbers in a value of a type, such as vec3 or float[9]."""
+    name, _, length = kind.rstrip("]").partition("[")
+    return _WIDTH[name] * int(length or 1)
+
+
+def _program(source: str, signature: Signature) -> str:
+    """Vertex shader that calls the function: arrays are rows of textures, of which there is one for each."""
+    inputs: list[str] = []
+    before: list[str] = []
+    for kind, name, length in signature.parameters:
+        if not length:
+            inputs.append(f"in {kind} argument_{name};")
+            continue
+        inputs.append(f"uniform sampler2D argument_{name};")
+        components = "xyzw"[: _WIDTH[kind]]
+        fetched = f"texelFetch(argument_{name}, ivec2(i, gl_VertexID), 0).{components}"
+        before.append(f"{kind} row_{name}[{length}]; for (int i = 0; i < {length}; i++) row_{name}[i] = {fetched};")
+    call = ", ".join(f"{'row' if length else 'argument'}_{name}" for _, name, length in signature.parameters)
+    body = " ".join([*before, f"result = {signature.name}({call});"])
+    returns, _, length = signature.returns.partition("[")
+    inputs.append(f"out {returns} result{'[' + length if length else ''};")
+    return source + "\n" + "\n".join(inputs) + f"\nvoid main() {{ {body} }}\n"

@@ -225,6 +225,16 @@ class Environment(Frozen):
         with np.errstate(under="ignore"):
             return np.asarray(np.pi * (self.first + (self.second - self.first) * share[..., None]))
 
+    def harmonics(self) -> Array:
+        """Coefficients (9, 3) of its light in real spherical harmonics of the bands 0 to 2.
+
+        Coefficient i = l (l + 1) + m, as `translucent.formulas.spherical_harmonics.real_harmonics` has them in
+        directions of the world: what a bake of scattered light is read with, where the object is not turned.
+        """
+        from translucent.scene.environment_harmonics import environment_harmonics
+
+        return environment_harmonics(self)
+
 
 #: Rows of the picture of a gradient: between two of them, a sine differs from a straight line by 2e-5.
 GRADIENT_MAP_HEIGHT = 256

@@ -1,0 +1,137 @@
+"""Transfer of light through a body: what it gives back by diffusion for each spherical harmonic of the light around it.
+
+Diffusion is linear in the light. A harmonic has both signs, and light has one: the body is solved for in uniform light
+and in light that is uniform plus a harmonic, and the difference is what belongs to the harmonic.
+
+References
+----------
+Sloan, Kautz & Snyder 2002, "Precomputed radiance transfer for real-time rendering in dynamic, low-frequency lighting
+environments".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from translucent.arrays import Array, Floats
+from translucent.diffusion.entering import MAP_HEIGHT
+from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
+from translucent.errors import InputError
+from translucent.formulas.spherical_harmonics import BAND_0, COUNT, real_harmonics
+from translucent.planning.scattering import Diffusion
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.environment_map import EnvironmentMap
+from translucent.scene.scene import Object, Scene
+
+#: Uniform radiance that is above every harmonic's least value, -0.63.
+UNIFORM = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """Transfer of a body on a grid of cells around its surface.
+
+    Attributes
+    ----------
+    values : (x, y, z, 9, 3) float32
+        See `at`.
+    low : (3,) float64
+        Corner of the grid in metres.
+    step : float
+        Side of a cell in metres.
+    cells : int
+        In the system.
+    """
+
+    values: Floats
+    low: Array
+    step: float
+    cells: int
+
+    def at(self, points: Array) -> Array:
+        """(k, 9, 3): mean radiance that points (k, 3) of the surface give back for a unit of each harmonic."""
+        flat = self.values.reshape(*self.values.shape[:3], -1)
+        return _read(flat, self.low, self.step, points).reshape(-1, COUNT, 3)
+
+
+def exit_radiance(field: DiffusionField, points: Array) -> Array:
+    """(k, 3): mean radiance, flux over pi, that the diffused light of a body has outside at points (k, 3)."""
+    return field.exit_share / np.pi * _read(field.fluence, field.low, field.step, points)
+
+
+def _read(volume: Floats, low: Array, step: float, points: Array) -> Array:
+    place = ((points - low) / step - 0.5).T
+    channels = [
+        map_coordinates(volume[..., i], place, np.float64, order=1, mode="nearest") for i in range(volume.shape[-1])
+    ]
+    return np.stack(channels, axis=1)
+
+
+class LitAlone:
+    """A body alone in an environment, in which light diffuses.
+
+    Parameters
+    ----------
+    body : Object
+        With a medium.
+    resolution : int
+        See `translucent.Diffusion`.
+
+    Raises
+    ------
+    InputError
+        If its light cannot diffuse, or the medium does not scatter, or emits.
+    """
+
+    def __init__(self, body: Object, resolution: int) -> None:
+        diffusion = Diffusion(resolution)
+        _check(body, diffusion)
+        assert body.medium is not None
+        roughness = 0.0 if body.surface is None else body.surface.roughness
+        self._body = body
+        self._camera = Camera.look_at((0, 0, 1), (0, 0, 0))  # which the light does not depend on
+        self._diffusing = DiffusingBody(lit_body(body, None, diffusion.cell_size(body)), body.medium, roughness)
+
+    def field(self, environment: Environment) -> DiffusionField:
+        """Light that the body gives back."""
+        return self._diffusing.field(Scene([self._body], self._camera, (), environment))
+
+    def transfer(self) -> Transfer:
+        """Transfer of the body.
+
+        Raises
+        ------
+        RenderError
+            If the solver does not get there.
+        """
+        uniform = self.field(Environment.constant((1, 1, 1)))
+        values = np.empty((*uniform.fluence.shape[:3], COUNT, 3), np.float32)
+        values[..., 0, :] = BAND_0 * uniform.fluence
+        for i in range(1, COUNT):
+            values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence
+        values *= uniform.exit_share / np.pi
+        return Transfer(values, uniform.low, uniform.step, uniform.cells)
+
+
+def _harmonic(index: int) -> Environment:
+    """Light of a harmonic and `UNIFORM`, white, at the texels that the samples of a body look up."""
+
+    def radiance(directions: Array) -> Array:
+        return np.repeat(UNIFORM + real_harmonics(directions)[..., index, None], 3, axis=-1)
+
+    return Environment.image(EnvironmentMap.from_formula(radiance, MAP_HEIGHT))
+
+
+def _check(body: Object, diffusion: Diffusion) -> None:
+    asked, medium = f"scattered light of {body.mesh.name!r}", body.medium
+    if medium is None or not medium.scatters:
+        do = "give one that does, for example --preset wax, or tl.scattering_medium('#f2e0b8', 0.002)"
+        raise InputError(asked, "its medium does not scatter" if medium is not None else "no medium", do)
+    if medium.emission.any():
+        raise InputError(asked, "its medium emits: that light depends on no other", "leave the emission out")
+    if (why := diffusion.refusal(body)) is not None:
+        raise InputError(asked, why, "give a closed mesh that is thicker, or a higher resolution")
