@@ -19,6 +19,10 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.bake.batch import BatchReport as BatchReport
     from translucent.bake.batch import bake_many as bake_many
     from translucent.bake.reading import load_thickness_map as load_thickness_map
+    from translucent.bake.scatter.bake import bake_scatter as bake_scatter
+    from translucent.bake.scatter.bake import bake_vertex_scatter as bake_vertex_scatter
+    from translucent.bake.scatter.result import ScatterMap as ScatterMap
+    from translucent.bake.scatter.result import VertexScatter as VertexScatter
     from translucent.bake.settings import BakeSettings as BakeSettings
     from translucent.bake.thickness_map import ThicknessMap as ThicknessMap
     from translucent.bake.thickness_map import VertexThickness as VertexThickness
@@ -93,6 +97,8 @@ _NAMES = {
     "bake.baked": "BakeReport",
     "bake.batch": "BatchReport bake_many",
     "bake.reading": "load_thickness_map",
+    "bake.scatter.bake": "bake_scatter bake_vertex_scatter",
+    "bake.scatter.result": "ScatterMap VertexScatter",
     "bake.settings": "BakeSettings",
     "bake.thickness_map": "ThicknessMap VertexThickness",
     "bake.vertices": "bake_vertex_thickness",

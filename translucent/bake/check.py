@@ -167,20 +167,20 @@ def first_uv(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | Non
     """
     if mesh.uv is None:
         raise InputError(f"mesh {mesh.name!r}", "it has no uv", "bake a map first; its mesh has them")
-    face, distance = _first_hits(mesh, camera, size)
+    face, distance = first_hits(mesh, camera, size)
     hit = face >= 0
     if body is not None:
         with np.errstate(invalid="ignore"):
-            hit &= distance <= _first_hits(body, camera, size)[1] + SAME_POINT * body.diagonal
+            hit &= distance <= first_hits(body, camera, size)[1] + SAME_POINT * body.diagonal
     origins, directions = (part.reshape(-1, 3)[hit] for part in camera.rays(size))
     corners = mesh.faces[face[hit]]
-    weights = _barycentric(mesh.vertices[corners], origins + distance[hit, None] * directions)
+    weights = barycentric(mesh.vertices[corners], origins + distance[hit, None] * directions)
     found = np.full((len(hit), 2), np.nan)
     found[hit] = np.einsum("kc,kci->ki", weights, mesh.uv[corners])
     return found.reshape(size[1], size[0], 2)
 
 
-def _first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], Array]:
+def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[npt.NDArray[np.int64], Array]:
     """(k,), (k,): the face that the ray of each pixel first meets, and the way to it in metres; -1 and inf for none."""
     traced = EmbreeMesh(mesh)
     origins, directions = (part.reshape(-1, 3) for part in camera.rays(size))
@@ -191,7 +191,7 @@ def _first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[npt.
     return face, np.where(face >= 0, traced.radius * (ahead + distance), np.inf)
 
 
-def _barycentric(corners: Array, points: Array) -> Array:
+def barycentric(corners: Array, points: Array) -> Array:
     """(k, 3): weights of the corners (k, 3, 3) at points (k, 3) of their triangles, each in 0..1."""
     a, b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
     aa, ab, bb = (np.einsum("ki,ki->k", x, y) for x, y in ((a, a), (a, b), (b, b)))

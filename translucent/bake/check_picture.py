@@ -43,9 +43,13 @@ def write_picture(checks: list[MapCheck], path: Path) -> None:
 
 def picture(checks: list[MapCheck]) -> Image.Image:
     """Rows of the first checks: the look with the map, the true look, and the error of thickness with its scale."""
+    return stacked([_row(check) for check in checks[:MOST_ROWS]])
+
+
+def stacked(rows: list[Image.Image]) -> Image.Image:
+    """Rows below each other."""
     from PIL import Image
 
-    rows = [_row(check) for check in checks[:MOST_ROWS]]
     whole = Image.new("RGB", (max(row.width for row in rows), sum(row.height for row in rows)))
     top = 0
     for row in rows:
@@ -55,15 +59,19 @@ def picture(checks: list[MapCheck]) -> Image.Image:
 
 
 def _row(check: MapCheck) -> Image.Image:
+    scale = check.thickness.p99 or 1.0
+    return labeled(
+        ("with the map", look(check.baked.radiance)),
+        ("true thickness along the view", look(check.true.radiance)),
+        (f"map - true: blue -{scale:.2g} m .. red +{scale:.2g} m", _difference(check, scale)),
+    )
+
+
+def labeled(*panels: tuple[str, Pixels]) -> Image.Image:
+    """Pictures of one size beside each other, each below its caption."""
     from PIL import Image, ImageDraw, ImageFont
 
-    width, height = check.true.size
-    scale = check.thickness.p99 or 1.0
-    panels = [
-        ("with the map", _look(check.baked.radiance)),
-        ("true thickness along the view", _look(check.true.radiance)),
-        (f"map - true: blue -{scale:.2g} m .. red +{scale:.2g} m", _difference(check, scale)),
-    ]
+    height, width = panels[0][1].shape[:2]
     row = Image.new("RGB", (width * len(panels), height + _CAPTION), (20, 20, 22))
     draw, font = ImageDraw.Draw(row), ImageFont.load_default(14)
     for number, (caption, pixels) in enumerate(panels):
@@ -72,7 +80,8 @@ def _row(check: MapCheck) -> Image.Image:
     return row
 
 
-def _look(radiance: npt.NDArray[np.floating]) -> Pixels:
+def look(radiance: npt.NDArray[np.floating]) -> Pixels:
+    """(h, w, 3): linear radiance as sRGB."""
     linear = np.clip(np.asarray(radiance, dtype=np.float64), 0.0, 1.0)
     return np.rint(linear_to_srgb(linear) * 255.0).astype(np.uint8)
 

@@ -16,7 +16,7 @@ def pad(values: npt.NDArray[np.float32], valued: npt.NDArray[np.bool_], padding:
 
     Parameters
     ----------
-    values : (h, w) float32
+    values : (h, w, ...) float32
     valued : (h, w) bool
     padding : int
     """
@@ -30,6 +30,6 @@ def pad(values: npt.NDArray[np.float32], valued: npt.NDArray[np.bool_], padding:
         part = slice(begin, begin + ROWS)
         rows = np.arange(begin, min(begin + ROWS, len(values)))[:, None]
         far = (row[part] - rows) ** 2 + (column[part] - columns) ** 2 > padding * padding
-        filled = np.where(far | valued[part], values[part], values[row[part], column[part]])
         # Only texels without a value change, and only those with one are read.
-        values[part] = filled
+        new = ~(far | valued[part])
+        values[part][new] = values[row[part][new], column[part][new]]

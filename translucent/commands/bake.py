@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from translucent.commands.bake_options import FORMATS, bake_options, read_job
+from translucent.commands.bake_scatter import SCATTER, bake_scatter, refuse_scatter_options
 from translucent.commands.common import common_options, overwrite_option
 from translucent.commands.console import echo
 from translucent.commands.model import mesh_file
@@ -58,7 +59,14 @@ def bake(
     Values are metres; 0.2 in the map is 20 cm. A .glb gets thicknessFactor and thicknessTexture, and what else a .glb
     or .gltf MODEL has stays. Beside each file goes a record, FILE.json. With --out-dir, many models: those that are
     done are skipped, and those that fail stop no other.
+
+    --mode scatter bakes the light that the body gives back after scattering, into an .exr map or the vertices of a
+    .glb: translucent bake bear -o bear.exr --mode scatter --preset wax
     """
+    if given["mode"] == SCATTER:
+        bake_scatter(models, output, given, check, as_json)
+        return
+    refuse_scatter_options()
     if (output is None) == (out_dir is None):
         found = "neither is given" if output is None else "both are given"
         raise InputError("-o FILE or --out-dir FOLDER", found, "give one of the two")

@@ -7,14 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from translucent.commands.common import F, medium_options, outside_option, read_medium, refuse_overwriting, unit_option
+from translucent.commands.bake_scatter import SCATTER, SIZE
+from translucent.commands.common import (
+    F,
+    medium_options,
+    outside_option,
+    read_medium,
+    refuse_overwriting,
+    scattering_medium_options,
+    unit_option,
+)
 from translucent.commands.model import mesh_file
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
     from translucent.bake.jobs import Job
 
-MODES = ("normal", "cone", "transmittance", "inscribed", "local")
+MODES = ("normal", "cone", "transmittance", "inscribed", "local", SCATTER)
 FORMATS = ("exr", "png", "npy", "npz", "glb", "ply")
 
 _FLAGS = ("vertices", "unwrap", "normalize", "invert", "resume")
@@ -38,8 +47,27 @@ def _length(name: str, help: str) -> Any:
 
 
 _OPTIONS = [
-    click.option("--mode", type=click.Choice(MODES), default="cone", show_default=True, help="What thickness means."),
-    click.option("--size", default=1024, show_default=True, metavar="N", help="Texels along each side of the map."),
+    click.option(
+        "--mode",
+        type=click.Choice(MODES),
+        default="cone",
+        show_default=True,
+        help="What thickness means; or scatter: no thickness, but the light that a body gives back after scattering.",
+    ),
+    click.option(
+        "--size",
+        default=1024,
+        show_default=True,
+        metavar="N",
+        help=f"Texels along each side of the map; of --mode scatter, {SIZE}.",
+    ),
+    click.option(
+        "--resolution",
+        default=32,
+        show_default=True,
+        metavar="N",
+        help="Of --mode scatter: the body has about N^3 / 4 cells, 8 to 128.",
+    ),
     click.option("--rays", default=64, show_default=True, metavar="N", help="Rays per point of the surface."),
     click.option("--spread", default=180.0, show_default=True, metavar="DEG", help="Full angle of the cone."),
     click.option(
@@ -69,6 +97,7 @@ _OPTIONS = [
     unit_option,
     outside_option,
     medium_options,
+    scattering_medium_options,
     click.option("--unwrap", is_flag=True, help="Make new UVs, even if MODEL has some."),
     click.option("--vertices", is_flag=True, help="Thickness per vertex, into a .ply, .glb or .npy file."),
     click.option("--normalize", is_flag=True, help="Store shares of the largest value instead of metres."),

@@ -131,7 +131,7 @@ def _check(body: Object, diffusion: Diffusion) -> None:
     if medium is None or not medium.scatters:
         do = "give one that does, for example --preset wax, or tl.scattering_medium('#f2e0b8', 0.002)"
         raise InputError(asked, "its medium does not scatter" if medium is not None else "no medium", do)
-    if medium.emission.any():
+    if np.asarray(medium.emission).any():
         raise InputError(asked, "its medium emits: that light depends on no other", "leave the emission out")
     if (why := diffusion.refusal(body)) is not None:
         raise InputError(asked, why, "give a closed mesh that is thicker, or a higher resolution")

@@ -102,6 +102,6 @@ def _program(source: str, signature: Signature) -> str:
         before.append(f"{kind} row_{name}[{length}]; for (int i = 0; i < {length}; i++) row_{name}[i] = {fetched};")
     call = ", ".join(f"{'row' if length else 'argument'}_{name}" for _, name, length in signature.parameters)
     body = " ".join([*before, f"result = {signature.name}({call});"])
-    returns, _, length = signature.returns.partition("[")
-    inputs.append(f"out {returns} result{'[' + length if length else ''};")
+    returns, bracket, rest = signature.returns.partition("[")
+    inputs.append(f"out {returns} result{bracket}{rest};")
     return source + "\n" + "\n".join(inputs) + f"\nvoid main() {{ {body} }}\n"
