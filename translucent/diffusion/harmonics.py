@@ -134,4 +134,4 @@ def _check(body: Object, diffusion: Diffusion) -> None:
     if np.asarray(medium.emission).any():
         raise InputError(asked, "its medium emits: that light depends on no other", "leave the emission out")
     if (why := diffusion.refusal(body)) is not None:
-        raise InputError(asked, why, "give a closed mesh that is thicker, or a higher resolution")
+        raise InputError(asked, why, "give a closed mesh, a thicker body, or a higher resolution")

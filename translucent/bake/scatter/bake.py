@@ -17,6 +17,7 @@ from translucent.errors import TranslucentWarning
 from translucent.formulas.spherical_harmonics import COUNT
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
+from translucent.planning.scattering.choice import LEAST_DEPTH
 from translucent.scene.scene import Object
 from translucent.scene.surface import Surface
 
@@ -72,10 +73,10 @@ def bake_scatter(
     Warns
     -----
     TranslucentWarning
-        If texture coordinates overlap, or lie outside 0..1.
+        If texture coordinates overlap, or lie outside 0..1; if little of the scattered light is scattered again.
     """
     BakeSettings(size=size, padding=padding)
-    transfer = _transfer(body or mesh, medium, resolution, roughness)
+    transfer, said = _transfer(body or mesh, medium, resolution, roughness)
     unwrapped = unwrap(mesh, size, None)
     values, coverage = np.zeros((size, size, COUNT, 3), np.float32), np.zeros((size, size), bool)
     corners, atlas = unwrapped.mesh.vertices[unwrapped.mesh.faces], Atlas(unwrapped.uv, size, size)
@@ -86,11 +87,10 @@ def bake_scatter(
         coverage[texels.row, texels.column] = True
         overlapping += int(texels.overlapping.sum())
     pad(values, coverage, padding)
-    said = list(unwrapped.warnings)
+    said += unwrapped.warnings
     if overlapping:
         said.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
-    for text in said:
-        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=2)
+    _warn(mesh, said)
     return ScatterMap(
         values=values,
         mesh=unwrapped.mesh,
@@ -127,12 +127,30 @@ def bake_vertex_scatter(
     ------
     InputError, RenderError
         As `bake_scatter`.
+
+    Warns
+    -----
+    TranslucentWarning
+        If little of the scattered light is scattered again.
     """
-    transfer = _transfer(body or mesh, medium, resolution, roughness)
+    transfer, said = _transfer(body or mesh, medium, resolution, roughness)
+    _warn(mesh, said)
     values = transfer.at(mesh.vertices).astype(np.float32)
-    return VertexScatter(values, mesh, medium, roughness, resolution, transfer.cells, ())
+    return VertexScatter(values, mesh, medium, roughness, resolution, transfer.cells, tuple(said))
 
 
-def _transfer(mesh: Mesh, medium: Medium, resolution: int, roughness: float) -> Transfer:
+def _transfer(mesh: Mesh, medium: Medium, resolution: int, roughness: float) -> tuple[Transfer, list[str]]:
+    """Transfer of a body, and what to warn of."""
     mesh.require_finite()
-    return LitAlone(Object(mesh, medium=medium, surface=Surface(roughness=roughness)), resolution).transfer()
+    body = Object(mesh, medium=medium, surface=Surface(roughness=roughness))
+    alone = LitAlone(body, resolution)
+    depth = float((np.asarray(medium.scattering) * (1.0 - medium.anisotropy)).max() * body.mean_thickness)
+    if depth > LEAST_DEPTH:
+        return alone.transfer(), []
+    told = f"light is scattered {depth:.2g} times on its way through, where diffusion wants {LEAST_DEPTH:g} and more"
+    return alone.transfer(), [told]
+
+
+def _warn(mesh: Mesh, said: list[str]) -> None:
+    for text in said:
+        warnings.warn(f"mesh {mesh.name!r}: {text}", TranslucentWarning, stacklevel=3)

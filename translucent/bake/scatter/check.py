@@ -28,7 +28,7 @@ from translucent.geometry.normals import corner_normals
 from translucent.gltf.file import read_gltf
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object
-from translucent.scene.showcase import LIGHT_TABLE, showcase
+from translucent.scene.showcase import showcase
 from translucent.scene.surface import Surface
 
 #: Largest distance from a body's surface at which what is behind it still counts as that surface, over its diagonal.
@@ -63,7 +63,11 @@ ScatterCheck = dict[str, ScatterLook]
 
 def environments() -> dict[str, Environment]:
     """Environments of a check by name: of the first band, of the first two, and of all."""
-    return {"uniform": Environment.constant((1, 1, 1)), "light-table": LIGHT_TABLE, "studio": Environment.studio()}
+    return {
+        "uniform": Environment.constant((1, 1, 1)),
+        "from-above": Environment.gradient((0, 0, 0), (1, 1, 1)),
+        "studio": Environment.studio(),
+    }
 
 
 def check_scatter_output(path: Path, results: dict[PrimitiveKey, Baked]) -> dict[str, ScatterCheck]:
