@@ -74,6 +74,9 @@ ON_A_FARM = "--dask"
 #: Of an option that is given twice, the last counts: the pages show pictures of a useful size, tests need none.
 SMALL = {"render": ["--size", "96x72", "--samples", "2"], "bake": ["--size", "64", "--rays", "16"]}
 
+#: Likewise of `bake --mode scatter`.
+SMALL_SCATTER = ["--size", "64", "--resolution", "12"]
+
 
 def runs_here(command: str) -> bool:
     return command.split()[0] != WINDOWED and ON_A_FARM not in command
@@ -92,7 +95,8 @@ def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     trimesh.creation.icosphere(subdivisions=1).export("out.glb")
     # As a shell would.
     arguments = [name for word in shlex.split(command) for name in ("*" in word and sorted(glob.glob(word))) or [word]]
-    assert main([*arguments, *SMALL.get(arguments[0], [])]) == 0
+    small = SMALL_SCATTER if "scatter" in arguments else SMALL.get(arguments[0], [])
+    assert main([*arguments, *small]) == 0
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])

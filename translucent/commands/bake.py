@@ -61,7 +61,7 @@ def bake(
     done are skipped, and those that fail stop no other.
 
     --mode scatter bakes the light that the body gives back after scattering, into an .exr map or the vertices of a
-    .glb: translucent bake bear -o bear.exr --mode scatter --preset wax
+    .glb: translucent bake candle -o candle.exr --mode scatter --preset wax
     """
     if given["mode"] == SCATTER:
         bake_scatter(models, output, given, check, as_json)

@@ -231,9 +231,9 @@ class Environment(Frozen):
         Coefficient i = l (l + 1) + m, as `translucent.formulas.spherical_harmonics.real_harmonics` has them in
         directions of the world: what a bake of scattered light is read with, where the object is not turned.
         """
-        from translucent.scene.environment_harmonics import environment_harmonics
+        from translucent.scene.environment_harmonics import radiance_harmonics
 
-        return environment_harmonics(self)
+        return radiance_harmonics(self.lighting, 0 if self.map is None else self.map.size[1])
 
 
 #: Rows of the picture of a gradient: between two of them, a sine differs from a straight line by 2e-5.
