@@ -121,15 +121,18 @@ def check_map_output(
 ) -> str:
     """Check the output path of a map before any work is done, as `save_map` does; returns the suffix in lower case."""
     asked, suffix = f"output {str(path)!r}", path.suffix.lower()
+    others = [other for other in suffixes if other != ".exr"]
     if suffix not in suffixes:
-        raise InputError(asked, f"suffix {path.suffix!r}", f"use {', '.join(suffixes[:-1])} or {suffixes[-1]}")
+        *more, last = suffixes
+        known = f"{', '.join(more)} or {last}" if more else last
+        raise InputError(asked, f"suffix {path.suffix!r}", f"use {known}")
     require_output(path, asked)
     if not os.access(path.parent, os.W_OK):
         raise RenderError(asked, f"the folder {str(path.parent)!r} is read-only", "choose another folder")
     if suffix == ".glb" and (normalize or invert):
         raise InputError(asked, "glTF stores t / max and the max", "leave --normalize and --invert out")
     if suffix == ".exr":
-        require_package("OpenEXR", asked, "write .npy or .png")
+        require_package("OpenEXR", asked, f"write {' or '.join(others)}" if others else "")
     return suffix
 
 
