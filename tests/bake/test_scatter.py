@@ -219,6 +219,12 @@ def test_vertices_of_a_glb_are_in_the_frame_of_their_object(run: Run, tmp_path: 
     assert (tmp_path / "out.glb.check.png").is_file()
 
 
+def test_the_validator_accepts_it(validate: Callable[[Path], dict[str, Any]], tmp_path: Path) -> None:
+    tl.bake_vertex_scatter(Sphere().tessellate(16), DENSE, resolution=8).save(tmp_path / "s.glb")
+    issues = validate(tmp_path / "s.glb")
+    assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), json.dumps(issues, indent=1)
+
+
 def test_a_wrong_bake_does_not_pass_the_check() -> None:
     baked = tl.bake_vertex_scatter(bear(), tl.preset("wax").medium, resolution=12)
     one = Baked(baked, bear(), np.eye(3))
