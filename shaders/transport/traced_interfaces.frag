@@ -242,6 +242,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         if (kind != KIND_SHEET && !alters_light(before, after, channel)) {
             leave(ray, ray.origin + place.path * ray.direction, face_normal);
             ray.record = place.record;
+            ray.outwards = smooth_normal;
             continue;
         }
         float ior = index_of(kind == KIND_SHEET ? place.object : after, channel) / index_of(before, channel);

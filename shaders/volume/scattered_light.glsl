@@ -1,4 +1,4 @@
-// Light that comes from all around to points in media whose density varies: what has been scattered before, and the
+// Light that comes from all around to points in media without an interface: what has been scattered before, and the
 // environment. A medium scatters sigma_s times as much into each metre of a ray. Points count from the center of the media.
 
 #include <Density>

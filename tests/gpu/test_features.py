@@ -22,6 +22,8 @@ FLAGS = (
     "has_fallback",
     "has_unlit",
     "scatters",
+    "scatters_again",
+    "varies",
     "one_interface",
     "traced",
     "finds_exits",
@@ -90,13 +92,18 @@ CASES: dict[str, tuple[FrameFeatures, set[str], str]] = {
         {"has_surfaces", "one_interface", "traced"},
         "traced_interfaces",
     ),
-    "lit": (features(scene(body(MILK), lights=[LIGHT])), {"scatters"}, "transmittance"),
+    "lit": (features(scene(body(MILK), lights=[LIGHT]), tl.FragmentLists()), {"scatters"}, "transmittance"),
+    "fog": (
+        features(scene(body(MILK), lights=[LIGHT])),
+        {"scatters", "scatters_again", "varies", "marches"},
+        "transmittance",
+    ),
     "unlit": (
         features(scene(body(MILK), lights=[LIGHT]), capabilities=NO_STORAGE),
         {"accumulates", "has_unlit"},
         "transmittance",
     ),
-    "marched": (features(scene(VARYING), tl.RayMarched()), {"marches"}, "transmittance"),
+    "marched": (features(scene(VARYING), tl.RayMarched()), {"marches", "varies"}, "transmittance"),
     "layers": (features(scene(body(), LAYER)), {"accumulates", "has_layers"}, "layers"),
 }
 

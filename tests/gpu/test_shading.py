@@ -71,7 +71,7 @@ def test_optical_depths_of_different_media_add_up_in_any_order(renderer: tl.Rend
     frames = []
     for order in (bodies, bodies[::-1]):
         scene = tl.Scene(order, CAMERA)
-        frame = renderer.render(scene, SIZE)
+        frame = renderer.render(scene, SIZE, scattering=tl.SingleScattering())
         assert frame.plan.spectral
         _close(frame, tl.reference.render(scene, SIZE), tl.interior(tl.reference.hit_counts(scene, SIZE)))
         frames.append(frame)

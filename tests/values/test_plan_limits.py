@@ -38,7 +38,7 @@ def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effect
     first_interval = "refraction and reflection beyond the first interval"
     traced = first_interval if method == tl.ThinLayer() else cut_off  # sheets bend no ray
     for interfaces, bent in ((None, traced), (tl.ScreenInterfaces(), first_interval)):
-        found = plan(scene(*objects), method, interfaces=interfaces)
+        found = plan(scene(*objects), method, interfaces=interfaces, scattering=tl.SingleScattering())
         assert len(found.unmodelled) == len(effects)
         for told, effect in zip(found.unmodelled, effects, strict=True):
             assert told.startswith(bent if effect == BENT else effect)

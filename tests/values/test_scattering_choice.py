@@ -16,7 +16,7 @@ from translucent.media.given_back import DiffusedMedium, DiffusedVolume, Layered
 from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
-from translucent.planning.scattering.choice import LEAST_DEPTH, MOST_DIFFUSED, shown
+from translucent.planning.scattering.choice import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, shown
 
 WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
@@ -24,6 +24,7 @@ INSIDE_OUT = tl.Mesh(BOX.vertices, BOX.faces[:, ::-1], name="inside out")
 THIN = tl.Mesh(
     *(getattr(Box((0, 0, 0), (1, 1, 0.004)).tessellate(), part) for part in ("vertices", "faces")), name="thin"
 )
+DENSE = tl.Medium(scattering=500.0)  # more than a mean free path across a cell
 VARYING = tl.LinearDensity(0.0, 0.5, 1.0)
 
 
@@ -74,13 +75,13 @@ def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
 @pytest.mark.parametrize(
     "what",
     [
-        body(MILK),
+        body(tl.Medium(scattering=0.05)),
         sheet(WAX),
         body(GLASS),
         body(tl.Medium(absorption=1.0, ior=1.5)),
         body(tl.Medium(scattering=0.01), density=VARYING),
     ],
-    ids=["matched", "sheet", "clear", "clear glass", "haze"],
+    ids=["thin", "sheet", "clear", "clear glass", "haze"],
 )
 def test_other_bodies_show_what_they_scatter_once(what: tl.Object) -> None:
     found = plan(scene(what, lights=LIT))
@@ -99,7 +100,7 @@ def test_little_scattering_is_shown_once() -> None:
             assert plan(scene(body(medium))).given_back.diffused == diffused
 
 
-@pytest.mark.parametrize("medium", [MILK, tl.Medium(scattering=0.01, ior=1.4)], ids=["matched", "shallow"])
+@pytest.mark.parametrize("medium", [DENSE, tl.Medium(scattering=0.01, ior=1.4)], ids=["matched", "shallow"])
 def test_what_is_asked_for_is_done_where_it_can_be(medium: tl.Medium) -> None:
     diffused = plan(scene(body(medium)), scattering=tl.Diffusion(16))
     assert (diffused.given_back.diffused, diffused.given_back.layered) == ((0,), ())
@@ -124,14 +125,15 @@ def test_each_body_has_its_own_way() -> None:
     """And a plan tells of all of them."""
     asked = scene(body(WAX), body(WAX, OPEN, x=3), body(MILK, x=6), body(GLASS, x=9), body(None, x=12))
     found = plan(asked)
-    assert (found.given_back.diffused, found.given_back.layered) == ((0,), (1,))
+    back = found.given_back
+    assert (back.diffused, back.layered, back.volumes) == ((0,), (1,), (2,))
     assert found.given_back.refusals == ((1, "its mesh is not closed"),)
-    kinds = NoteKind.DIFFUSED_LIGHT, NoteKind.SPREAD_INSIDE, NoteKind.LAYER_INSTEAD, NoteKind.ONLY_REMOVES
+    kinds = NoteKind.DIFFUSED_LIGHT, NoteKind.SPREAD_INSIDE, NoteKind.LAYER_INSTEAD
     for kind in kinds:
         assert found.says(kind)
     marked = shown(asked, found.given_back)
-    assert [type(item.medium) for item in marked.objects[:2]] == [DiffusedMedium, LayeredMedium]
-    assert marked.objects[2:] == asked.objects[2:]
+    assert [type(item.medium) for item in marked.objects[:3]] == [DiffusedMedium, LayeredMedium, DiffusedVolume]
+    assert marked.objects[3:] == asked.objects[3:]
     # Along rays, what scatters in them only removes light.
     seen = marked.objects[0].medium
     assert seen is not None
@@ -240,6 +242,23 @@ def test_light_is_scattered_on_where_density_varies(lights: list[tl.PointLight])
     marked = shown(scene(CLOUD), back)
     assert isinstance(marked.objects[0].medium, DiffusedVolume)
     assert not marked.objects[0].has_interface
+
+
+def test_light_is_scattered_on_in_fog_and_leaves_dense_bodies_through_their_surface() -> None:
+    """By the reduced optical depth across a cell; with OpenGL, and unless ambient light stands for it."""
+    cell = tl.Diffusion().cell_size(body())
+    for share, anisotropy in ((0.9, 0.0), (1.1, 0.0), (0.9, 0.5), (1.1, 0.5)):
+        medium = tl.Medium(scattering=share * MOST_CELL_DEPTH / cell / (1.0 - anisotropy), anisotropy=anisotropy)
+        back = plan(scene(body(medium))).given_back
+        assert (back.volumes, back.diffused) == (((0,), ()) if share < 1.0 else ((), (0,)))
+    fog, dense = scene(body(MILK), lights=LIT), scene(body(DENSE), lights=LIT)
+    for machine in (NO_STORAGE, Capabilities(opengl=False)):
+        assert not plan(fog, capabilities=machine).given_back
+        assert plan(dense, capabilities=machine).given_back.diffused == (0,)
+    assert not plan(scene(body(MILK), ambient=(1, 1, 1))).given_back
+    assert isinstance(plan(fog).method, tl.RayMarched)
+    assert not plan(fog, tl.FragmentLists()).given_back
+    assert not plan(dense, tl.FragmentLists()).given_back
 
 
 def test_a_march_that_is_asked_for_has_light_scattered_once() -> None:

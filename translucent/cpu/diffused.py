@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.vectors import dot
 from translucent.diffusion.field import DiffusionField
 
@@ -26,6 +26,10 @@ class DiffusedLight:
     def __bool__(self) -> bool:
         """Whether there is any."""
         return bool(self._fields)
+
+    def leaves(self, before: Integers, after: Integers) -> Mask:
+        """(k,): whether it leaves one of two bodies where they meet, bent or not."""
+        return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
 
     def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
         """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,)."""

@@ -241,7 +241,7 @@ class _Growth:
             entering = self._enters(face[ray], beams.directions[ray])
             self._cross(record, ray, own[ray].astype(np.int16), entering, beams.owner[ray])
         after = self.media.dominant(record)
-        changed = self.own.matters(before, after)
+        changed = self.own.matters(before, after) | (before != after) & self.tree.diffused.leaves(before, after)
         wall = self.is_wall[item]
         # With a wall of a body at the same place, the wall goes first.
         sheet = ~changed & wall.any(axis=1)

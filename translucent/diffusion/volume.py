@@ -1,4 +1,4 @@
-"""Light that is scattered many times in media whose density varies, as rays find it at each point inside.
+"""Light that is scattered many times in media without an interface, as rays find it at each point inside.
 
 Discrete ordinates on a grid of cells, from a start by diffusion, which also finds what each round leaves over: a few
 rounds are enough however often light is scattered (diffusion synthetic acceleration, Alcouffe 1977; Adams & Larsen
@@ -72,12 +72,12 @@ class VolumeField:
 
 
 class VolumeGrid:
-    """Cells of a body with the density in them; the same for all media and lights.
+    """Cells of a body and how dense each is; the same for all media and lights.
 
     Parameters
     ----------
     body : Object
-        Closed, with a density.
+        Closed, without an interface.
     step : float
         Side of a cell in metres.
     """
@@ -94,7 +94,7 @@ class VolumeGrid:
 
 
 class DiffusingVolume:
-    """A body whose density varies with its medium, ready for any light.
+    """A body without an interface and its medium, ready for any light.
 
     Parameters
     ----------
@@ -187,7 +187,8 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
 
 def _cell_means(body: Object, grid: BodyGrid) -> Array:
     """(x, y, z): mean density of the body in each cell."""
-    assert body.density is not None
+    if body.density is None:
+        return np.ones(grid.number.shape)
     corner = np.stack(np.meshgrid(*(np.arange(n) for n in grid.number.shape), indexing="ij"), axis=-1)
     rows = body.to_unit_box(grid.cells.low)
     total = np.zeros(grid.number.shape)

@@ -64,6 +64,11 @@ class FrameFeatures:
         return self.plan.has(PassName.LIGHT_VIEWS)
 
     @property
+    def varies(self) -> bool:
+        """Whether media, or the light in them, vary from place to place."""
+        return self.scene.varies or self.scatters_again
+
+    @property
     def scatters_again(self) -> bool:
         """Whether light that was scattered before is scattered into the rays."""
         return bool(self.plan.given_back.volumes)

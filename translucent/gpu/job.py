@@ -76,7 +76,7 @@ class FrameJob(SceneView):
         placed = PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
-        if scene.varies:
+        if self.features.varies:
             light = resources.diffusion.of(scene, plan.given_back.diffusion)
             contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
         super().__init__(gl, placed, body_roles(self.features, counts), contents, targets, resources)
@@ -162,7 +162,7 @@ class FrameJob(SceneView):
 
     def bind_grids(self, unit: int, light_unit: int) -> None:
         """Bind density grids, and grids of light scattered before, for the shader that reads these textures, if any."""
-        if self.scene.varies:
+        if self.features.varies:
             self.resources.grids.use(unit, scene_grids(self.scene, self.features.slots))
         if self.features.scatters_again and self.diffused_light is not None:
             self.diffused_light.texture.use(light_unit)

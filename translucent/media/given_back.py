@@ -24,7 +24,7 @@ class LayeredMedium(Medium):
 
 @dataclass(frozen=True, eq=False)
 class DiffusedVolume(Medium):
-    """Medium of varying density into whose rays light is scattered that was scattered before; see `Diffusion`."""
+    """Medium into whose rays light is scattered that was scattered before; see `Diffusion`."""
 
     @classmethod
     def of(cls, medium: Medium) -> Self:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 
 from translucent.errors import InputError
+from translucent.media.given_back import DiffusedVolume
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
 from translucent.planning.effects import unmodelled_effects, with_ambient_told, with_given_back_told
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
-from translucent.planning.limits import marching_method, mesh_limits, open_limits
-from translucent.planning.methods import DepthPeeling, FragmentLists, Method, SignedDepth, ThinLayer
+from translucent.planning.limits import LEAST_STEPS, marching_method, mesh_limits, open_limits
+from translucent.planning.methods import DepthPeeling, FragmentLists, Method, RayMarched, SignedDepth, ThinLayer
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
@@ -55,15 +56,19 @@ def plan(
     check_interfaces(interfaces)
     check_scattering(scattering)
     capabilities = capabilities or Capabilities()
-    # A march that is asked for is the sum that is asked for, of light scattered once.
-    volumes = capabilities.shader_storage and (method is None or scattering is not None)
-    if back := given_back(scene, scattering, layers=capabilities.opengl, volumes=volumes):
+    opengl = capabilities.opengl
+    # Where nothing bends, a method that is asked for is the sum that is asked for, of light scattered once; and ambient
+    # light stands for what is scattered often.
+    matched = scattering is not None or (method is None and not scene.scatters_ambient)
+    volumes = opengl and capabilities.shader_storage and (method is None or method.marches)
+    if back := given_back(scene, scattering, layers=opengl, matched=matched, volumes=volumes):
         once = SingleScattering()
         found = plan(shown(scene, back), method, capabilities, interfaces=interfaces, scattering=once)
         return with_given_back_told(found, scene, back)
     if scene.scatters_ambient:
         emitted = scene.with_ambient_emitted
-        return with_ambient_told(plan(emitted, method, capabilities, interfaces=interfaces, scattering=scattering))
+        once = scattering or SingleScattering()
+        return with_ambient_told(plan(emitted, method, capabilities, interfaces=interfaces, scattering=once))
     if not scene.bodies:
         raise InputError(
             f"rendering {object_names(scene.objects)}",
@@ -91,6 +96,8 @@ def _choice(
     """The method of a renderer with OpenGL, and why it is that one; refuses what was asked for if it cannot do."""
     if scene.varies:
         return marching_method(scene, method, capabilities), "the density varies from place to place"
+    if method is None and any(isinstance(body.medium, DiffusedVolume) for body in scene.bodies):
+        return RayMarched(steps=LEAST_STEPS), "light scattered again into the rays: steps look it up"
     if method is not None and method.ordered:
         return method, "asked for"
     if (why := why_order_matters(scene, method, interfaces)) is not None:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
+from translucent.media.given_back import DiffusedVolume
 from translucent.media.medium import Medium
 from translucent.scene.overlaps import first_overlap
 from translucent.scene.scene import Object, Scene
@@ -107,7 +108,7 @@ def _never_negative(body: Object) -> bool:
 def _filling(scene: Scene, i: int) -> Hashable:
     """Key of an object's medium: equal for two objects where it makes no difference which of them fills a point."""
     medium, varies = scene.objects[i].medium, scene.objects[i].density is not None
-    if medium is None or varies:
+    if medium is None or varies or isinstance(medium, DiffusedVolume):
         return i
     told = [*medium.extinction, *np.asarray(medium.emission)]
     if scene.lights:

@@ -110,7 +110,7 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
         "EMISSION": features.emits,
         "SCATTER": features.scatters or features.marches,
         "MARCH": features.marches,
-        "VARIES": features.scene.varies,
+        "VARIES": features.varies,
         "SCATTERS_AGAIN": features.scatters_again,
         # One set of points serves all channels where light fares alike in them.
         "GRAY": all(_is_gray(slot.medium.extinction) for slot in features.slots),

@@ -17,6 +17,12 @@ from translucent.scene.scene import Object, Scene
 #: single scattering: below, less than a tenth of the scattered light is scattered again.
 LEAST_DEPTH = 0.2
 
+#: The same where nothing bends: there, single scattering leaves out all light of the environment.
+LEAST_MATCHED_DEPTH = 0.02
+
+
+#: Optical depth across a cell from which on light of a body of one density leaves through its surface.
+MOST_CELL_DEPTH = 1.0
 
 #: Bodies in which light diffuses unless asked for: each takes its tenths of a second and its share of a texture.
 MOST_DIFFUSED = 32
@@ -33,7 +39,7 @@ class GivenBack:
     layered : tuple of int
         Of those that give back light as layers.
     volumes : tuple of int
-        Of those whose density varies, into whose rays light is scattered again.
+        Of those without an interface, into whose rays light is scattered again.
     diffusion : Diffusion
     refusals : tuple of (int, str)
         Objects that are layers since light cannot diffuse in them, and why.
@@ -81,12 +87,23 @@ def check_scattering(scattering: object) -> None:
     )
 
 
-def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True, volumes: bool = True) -> GivenBack:
+def given_back(
+    scene: Scene, asked: Scattering | None, *, layers: bool = True, matched: bool = True, volumes: bool = True
+) -> GivenBack:
     """Bodies that give back what they scatter many times, and how.
 
-    Unless something is asked for, bodies of one density without interfaces, as fog is, do not, nor do those in which
-    little is scattered. Without `layers` nothing is shown as a layer, without `volumes` none whose density varies is
-    shown with more than single scattering.
+    Unless something is asked for, those in which little is scattered do not.
+
+    Parameters
+    ----------
+    scene : Scene
+    asked : Scattering, optional
+    layers : bool
+        Bodies can be shown as layers.
+    matched : bool
+        Bodies without an interface can give back light, too.
+    volumes : bool
+        Rays can gather it on their way through them.
 
     Raises
     ------
@@ -102,8 +119,8 @@ def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True, v
         if body.medium is not None
         and body.medium.scatters
         and not body.covers
-        and (body.density is None or volumes)
-        and (asked is not None or ((body.has_interface or body.density is not None) and _is_deep(body, body.medium)))
+        and (body.has_interface or (matched and (volumes or not _is_volume(body, wanted))))
+        and (asked is not None or _is_deep(body, body.medium))
     }
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
     if asked is None and len(bodies) - len(refused) > MOST_DIFFUSED:
@@ -120,9 +137,9 @@ def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True, v
         return GivenBack(layered=layered)
     solved = [i for i in bodies if i not in refused]
     return GivenBack(
-        tuple(i for i in solved if bodies[i].density is None),
+        tuple(i for i in solved if not _is_volume(bodies[i], wanted)),
         layered,
-        tuple(i for i in solved if bodies[i].density is not None),
+        tuple(i for i in solved if _is_volume(bodies[i], wanted)),
         wanted,
         tuple((i, why) for i, why in refused.items() if i in layered),
     )
@@ -131,7 +148,20 @@ def given_back(scene: Scene, asked: Scattering | None, *, layers: bool = True, v
 def _is_deep(body: Object, medium: Medium) -> bool:
     reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     densest = 1.0 if body.density is None else body.density.maximum
-    return bool(reduced.max() * densest * body.mean_thickness > LEAST_DEPTH)
+    return bool(
+        reduced.max() * densest * body.mean_thickness > (LEAST_DEPTH if body.has_interface else LEAST_MATCHED_DEPTH)
+    )
+
+
+def _is_volume(body: Object, wanted: Scattering) -> bool:
+    """Whether rays gather scattered light on their way: where they see more than a skin that no cell resolves."""
+    if body.has_interface or not isinstance(wanted, Diffusion):
+        return False
+    if body.density is not None:
+        return True
+    medium = _medium(body)
+    reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
+    return float(reduced.max()) * wanted.cell_size(body) < MOST_CELL_DEPTH
 
 
 _SHOWN: WeakKeyDictionary[Scene, dict[GivenBack, Scene]] = WeakKeyDictionary()
