@@ -110,7 +110,9 @@ class CaseRecord:
     compared_pixels : int
         Within the mask of the errors.
     reference_seconds : float
-        That the reference took.
+        That the reference took; of a stored truth, when it was made.
+    truth_noise : float, optional
+        Root mean square of the standard error of a path traced truth, as a share of its mean.
     rows : tuple of Row
         The floor first.
     pictures : tuple of Picture
@@ -134,6 +136,7 @@ class CaseRecord:
     diagonal: float = 0.0
     compared_pixels: int = 0
     reference_seconds: float = 0.0
+    truth_noise: float | None = None
     rows: tuple[Row, ...] = ()
     pictures: tuple[Picture, ...] = ()
     failure: str | None = None

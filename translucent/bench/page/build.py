@@ -83,6 +83,7 @@ def _environment() -> Any:
         ratio=numbers.ratio_text,
         ms=numbers.ms_text,
         share=numbers.share_text,
+        signed_share=numbers.signed_share_text,
         count=numbers.count_text,
         rounded=numbers.rounded_text,
         data=data_address,
@@ -110,6 +111,7 @@ def _case(case: CaseRecord, name: str) -> dict[str, Any]:
         "picture_columns": _columns(len(case.pictures)),
         "measured": [row for row in case.rows if row.refusal is None and row.failure is None],
         "refused": _refusals(case),
+        "scattered": [row for row in case.rows if row.light is not None],
         "failed": [row for row in case.rows if row.failure is not None],
         "errors": [
             (row, quantity, row.errors(quantity))
