@@ -57,6 +57,11 @@ def signed_share_text(value: float) -> str:
     return f"{100 * value:+.1f} %".replace("-", "−")
 
 
+def change_text(value: float) -> str:
+    """A difference of shares with its sign: ``+0.012``."""
+    return f"{value:+.3f}".replace("-", "−")
+
+
 def count_text(value: float | None) -> str:
     """A whole number, in groups of three."""
     return "–" if value is None else f"{value:,.0f}".replace(",", "\u202f")
