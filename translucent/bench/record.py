@@ -288,7 +288,7 @@ class Report:
 
     Attributes
     ----------
-    provenance, cases, scaling, slabs, hard_cases, claims
+    provenance, cases, scaling, hard_cases, claims, slabs
     seconds : float
         That the measurements took so far.
     complete : bool
@@ -298,11 +298,11 @@ class Report:
     provenance: Provenance
     cases: tuple[CaseRecord, ...] = ()
     scaling: tuple[Series, ...] = ()
-    slabs: tuple[Slab, ...] = ()
     hard_cases: tuple[HardCase, ...] = ()
     claims: tuple[Claim, ...] = ()
     seconds: float = 0.0
     complete: bool = False
+    slabs: tuple[Slab, ...] = ()
     format: str = field(default=FORMAT)
     version: int = field(default=VERSION)
 
