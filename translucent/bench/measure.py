@@ -254,9 +254,10 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
         found[quantity] = None if errors is None else errors[0]
         if errors is not None:
             found["invalid"], found["coverage_mismatch"] = errors[1:]
-    if case.truth_noise is not None:
+    if case.truth_noise is None:
+        found["color_difference"] = truth.color_difference(frame, case.quantity)
+    else:  # its noise would be all that is seen
         found["light"] = truth.light_errors(frame, drawn.solve_seconds)
-    found["color_difference"] = truth.color_difference(frame, case.quantity)
     if "invalid" not in found:
         covered = (frame.coverage | truth.frame.coverage).sum()
         found["invalid"] = float((~frame.valid).sum() / max(covered, 1))

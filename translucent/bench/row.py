@@ -131,7 +131,7 @@ class Row:
     thickness, transmittance, radiance : Errors, optional
         None where there is no pixel that can be compared.
     color_difference : ColorDifference, optional
-        What anybody could see of these errors.
+        What anybody could see of these errors; None beside a truth with noise.
     light : LightErrors, optional
         Where light is scattered many times.
     invalid : float, optional

@@ -201,7 +201,8 @@ def _symbol(axes: Axes, row: Row, point: np.ndarray, gid: str) -> None:
         )
     axes.plot(
         *point,
-        style.marker,
+        linestyle="none",
+        marker=style.marker,
         markersize=_SYMBOL + (3 if style.marker == "*" else 0),
         markerfacecolor=color if filled else placeholder("paper"),
         markeredgecolor=placeholder("paper") if filled else color,

@@ -97,7 +97,7 @@ class NormalizedDiffusion(Engine):
         On the surface.
     """
 
-    name: ClassVar[str] = "normalized diffusion (Burley)"
+    name: ClassVar[str] = "Burley's normalized diffusion"
     promise: ClassVar[str] = "none: exact for flat bodies as wide and thick as it takes; computed here in NumPy"
 
     samples: int = 3000
@@ -148,7 +148,7 @@ class Frostbite(Engine):
     front, scale, ambient : float
     """
 
-    name: ClassVar[str] = "translucency by local thickness (Frostbite)"
+    name: ClassVar[str] = "Frostbite's translucency"
     promise: ClassVar[str] = "none: its settings are the best ones for this picture; computed here in NumPy"
 
     wrap: float = 0.5
