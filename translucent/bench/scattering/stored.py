@@ -14,8 +14,8 @@ from translucent.errors import InputError
 from translucent.scene.lights import PointLight
 from translucent.scene.scene import Scene
 
-#: Relative difference of parameters up to which a scene is the one whose truth is stored: rounding.
-SAME = 1e-6
+#: Relative and absolute difference of parameters up to which a scene is the one whose truth is stored: rounding.
+SAME, SAME_ZERO = 1e-6, 1e-9
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def stored_truth(name: str, scene: Scene) -> StoredTruth:
         raise InputError(f"truth of {name!r}", "none is stored", "run tools/scattering_truth.py")
     truth = StoredTruth.from_bytes(file.read_bytes())
     now = scene_parameters(scene)
-    if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME * np.abs(now).max()):
+    if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME_ZERO):
         raise InputError(
             f"truth of {name!r}",
             "the scene has changed since its truth was path traced",
