@@ -117,14 +117,14 @@ def _lantern() -> Scene:
 
 SCENES: tuple[ScatteringScene, ...] = (
     ScatteringScene(
-        "jade ring", "Ring of jade", "a green ring, its tube 8 mean free paths thick", _jade, paths=160, quick=True
+        "jade ring", "Ring of jade", "a green ring, its tube 8 mean free paths thick", _jade, paths=280, quick=True
     ),
     ScatteringScene("soap", "Bar of soap", "a rough box with round edges, 6 mean free paths high", _soap, paths=160),
     ScatteringScene(
         "milk ball", "Ball of milk", "40 mean free paths, half of them forwards; next to nothing is absorbed", _milk
     ),
     ScatteringScene("milk bear", "Bear of skimmed milk", "limbs that shadow each other", _bear, paths=100),
-    ScatteringScene("marble knot", "Knot of marble", "a body beside itself, in its own light", _marble),
+    ScatteringScene("marble knot", "Knot of marble", "a body beside itself, in its own light", _marble, paths=90),
     ScatteringScene(
         "wax block", "Block of wax with a lamp behind it", "light of one corner that spreads sideways", _wax, paths=400
     ),
@@ -134,6 +134,6 @@ SCENES: tuple[ScatteringScene, ...] = (
         "a wall of 2.5 mean free paths around a hollow, in which light goes to and fro",
         _lantern,
         side=32,
-        paths=550,
+        paths=900,
     ),
 )
