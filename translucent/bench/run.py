@@ -74,7 +74,7 @@ def measure_all(
     methods : sequence of str
         Names or families of what to measure, ``"SignedDepth"`` or ``"signed-depth"``; default: all.
     quick : bool
-        Fewer cases, methods and repetitions: about a minute instead of ten.
+        Fewer cases, methods and repetitions: one or two minutes instead of a quarter of an hour.
     backend : str, optional
         Of the renderer; default: what works here.
     effort : Effort, optional

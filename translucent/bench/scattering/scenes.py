@@ -134,6 +134,6 @@ SCENES: tuple[ScatteringScene, ...] = (
         "a wall of 2.5 mean free paths around a hollow, in which light goes to and fro",
         _lantern,
         side=32,
-        paths=900,
+        paths=550,
     ),
 )
