@@ -40,11 +40,17 @@ def test_a_scene_that_has_changed_is_told() -> None:
     jade = SCENES[0].make()
     body = jade.objects[0]
     assert body.medium is not None
-    medium = dataclasses.replace(body.medium, anisotropy=1e-3)
+    media = [
+        dataclasses.replace(body.medium, anisotropy=1e-3),
+        dataclasses.replace(body.medium, scattering=1.0001 * np.asarray(body.medium.scattering)),
+        dataclasses.replace(body.medium, absorption=1.0001 * np.asarray(body.medium.absorption)),
+        dataclasses.replace(body.medium, ior=1.601),
+    ]
     turned = np.eye(4)
     turned[0, 3] = 1e-3
     for other in (
-        dataclasses.replace(jade, objects=[dataclasses.replace(body, medium=medium)]),
+        *(dataclasses.replace(jade, objects=[dataclasses.replace(body, medium=medium)]) for medium in media),
+        dataclasses.replace(jade, objects=[dataclasses.replace(body, surface=tl.Surface(roughness=0.1))]),
         dataclasses.replace(jade, objects=[dataclasses.replace(body, transform=turned)]),
         dataclasses.replace(jade, environment=WHITE),
         dataclasses.replace(jade, lights=[tl.DirectionalLight((0, -1, 0), 1.0)]),
