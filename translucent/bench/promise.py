@@ -36,7 +36,7 @@ def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Q
     if contender.engine is not None:
         return contender.engine.promise, False
     if contender.scattering is not None:
-        return _SCATTERED[type(contender.scattering)], False
+        return _SCATTERED.get(type(contender.scattering)) or "; ".join(map(str, plan.limits)), False
     if contender.technique == "constant" and contender.interfaces is not None:
         return "none: the best constant thickness, and rays that bend once, where they enter", False
     if contender.technique in ("constant", "ball"):
