@@ -42,7 +42,7 @@ lint: ## check style, types and the layers of the imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: ## measure speed and error of every method into out/report/, in ten minutes; BENCH_ARGS=--quick: in one
+bench: ## measure speed and error of every method into out/report/, in a quarter of an hour; BENCH_ARGS=--quick: in one or two minutes
 	$(BOOTSTRAP) --group test
 	$(BIN)/translucent report -o out/report $(BENCH_ARGS)
 

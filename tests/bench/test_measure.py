@@ -190,6 +190,7 @@ def small(monkeypatch: pytest.MonkeyPatch, *cases: Case) -> None:
     monkeypatch.setattr(running, "CASES", cases)
     monkeypatch.setattr(running.ScalingRun, "ladders", lambda self: [])
     monkeypatch.setattr(running, "measure_hard_cases", lambda renderer: iter(()))
+    monkeypatch.setattr(running, "measure_slabs", lambda *, quick: ())
 
 
 def test_a_case_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,8 +27,8 @@ from translucent.bench.frontier import mark_frontier
 from translucent.bench.page import numbers
 from translucent.bench.page.build import build_page, write_page
 from translucent.bench.page.overview import overview_svg
-from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series
-from translucent.bench.row import Errors, Ratio, Row, Timing
+from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series, Slab
+from translucent.bench.row import Errors, LightErrors, Ratio, Row, Timing
 from translucent.errors import InputError, RenderError
 
 FAMILIES = ("SignedDepth", "BackFaceDepth", "constant thickness", "KBuffer", "FragmentLists", "something new")
@@ -237,6 +237,23 @@ def test_texts_of_the_record_are_shown(page: str) -> None:
         "translucent report -o out", "what marking promises", "777 pixels", "20 160 triangles",
     ):  # fmt: skip
         assert shown in text
+
+
+def test_slabs_and_scattered_light_have_tables() -> None:
+    known = case()
+    light = LightErrors(0.0123, 0.0045, (0.0678, -0.0912, 0.0034), 0.567)
+    lit = dataclasses.replace(known.rows[1], light=light)
+    record = dataclasses.replace(known, rows=(known.rows[0], lit, *known.rows[2:]), truth_noise=0.0314)
+    shares = [(0.4, 0.2), (0.0, 0.1), (0.411, 0.19), (0.33, 0.25)]
+    slabs = tuple(Slab(0.9, depth, 0.5, 1.5, *shares[0], *shares[1:], "layer") for depth in (2.0, 4.0))
+    page = build_page(report(cases=(record,), slabs=slabs))
+    found = cells(page)
+    for text in ("0.012", "4.5e-3", "+6.8 %", "−9.1 %", "+0.3 %", "567", "0.9", "+0.011", "−0.070"):
+        assert found[text], text
+    assert "3.14 % of the mean" in " ".join(page.split())
+    assert "of 4 × 4" not in build_page(report())
+    assert 'class="good"' in page
+    assert 'class="bad planned"' in page
 
 
 def test_banners() -> None:

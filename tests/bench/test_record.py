@@ -14,8 +14,8 @@ import pytest
 from tests.bench.provenance import PROVENANCE
 from translucent.bench.codec import Packed
 from translucent.bench.files import read_report, write_csv, write_report
-from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series
-from translucent.bench.row import Errors, Ratio, Row, Timing
+from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series, Slab
+from translucent.bench.row import Errors, LightErrors, Ratio, Row, Timing
 from translucent.errors import InputError
 
 
@@ -36,6 +36,7 @@ def full_report() -> Report:
         passes=1,
         bytes_per_pixel=61,
         thickness=errors,
+        light=LightErrors(0.02, 0.01, (0.1, -0.2, 0.3), 0.4),
         invalid=0.0,
         coverage_mismatch=0.0,
         pareto=True,
@@ -49,7 +50,9 @@ def full_report() -> Report:
     )
     hard = HardCase("H07", "far away", "exact", "1e-7", True, 1e-7, 6e-6, "of the diagonal")
     unversioned = dataclasses.replace(PROVENANCE, commit=None, dirty=None)
-    return Report(unversioned, (case,), (series,), (hard,), (Claim("fast", None, "-"),), seconds=3.5, complete=True)
+    slab = Slab(0.9, 4.0, 0.5, 1.5, 0.4, 0.2, (0.0, 0.02), (0.41, 0.19), (0.38, 0.25), "diffusion")
+    claim = Claim("fast", None, "-")
+    return Report(unversioned, (case,), (series,), (hard,), (claim,), seconds=3.5, complete=True, slabs=(slab,))
 
 
 def test_a_report_is_the_same_after_writing_and_reading(tmp_path: Path) -> None:
@@ -155,6 +158,7 @@ def test_the_table_has_a_line_for_each_row(tmp_path: Path) -> None:
     assert [line["method"] for line in lines] == ["SignedDepth", "BackFaceDepth"]
     assert float(lines[0]["thickness.rms"]) == 1e-3
     assert lines[0]["radiance.rms"] == ""
+    assert lines[0]["light.bias"] == "0.1 -0.2 0.3"
     assert lines[1]["refusal"] == "two media"
     assert lines[0]["size"] == "64x48"
 

@@ -168,6 +168,7 @@ def nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measuring, "CASES", ())
     monkeypatch.setattr(measuring.ScalingRun, "ladders", lambda _: ())
     monkeypatch.setattr(measuring, "measure_hard_cases", lambda _: ())
+    monkeypatch.setattr(measuring, "measure_slabs", lambda *, quick: ())
 
 
 SMALL = ("--quick", "--size", "64x48", "--methods", "signed-depth,constant-thickness")

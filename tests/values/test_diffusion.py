@@ -11,7 +11,6 @@ import pytest
 from scipy import sparse
 
 import translucent as tl
-from tests import slabs
 from translucent.bench.shapes import joined
 from translucent.diffusion.cells import TOLERANCE
 from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
@@ -30,6 +29,7 @@ from translucent.diffusion.solution import (
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.scattering import Diffusion
+from translucent.reference import slabs
 
 Array = npt.NDArray[np.float64]
 

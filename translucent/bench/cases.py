@@ -11,6 +11,7 @@ import numpy as np
 
 from translucent.assets import mesh_path
 from translucent.bench.contenders import Effect
+from translucent.bench.scattering.scenes import SCENES, ScatteringScene
 from translucent.bench.shapes import lens_row, lying_torus, menger_sponge, nested_shells, subdivided
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
@@ -58,6 +59,8 @@ class Case:
         ``--quick``.
     tolerance : float
         Relative error of scattered light in the reference.
+    stored : bool
+        Its truth is path traced beforehand: see `translucent.bench.scattering.stored`.
     """
 
     name: str
@@ -70,6 +73,7 @@ class Case:
     shrink: int = 1
     compared: int = 240
     tolerance: float = 1e-4
+    stored: bool = False
 
 
 def _shown(make: Callable[[], Mesh], size: Size) -> Scene:
@@ -177,6 +181,21 @@ def _density(size: Size) -> Scene:
     glowing = Medium(absorption=(1.2, 2.2, 3.0), emission=(1.6, 0.7, 0.2))
     cloud = Object(mesh, glowing, density=density)
     return Scene([cloud], framing([cloud], size), environment=DUSK)
+
+
+def _scattered_again(one: ScatteringScene) -> Case:
+    """A case of light that is scattered many times, which is looked at from where its truth was."""
+    return Case(
+        one.name,
+        one.title,
+        one.why,
+        lambda size: one.make(),
+        "multiple scattering",
+        quick=one.quick,
+        shrink=4,
+        compared=one.side,
+        stored=True,
+    )
 
 
 #: Cases of interfaces, which take long: all but one are left out by ``--quick``.
@@ -316,4 +335,5 @@ CASES: tuple[Case, ...] = (
         compared=120,
     ),
     Case("density", "Cloud", "density that varies from place to place", _density, "density", shrink=2, compared=192),
+    *map(_scattered_again, SCENES),
 )

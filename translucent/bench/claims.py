@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
+from translucent.bench.claim import over_cases
 from translucent.bench.frontier import NOISES, error_of
 from translucent.bench.hard.measure import CASES as HARD_CASES
-from translucent.bench.record import CaseRecord, Claim, HardCase
+from translucent.bench.record import CaseRecord, Claim, HardCase, Slab
 from translucent.bench.row import Row
+from translucent.bench.scattering.claims import scattering_claims
 
 #: Largest time of signed depth, as a multiple of the floor.
 MOST_OF_FLOOR = 1.25
@@ -29,54 +31,41 @@ LOST = ("slab", "far slab", "far knot")
 VISIBLE_FACTOR, VISIBLE = 10.0, 1e-6
 
 
-def check_claims(cases: Sequence[CaseRecord], hard_cases: Sequence[HardCase]) -> tuple[Claim, ...]:
+def check_claims(
+    cases: Sequence[CaseRecord], hard_cases: Sequence[HardCase], slabs: Sequence[Slab] = ()
+) -> tuple[Claim, ...]:
     """All claims, each with the numbers behind it."""
     closed = [case for case in cases if case.closed and case.absorption_only and not case.failure]
     concave = [case for case in closed if not case.convex]
     far = [case for case in closed if case.name.startswith("far")]
     lost = [case for case in closed if case.name in LOST]
     return (
-        _over("SignedDepth is on the Pareto frontier of every closed case that only absorbs", closed, _on_frontier),
-        _over(f"SignedDepth takes at most {MOST_OF_FLOOR} times the floor on these", closed, _near_floor),
-        _over(
+        over_cases(
+            "SignedDepth is on the Pareto frontier of every closed case that only absorbs", closed, _on_frontier
+        ),
+        over_cases(f"SignedDepth takes at most {MOST_OF_FLOOR} times the floor on these", closed, _near_floor),
+        over_cases(
             f"SignedDepth has at most 1/{FACTOR:.0f} of the error of constant thickness on concave cases",
             concave,
             lambda case: _smaller(case, "constant thickness"),
         ),
-        _over(
+        over_cases(
             f"SignedDepth has at most 1/{FACTOR:.0f} of the error of back-face depth on concave cases, where rays "
             "leave the body and enter again",
             concave,
             lambda case: _smaller(case, "BackFaceDepth, unmarked") if case.layers > 2 else (None, ""),
         ),
-        _over("float16 is visibly off on thin and far cases", lost, lambda case: _off(case, "SignedDepth in float16")),
-        _over(
+        over_cases(
+            "float16 is visibly off on thin and far cases", lost, lambda case: _off(case, "SignedDepth in float16")
+        ),
+        over_cases(
             "distances from the camera are visibly off on far cases",
             far,
             lambda case: _off(case, "SignedDepth from the camera"),
         ),
+        *scattering_claims(cases, slabs),
         _hard(hard_cases),
     )
-
-
-Check = Callable[[CaseRecord], tuple[bool | None, str]]
-
-
-def _over(text: str, cases: Sequence[CaseRecord], check: Check) -> Claim:
-    """A claim over several cases: held where it holds on all, and not where it fails on one.
-
-    A check gives no verdict (None) where the case has not the numbers, or they are too noisy, which it tells in words:
-    a claim that is undecided anywhere is undecided, unless it fails elsewhere.
-    """
-    found = [(case, *check(case)) for case in cases]
-    known = [(case, held, words) for case, held, words in found if held is not None]
-    undecided = [f"undecided on {case.name!r}: {words}" for case, held, words in found if held is None and words]
-    if not known:
-        return Claim(text, None, "; ".join(undecided) or "no case in this run to check it on")
-    wrong = [f"not on {case.name!r}: {words}" for case, held, words in known if not held]
-    right = [f"{case.name}: {words}" for case, held, words in known if held]
-    held = False if wrong else None if undecided else True
-    return Claim(text, held, "; ".join([*wrong, *undecided, *right]))
 
 
 def _row(case: CaseRecord, method: str) -> Row | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from translucent.bench.row import Kind
+from translucent.bench.scattering.engines import Engine, Frostbite, NormalizedDiffusion, PaintLayer
 from translucent.errors import InputError
 from translucent.planning.interfaces import FrontInterface, Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.methods import (
@@ -23,18 +24,20 @@ from translucent.planning.methods import (
 )
 from translucent.planning.methods.depth_peeling import MAX_LAYERS
 from translucent.planning.methods.ray_marched import Quadrature
+from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.scene.scene import Scene
 
 #: Kinds of contenders: by the plan for its method, by a shortcut of the bench, or without OpenGL.
-Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march"]
+Technique = Literal["plan", "constant", "ball", "unmarked", "half", "cpu", "march", "engine"]
 
 #: Effects of a scene, which decide on the contenders that are measured.
-Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces"]
+Effect = Literal["absorption", "emission", "scattering", "density", "sheet", "interfaces", "multiple scattering"]
 
 #: Refraction index of the thin layers that bend rays.
 REFRACTED_IOR = 1.5
 
-_ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect != "interfaces")
+_WHOLE_FRAMES: tuple[Effect, ...] = ("interfaces", "multiple scattering")
+_ALL: tuple[Effect, ...] = tuple(effect for effect in get_args(Effect) if effect not in _WHOLE_FRAMES)
 _STEPS = (8, 16, 32, 64, 128, 256, 512)
 _SOURCES: tuple[Effect, ...] = ("emission", "scattering", "density")
 
@@ -71,6 +74,10 @@ class Contender:
         none of their own.
     interfaces : Interfaces, optional
         How they are found, as `translucent.Renderer.render` has it; None where they are not what is measured.
+    scattering : Scattering, optional
+        How light that is scattered many times is shown; None where that is not what is measured.
+    engine : Engine, optional
+        What an engine would show of it.
     """
 
     name: str
@@ -83,6 +90,8 @@ class Contender:
     pictured: tuple[Effect, ...] = ()
     ior: Literal["matched", "refracted"] | None = None
     interfaces: Interfaces | None = None
+    scattering: Scattering | None = None
+    engine: Engine | None = None
 
     @property
     def fitted(self) -> bool:
@@ -198,6 +207,45 @@ def _with_interfaces() -> Iterable[Contender]:
         )
 
 
+#: Ways of showing light that is scattered many times, and whether ``--quick`` has them.
+_SCATTERINGS: dict[str, tuple[Scattering, bool]] = {
+    "SingleScattering": (SingleScattering(), False),
+    "ScatteringLayer": (ScatteringLayer(), True),
+    "Diffusion, resolution 16": (Diffusion(16), True),
+    "Diffusion, resolution 24": (Diffusion(24), False),
+    "Diffusion, resolution 32": (Diffusion(32), True),
+    "Diffusion, resolution 48": (Diffusion(48), False),
+}
+
+#: What engines show of it.
+_ENGINES: tuple[Engine, ...] = (PaintLayer(), NormalizedDiffusion(), Frostbite())
+
+
+def _with_scattering() -> Iterable[Contender]:
+    every: tuple[Effect, ...] = ("multiple scattering",)
+    for engine in _ENGINES:
+        yield Contender(
+            engine.name,
+            engine.name,
+            SignedDepth(),
+            "engine",
+            "counter-example",
+            every,
+            pictured=every,
+            engine=engine,
+        )
+    for name, (scattering, quick) in _SCATTERINGS.items():
+        yield Contender(
+            name,
+            type(scattering).__name__,
+            SignedDepth(),
+            effects=every,
+            quick=quick,
+            pictured=every,
+            scattering=scattering,
+        )
+
+
 CONTENDERS: tuple[Contender, ...] = (
     Contender("constant thickness", "constant thickness", ThinLayer(), "constant", "counter-example", pictured=_ALL),
     Contender("sphere assumption", "sphere assumption", ThinLayer(), "ball", "counter-example"),
@@ -227,7 +275,8 @@ CONTENDERS: tuple[Contender, ...] = (
     *_light_points(),
     *_marched(),
     *_with_interfaces(),
-    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", get_args(Effect), quick=False),
+    *_with_scattering(),
+    Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", (*_ALL, "interfaces"), quick=False),
 )
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from translucent import reference
+from translucent.bench.scattering.engines import Engine
+from translucent.bench.scattering.shot import shot_of
 from translucent.bench.timing import Sample
 from translucent.frames.frame import Frame
 from translucent.gpu.job import FrameJob
@@ -19,6 +21,7 @@ from translucent.gpu.timer import PassTimer
 from translucent.planning.methods import RayMarched, SignedDepth
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering.choice import shown
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
@@ -37,6 +40,10 @@ class Drawing(Protocol):
     @property
     def bytes_per_pixel(self) -> int | None:
         """Bytes per pixel of all targets and buffers."""
+
+    @property
+    def solve_seconds(self) -> float | None:
+        """Seconds that were spent once on light that diffuses; None where none does."""
 
     def release(self) -> None:
         """Free its resources."""
@@ -89,9 +96,18 @@ class Studio:
 class _OnGpu:
     """Drawing with OpenGL, into shared targets."""
 
+    solve_seconds: float | None = None
+
     def __init__(self, studio: Studio, scene: Scene, targets: Targets, plan: RenderPlan) -> None:
         self._studio = studio
-        self._job = FrameJob(studio.gl, scene, plan, targets, studio.resources)
+        scene = shown(scene, plan.given_back)
+        # Only the light of the last scene is kept: each drawing of light that diffuses has its own.
+        self._own = Resources(studio.gl) if plan.given_back.diffused else None
+        if self._own is not None:
+            began = time.perf_counter()
+            self._own.diffusion.solve(scene, plan.given_back.diffusion)
+            self.solve_seconds = time.perf_counter() - began
+        self._job = FrameJob(studio.gl, scene, plan, targets, self._own or studio.resources)
 
     def read(self) -> Frame:
         """Read the frame of the last drawing."""
@@ -105,8 +121,10 @@ class _OnGpu:
         return self._job.targets.bytes_per_pixel() + lights
 
     def release(self) -> None:
-        """Free the uniform buffers."""
+        """Free the uniform buffers, and resources of its own."""
         self._job.release()
+        if self._own is not None:
+            self._own.release()
 
 
 class Floor:
@@ -205,6 +223,7 @@ class OnProcessor:
     """Drawing without OpenGL: of the backend ``cpu``, or where it is given a way to march, of the reference's march."""
 
     bytes_per_pixel = None
+    solve_seconds = None
 
     def __init__(
         self, studio: Studio, renderer: Renderer, scene: Scene, size: Size, march: RayMarched | None = None
@@ -231,6 +250,35 @@ class OnProcessor:
         if self._frame is None:
             self.draw()
         assert self._frame is not None
+        return self._frame
+
+    def release(self) -> None:
+        """Nothing to free: the renderer is shared."""
+
+
+class OfEngine:
+    """Drawing of what an engine would show: of NumPy in place of its shaders, on a frame of our own."""
+
+    bytes_per_pixel = None
+    solve_seconds = None
+
+    def __init__(self, studio: Studio, scene: Scene, size: Size, engine: Engine) -> None:
+        self._clock = studio.clock
+        self._renderer = studio.renderer
+        self._scene, self._size, self._engine = scene, size, engine
+        self._frame: Frame | None = None
+
+    def draw(self) -> Sample:
+        """Draw the frame, with all of it in one time."""
+        began, work = time.perf_counter(), self._clock()
+        shot = shot_of(self._renderer, self._scene, self._size)
+        self._frame = shot.frame(self._engine.light(shot))
+        seconds, spent = time.perf_counter() - began, self._clock() - work
+        return Sample(seconds, seconds, None, spent, spent)
+
+    def read(self) -> Frame:
+        """Read the frame of the last drawing."""
+        assert self._frame is not None, "drawn before"
         return self._frame
 
     def release(self) -> None:

@@ -17,7 +17,10 @@ from translucent.files.reading import read_text
 _LARGEST = 1 << 28
 
 #: Fields of a row that are dataclasses, one column for each of their fields.
-_GROUPS = ("wall", "gpu", "frame", "ratio", "frame_ratio", "thickness", "transmittance", "radiance", "color_difference")
+_GROUPS = (
+    *("wall", "gpu", "frame", "ratio", "frame_ratio"),
+    *("thickness", "transmittance", "radiance", "color_difference", "light"),
+)
 
 
 def write_report(report: Report, path: Path) -> None:
@@ -69,7 +72,12 @@ def _flat(case: CaseRecord, row: Row) -> dict[str, Any]:
     }
     for name, value in dataclasses.asdict(row).items():
         if isinstance(value, dict):
-            line.update({f"{name}.{part}": number for part, number in value.items()})
+            line.update({f"{name}.{part}": _cell(number) for part, number in value.items()})
         elif value is not None:
             line[name] = value
     return line
+
+
+def _cell(value: Any) -> Any:
+    """A number, or those of the channels with spaces between them."""
+    return " ".join(map(str, value)) if isinstance(value, tuple) else value

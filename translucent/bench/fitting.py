@@ -8,6 +8,7 @@ import numpy as np
 
 from translucent.bench.contenders import Contender
 from translucent.bench.drawing import Size, Studio
+from translucent.bench.scattering.shot import shot_of
 from translucent.bench.staging import drawing, plan_of
 from translucent.frames.frame import Frame
 from translucent.gpu.targets import Targets
@@ -16,11 +17,14 @@ from translucent.scene.scene import Scene
 
 
 def fitted(studio: Studio, contender: Contender, scene: Scene, truth: Frame, size: Size) -> tuple[Contender, float]:
-    """Contender with the thickness of least squared error, and that thickness in metres.
+    """Contender with the thickness of least squared error, and that thickness in metres; of an engine, its settings.
 
     Thickness is proportional to what is assumed, so one picture tells: with t for 1 m, the best is <t d> / <t t> over
     all pixels that truth or picture cover.
     """
+    if contender.engine is not None:
+        shot = shot_of(studio.renderer, scene, size)
+        return dataclasses.replace(contender, engine=contender.engine.fitted(shot, truth.radiance)), 0.0
     told = contender.technique == "plan" and all(body.sheet_thickness is not None for body in scene.bodies)
     if told or not contender.fitted:
         return contender, 0.0

@@ -34,6 +34,7 @@ QUANTITY: dict[str, Quantity] = {
     "scattering": "radiance",
     "density": "radiance",
     "interfaces": "radiance",
+    "multiple scattering": "radiance",
 }
 
 
@@ -83,7 +84,8 @@ class CaseRun:
         try:
             scene = case.scene(self.size)
             small = scaled(self.size, round(case.compared * self.compared))
-            truth = Truth.of(scene, small, case.tolerance)
+            truth = Truth.stored(case.name, scene) if case.stored else Truth.of(scene, small, case.tolerance)
+            small = truth.frame.size
         except Exception as error:  # noqa: BLE001 - a scene that cannot be traced leaves the other cases alone
             return dataclasses.replace(blank, failure=one_line(error))
         blank = _described(blank, scene, truth, small)
@@ -163,7 +165,7 @@ class CaseRun:
                     entry.drawn.release()
             floor.release()
             targets.release()
-        if self.case.effect == "interfaces":
+        if self.case.effect in ("interfaces", "multiple scattering"):
             found = {name: one.of_whole_frames for name, one in found.items()}
         rows = [
             _with_times(entry.row, found.get(entry.row.method), failures, peeled=entry.contender.method.peels)
@@ -201,6 +203,7 @@ def _described(blank: CaseRecord, scene: Scene, truth: Truth, small: Size) -> Ca
         diagonal=truth.diagonal,
         compared_pixels=int(truth.compared.sum()),
         reference_seconds=truth.seconds,
+        truth_noise=truth.noise,
     )
 
 
@@ -216,6 +219,8 @@ def _untrusted(scene: Scene) -> str:
 
 def _parameters(contender: Contender, plan: RenderPlan | None = None, assumed: float = 0.0) -> str:
     """The configuration as Python writes it, or of shortcuts in words, with that of interfaces behind it."""
+    if contender.engine is not None:
+        return str(contender.engine)
     method, interfaces = contender.method, contender.interfaces
     if plan is not None:
         interfaces = plan.interfaces
@@ -229,7 +234,10 @@ def _parameters(contender: Contender, plan: RenderPlan | None = None, assumed: f
         "cpu": 'Renderer(backend="cpu")',
         "march": f"reference.march with {method}",
         "plan": str(method),
+        "engine": "",
     }[contender.technique]
+    if contender.scattering is not None:
+        return str(contender.scattering)
     if assumed:
         found = f"{assumed:.4g} m, of least squared error"
     return found if interfaces is None else f"{found}, {interfaces}"
@@ -246,7 +254,10 @@ def _against(row: Row, entry: _Entry, drawn: Drawing, truth: Truth, case: CaseRe
         found[quantity] = None if errors is None else errors[0]
         if errors is not None:
             found["invalid"], found["coverage_mismatch"] = errors[1:]
-    found["color_difference"] = truth.color_difference(frame, case.quantity)
+    if case.truth_noise is None:
+        found["color_difference"] = truth.color_difference(frame, case.quantity)
+    else:  # its noise would be all that is seen
+        found["light"] = truth.light_errors(frame, drawn.solve_seconds)
     if "invalid" not in found:
         covered = (frame.coverage | truth.frame.coverage).sum()
         found["invalid"] = float((~frame.valid).sum() / max(covered, 1))

@@ -7,10 +7,18 @@ from translucent.bench.row import Quantity
 from translucent.planning.notes import NoteKind
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.scene.scene import Object, Scene
 
 #: Light that a sum of one event each does not have; rows say so by their effect.
 _LIT = (NoteKind.SCATTERED_AGAIN,)
+
+#: Promises of the ways of showing light that is scattered many times: none has a bound.
+_SCATTERED: dict[type[Scattering], str] = {
+    Diffusion: "no bound: light diffuses, which it does a few mean free paths below the surface",
+    ScatteringLayer: "no bound: exact for a wide flat slab in diffuse light; nothing spreads sideways",
+    SingleScattering: "light of lamps that is scattered once; the rest is lost",
+}
 
 #: Effects that change pictures, but not the thickness along straight rays.
 _BESIDE_THICKNESS = (
@@ -25,6 +33,10 @@ _BESIDE_THICKNESS = (
 
 def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Quantity) -> tuple[str, bool]:
     """Promise of a row in a quantity, in words, and whether it is exact."""
+    if contender.engine is not None:
+        return contender.engine.promise, False
+    if contender.scattering is not None:
+        return _SCATTERED.get(type(contender.scattering)) or "; ".join(map(str, plan.limits)), False
     if contender.technique == "constant" and contender.interfaces is not None:
         return "none: the best constant thickness, and rays that bend once, where they enter", False
     if contender.technique in ("constant", "ball"):

@@ -110,7 +110,9 @@ class CaseRecord:
     compared_pixels : int
         Within the mask of the errors.
     reference_seconds : float
-        That the reference took.
+        That the reference took; of a stored truth, when it was made.
+    truth_noise : float, optional
+        Root mean square of the standard error of a path traced truth, as a share of its mean.
     rows : tuple of Row
         The floor first.
     pictures : tuple of Picture
@@ -134,6 +136,7 @@ class CaseRecord:
     diagonal: float = 0.0
     compared_pixels: int = 0
     reference_seconds: float = 0.0
+    truth_noise: float | None = None
     rows: tuple[Row, ...] = ()
     pictures: tuple[Picture, ...] = ()
     failure: str | None = None
@@ -179,6 +182,52 @@ class Series:
     family: str
     fixed: str
     points: tuple[ScalePoint, ...]
+
+
+#: Ways of showing what slabs give back and let through; what the planner takes is one of the others, or nothing.
+SlabWay = Literal["diffusion", "layer", "planned"]
+
+
+@dataclass(frozen=True)
+class Slab:
+    """Record of a wide flat slab in diffuse light: shares of the light that enters, unscattered light with them.
+
+    Attributes
+    ----------
+    albedo, depth, anisotropy, ior : float
+        Of its medium, and its optical depth.
+    reflectance, transmittance : float
+        The true ones, by adding and doubling.
+    unscattered : (reflectance, transmittance)
+        What of them was never scattered, which is exact in all pictures.
+    diffusion, layer : (reflectance, transmittance)
+        By `Diffusion` and by `ScatteringLayer`.
+    planned : {"diffusion", "layer", "none"}
+        What the planner takes; none: nothing beyond what is scattered once.
+    """
+
+    albedo: float
+    depth: float
+    anisotropy: float
+    ior: float
+    reflectance: float
+    transmittance: float
+    unscattered: tuple[float, float]
+    diffusion: tuple[float, float]
+    layer: tuple[float, float]
+    planned: Literal["diffusion", "layer", "none"]
+
+    @property
+    def reduced_depth(self) -> float:
+        """Optical depth of the medium that scatters isotropically and is alike: of sigma_a + sigma_s (1 - g)."""
+        return self.depth * (1.0 - self.albedo * self.anisotropy)
+
+    def error(self, way: SlabWay) -> float:
+        """The error in reflectance or transmittance by a way that is larger, with its sign."""
+        shares = {"diffusion": self.diffusion, "layer": self.layer, "none": self.unscattered}
+        reflected, transmitted = shares[self.planned if way == "planned" else way]
+        off = reflected - self.reflectance, transmitted - self.transmittance
+        return max(off, key=abs)
 
 
 @dataclass(frozen=True)
@@ -239,7 +288,7 @@ class Report:
 
     Attributes
     ----------
-    provenance, cases, scaling, hard_cases, claims
+    provenance, cases, scaling, hard_cases, claims, slabs
     seconds : float
         That the measurements took so far.
     complete : bool
@@ -253,6 +302,7 @@ class Report:
     claims: tuple[Claim, ...] = ()
     seconds: float = 0.0
     complete: bool = False
+    slabs: tuple[Slab, ...] = ()
     format: str = field(default=FORMAT)
     version: int = field(default=VERSION)
 

@@ -62,6 +62,28 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class LightErrors:
+    """Errors of light that is scattered many times, as shares of the mean of the truth.
+
+    Attributes
+    ----------
+    nrmse : float
+        Root mean square error, freed of the noise of the truth: of (x - a)(x - b) with two independent halves a, b.
+    block : float
+        The same of means over 4 x 4 pixels: what is left where errors of neighbors cancel.
+    bias : tuple of 3 floats
+        Mean signed error of each channel, as a share of the channel's mean.
+    solve_seconds : float, optional
+        For the light that diffuses, once for each light, medium and mesh; frames do not have it.
+    """
+
+    nrmse: float
+    block: float
+    bias: tuple[float, float, float]
+    solve_seconds: float | None = None
+
+
+@dataclass(frozen=True)
 class ColorDifference:
     """Statistics of the color difference in CIELAB 1976: median, 99.9th percentile and maximum.
 
@@ -109,7 +131,9 @@ class Row:
     thickness, transmittance, radiance : Errors, optional
         None where there is no pixel that can be compared.
     color_difference : ColorDifference, optional
-        What anybody could see of these errors.
+        What anybody could see of these errors; None beside a truth with noise.
+    light : LightErrors, optional
+        Where light is scattered many times.
     invalid : float, optional
         Share of the covered pixels that the method marks as not to be trusted; errors leave these out.
     coverage_mismatch : float, optional
@@ -141,6 +165,7 @@ class Row:
     transmittance: Errors | None = None
     radiance: Errors | None = None
     color_difference: ColorDifference | None = None
+    light: LightErrors | None = None
     invalid: float | None = None
     coverage_mismatch: float | None = None
     pareto: bool = False

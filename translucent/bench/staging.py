@@ -6,12 +6,13 @@ import dataclasses
 from typing import cast
 
 from translucent.bench.contenders import REFRACTED_IOR, Contender
-from translucent.bench.drawing import Drawing, OnProcessor, Planned, Short, Studio
+from translucent.bench.drawing import Drawing, OfEngine, OnProcessor, Planned, Short, Studio
 from translucent.errors import InputError
 from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFacePass, Shortcut, UnmarkedBackFacePass
 from translucent.gpu.targets import Targets
 from translucent.planning.methods import BackFaceDepth, RayMarched, SignedDepth
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import SingleScattering
 from translucent.renderer import Renderer
 from translucent.scene.scene import Object, Scene
 
@@ -47,6 +48,8 @@ def drawing(
         # What the reference marches by is `RayMarched`, as it checks.
         march = cast("RayMarched", contender.method) if contender.technique == "march" else None
         return OnProcessor(studio, cpu, scene, targets.size, march)
+    if contender.engine is not None:
+        return OfEngine(studio, scene, targets.size, contender.engine)
     if contender.technique == "plan":
         return Planned(studio, scene, targets, plan)
     shortcut: Shortcut
@@ -67,6 +70,8 @@ def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | 
         return cpu.plan(scene)
     if contender.interfaces is not None:
         return studio.renderer.plan(scene, interfaces=contender.interfaces)
+    if contender.engine is not None or contender.scattering is not None:
+        return studio.renderer.plan(scene, scattering=contender.scattering or SingleScattering())
     if contender.technique == "plan":
         return studio.renderer.plan(scene, contender.method)
     return studio.renderer.plan(scene, BackFaceDepth() if contender.technique == "unmarked" else SignedDepth())

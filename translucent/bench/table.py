@@ -11,6 +11,8 @@ _HEAD = (
     f"{'method':<38}{'ms':>8}{'p95':>8}{'÷ floor':>9}{'±':>6}{'frame':>7}{'passes':>7}{'layers':>7}{'ms/layer':>9}"
     f"{'RMS':>9}{'p99.9':>9}{'invalid':>9}"
 )
+#: Of cases with a path traced truth: errors as shares of its mean.
+_SCATTERED_HEAD = _HEAD[: _HEAD.index("RMS") - 6] + f"{'nRMSE':>9}{'4x4':>9}{'bias r':>8}{'g':>8}{'b':>8}{'ms once':>9}"
 
 
 def table(report: Report) -> str:
@@ -30,7 +32,7 @@ def _lines(report: Report) -> Iterator[str]:
         if case.failure:
             yield f"  failed: {case.failure}"
             continue
-        yield _HEAD
+        yield _HEAD if case.truth_noise is None else _SCATTERED_HEAD
         yield from (_row(case, row) for row in case.rows)
     if report.hard_cases:
         yield ""
@@ -53,6 +55,10 @@ def _row(case: CaseRecord, row: Row) -> str:
     line += f"{row.frame_ratio.median:>7.2f}" if row.frame_ratio else f"{'':>7}"
     line += f"{'' if row.passes is None else row.passes:>7}{'' if row.layers is None else row.layers:>7}"
     line += f"{row.ms_per_layer:>9.2f}" if row.ms_per_layer is not None else f"{'':>9}"
+    if row.light is not None:
+        bias = "".join(f"{one:>+8.1%}" for one in row.light.bias)
+        solved = "" if row.light.solve_seconds is None else f"{1e3 * row.light.solve_seconds:.0f}"
+        return f"{line}{row.light.nrmse:>9.3f}{row.light.block:>9.3f}{bias}{solved:>9}"
     errors = row.errors(case.quantity)
     line += f"{errors.rms:>9.1e}{errors.p999:>9.1e}" if errors else f"{'':>18}"
     return line + (f"{row.invalid:>9.2%}" if row.invalid is not None else "")

@@ -18,7 +18,8 @@ from translucent.arrays import Array
 from translucent.bench.codec import Packed
 from translucent.bench.drawing import Size
 from translucent.bench.record import Picture
-from translucent.bench.row import ColorDifference, Errors, Quantity
+from translucent.bench.row import ColorDifference, Errors, LightErrors, Quantity
+from translucent.bench.scattering.stored import stored_truth
 from translucent.bench.seeing import color_difference
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
@@ -31,6 +32,9 @@ BOUNCES = 128
 
 #: Number of rays through each pixel of each of two references before rough interfaces, whose spread is their noise.
 PATHS = 128
+
+#: Width and height of the blocks over whose means errors are taken, too, in pixels.
+BLOCK = 4
 
 #: Errors that pictures need not tell from 0: half of the smallest that a heat map shows. Noise does not compress.
 INVISIBLE = 5e-8
@@ -59,6 +63,8 @@ class Truth:
     halves : two (h, w, 3) arrays, optional
         Radiances with noise that has nothing to do with each other's, where interfaces are rough; the frame has the
         mean.
+    noise : float, optional
+        Of a stored truth: root mean square of its standard error, as a share of its mean.
     """
 
     frame: Frame
@@ -67,6 +73,7 @@ class Truth:
     diagonal: float
     seconds: float
     halves: tuple[Array, Array] | None = None
+    noise: float | None = None
 
     @classmethod
     def of(cls, scene: Scene, size: Size, tolerance: float) -> Truth:
@@ -81,7 +88,26 @@ class Truth:
         for other in others:
             halves = frame.radiance, other.radiance
             frame = dataclasses.replace(frame, radiance=0.5 * (halves[0] + halves[1]))
-        seconds = time.perf_counter() - begin
+        return cls._of_frame(scene, frame, time.perf_counter() - begin, halves)
+
+    @classmethod
+    def stored(cls, name: str, scene: Scene) -> Truth:
+        """Truth of a scene that the package brings; raises `InputError` where it is that of another scene."""
+        found = stored_truth(name, scene)
+        size = found.mask.shape[1], found.mask.shape[0]
+        # All but the light that media scatter.
+        frame, _ = reference.path_trace(scene, size, paths=2, max_events=0)
+        if not np.array_equal(frame.coverage, found.mask):
+            raise InputError(f"truth of {name!r}", "it covers other pixels", "run tools/scattering_truth.py")
+        halves = frame.radiance.copy(), frame.radiance.copy()
+        for half, radiance in zip(halves, found.halves, strict=True):
+            half[found.mask] = radiance
+        frame = dataclasses.replace(frame, radiance=0.5 * (halves[0] + halves[1]))
+        return dataclasses.replace(cls._of_frame(scene, frame, found.seconds, halves), noise=found.noise)
+
+    @classmethod
+    def _of_frame(cls, scene: Scene, frame: Frame, seconds: float, halves: tuple[Array, Array] | None) -> Truth:
+        size = frame.size
         counts = reference.hit_counts(scene, size)
         inside = interior(counts)
         for seen in reference.opaque_counts(scene, size):
@@ -121,6 +147,24 @@ class Truth:
         shown = np.asarray(frame.radiance, np.float64)
         return math.sqrt(max(float(np.mean(((shown - one) * (shown - other))[used])), 0.0))
 
+    def light_errors(self, frame: Frame, solve_seconds: float | None) -> LightErrors | None:
+        """Errors of a frame as shares of the mean of a path traced truth; None if there is no such truth."""
+        used = self.compared & frame.coverage & frame.valid
+        if self.halves is None or not used.any():
+            return None
+        mean = float(self.frame.radiance[used].mean())
+        shown = np.asarray(frame.radiance, np.float64)
+        off = [shown - half for half in self.halves]
+        whole = _blocks(used.astype(np.float64)[..., None])[..., 0] == 1.0
+        coarse = (_blocks(off[0]) * _blocks(off[1]))[whole]
+        bias = shown[used].mean(axis=0) / self.frame.radiance[used].mean(axis=0) - 1.0
+        return LightErrors(
+            self._rms_without_noise(frame, *self.halves) / mean,
+            math.sqrt(max(float(coarse.mean()), 0.0)) / mean if whole.any() else 0.0,
+            (float(bias[0]), float(bias[1]), float(bias[2])),
+            solve_seconds,
+        )
+
     def color_difference(self, frame: Frame, quantity: Quantity) -> ColorDifference | None:
         """Visible color difference of a frame; None if there is no pixel to compare."""
         used = self.compared & frame.coverage & frame.valid
@@ -146,3 +190,10 @@ class Truth:
         covered = frame.coverage | self.frame.coverage
         error = np.where(covered & frame.valid & self.frame.valid, error, np.nan)
         return Picture(method, png, Packed.of(error), Packed.of(covered & ~frame.valid))
+
+
+def _blocks(picture: Array) -> Array:
+    """Means over blocks of 4 x 4 pixels, without what is left over at the right and below."""
+    h, w = (side // BLOCK for side in picture.shape[:2])
+    cut = picture[: h * BLOCK, : w * BLOCK]
+    return np.asarray(cut.reshape(h, BLOCK, w, BLOCK, -1).mean(axis=(1, 3)))

@@ -14,6 +14,7 @@ from translucent.bench.page.figure import require_packages
 from translucent.bench.page.pareto import UNITS, identifier, pareto_svg, plotted
 from translucent.bench.page.pictures import data_address, heat_map, scale_colors
 from translucent.bench.page.scaling import AXES, axis_groups, scaling_svg
+from translucent.bench.page.slabs import mark, slab_tables
 from translucent.bench.page.swatch import swatch
 from translucent.bench.page.theme import css_variables
 from translucent.bench.record import CaseRecord, Report
@@ -55,6 +56,7 @@ def build_page(report: Report) -> str:
             {"axis": axis, "label": AXES[axis], "series": group, "svg": Markup(scaling_svg(axis, group))}
             for axis, group in axis_groups(report.scaling).items()
         ],
+        slabs=slab_tables(report.slabs),
         scale=scale_colors(),
         good_enough=GOOD_ENOUGH,
         worst=WORST,
@@ -83,12 +85,14 @@ def _environment() -> Any:
         ratio=numbers.ratio_text,
         ms=numbers.ms_text,
         share=numbers.share_text,
+        change=numbers.change_text,
+        signed_share=numbers.signed_share_text,
         count=numbers.count_text,
         rounded=numbers.rounded_text,
         data=data_address,
         seen=seen_words,
     )
-    environment.globals.update(swatch=swatch)
+    environment.globals.update(swatch=swatch, mark=mark)
     return environment
 
 
@@ -110,6 +114,7 @@ def _case(case: CaseRecord, name: str) -> dict[str, Any]:
         "picture_columns": _columns(len(case.pictures)),
         "measured": [row for row in case.rows if row.refusal is None and row.failure is None],
         "refused": _refusals(case),
+        "scattered": [row for row in case.rows if row.light is not None],
         "failed": [row for row in case.rows if row.failure is not None],
         "errors": [
             (row, quantity, row.errors(quantity))

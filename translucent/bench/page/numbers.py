@@ -52,6 +52,16 @@ def share_text(value: float | None) -> str:
     return "< 0.01 %" if value < 1e-4 else f"{100 * value:.2f} %" if value < 0.09995 else f"{100 * value:.1f} %"
 
 
+def signed_share_text(value: float) -> str:
+    """A share in percent with its sign: ``+3.2 %``."""
+    return f"{100 * value:+.1f} %".replace("-", "−")
+
+
+def change_text(value: float) -> str:
+    """A difference of shares with its sign: ``+0.012``."""
+    return f"{value:+.3f}".replace("-", "−")
+
+
 def count_text(value: float | None) -> str:
     """A whole number, in groups of three."""
     return "–" if value is None else f"{value:,.0f}".replace(",", "\u202f")

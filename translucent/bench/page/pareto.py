@@ -30,6 +30,10 @@ UNITS: Mapping[Quantity, str] = {
 #: Error at which smaller ones, and those of zero, are drawn.
 _ZERO = 1e-9
 _SYMBOL = 9.0
+_STARS = ("*", (4, 1, 0), (6, 1, 0))  # their points are thin
+
+#: Errors down to which plots go at least: to what float32 is good for, or to what a path traced truth can tell.
+_LEAST, _LEAST_BY_PATHS = 1e-7, 5e-3
 
 
 def plotted(case: CaseRecord) -> list[Row]:
@@ -65,7 +69,7 @@ def pareto_svg(
     rows = plotted(case)
     figure, axes = new_figure(*size)
     coordinates = np.array([_coordinates(row, case.quantity) for row in rows])
-    _scale(axes, coordinates)
+    _scale(axes, coordinates, _LEAST if case.truth_noise is None else _LEAST_BY_PATHS)
     axes.set_xlabel("time ÷ time of a depth-only pass over the same triangles")
     axes.set_ylabel(f"RMS error {UNITS[case.quantity]}")
     _guides(axes, case)
@@ -112,11 +116,11 @@ def _floor_ms(case: CaseRecord) -> float | None:
     return next((row.wall.median for row in case.rows if row.kind == "floor" and row.wall is not None), None)
 
 
-def _scale(axes: Axes, coordinates: np.ndarray) -> None:
-    """Logarithmic axes with room for labels, over a decade at least."""
+def _scale(axes: Axes, coordinates: np.ndarray, least: float) -> None:
+    """Logarithmic axes with room for labels, over a decade at least, and down to an error."""
     low, high = coordinates.min(axis=0), coordinates.max(axis=0)
     left, right = min(low[0], 1.0) / 1.35, max(high[0], 2.0) * 1.5
-    bottom, top = min(low[1], 1e-7) / 2.5, max(high[1], 1e-2) * 3
+    bottom, top = min(low[1], least) / 2.5, max(high[1], 1e-2) * 3
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(left, right)
@@ -201,8 +205,9 @@ def _symbol(axes: Axes, row: Row, point: np.ndarray, gid: str) -> None:
         )
     axes.plot(
         *point,
-        style.marker,
-        markersize=_SYMBOL + (3 if style.marker == "*" else 0),
+        linestyle="none",
+        marker=style.marker,
+        markersize=_SYMBOL + (3 if style.marker in _STARS else 0),
         markerfacecolor=color if filled else placeholder("paper"),
         markeredgecolor=placeholder("paper") if filled else color,
         markeredgewidth=0.6 if filled else 1.6,

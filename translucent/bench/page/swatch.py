@@ -29,7 +29,7 @@ def swatch(family: str, filled: bool = True) -> Markup:
     )
 
 
-def _path(marker: str) -> str:
+def _path(marker: str | tuple[int, int, int]) -> str:
     from matplotlib.markers import MarkerStyle
 
     shape = MarkerStyle(marker)

@@ -26,10 +26,10 @@ COLORS = {
 
 @dataclass(frozen=True)
 class Style:
-    """Style of a family: the name of its color, and a symbol of matplotlib."""
+    """Style of a family: the name of its color, and a symbol of matplotlib, as (points, 1, turn) a star."""
 
     color: str
-    marker: str
+    marker: str | tuple[int, int, int]
 
 
 FAMILIES = {
@@ -44,6 +44,12 @@ FAMILIES = {
     "TracedInterfaces": Style("green", "d"),
     "ScreenInterfaces": Style("sky", "<"),
     "FrontInterface": Style("orange", ">"),
+    "Diffusion": Style("green", "8"),
+    "ScatteringLayer": Style("blue", (4, 1, 0)),
+    "SingleScattering": Style("pink", (6, 1, 0)),
+    "layer without inner mirrors": Style("vermilion", "1"),
+    "Burley's normalized diffusion": Style("orange", "x"),
+    "Frostbite's translucency": Style("olive", "+"),
     "constant thickness": Style("vermilion", "X"),
     "sphere assumption": Style("vermilion", "p"),
     "cpu backend": Style("muted", "h"),

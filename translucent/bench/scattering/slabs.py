@@ -1,0 +1,117 @@
+"""Slabs in diffuse light: what diffusion and the layer make of them, against adding and doubling."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+
+from translucent.arrays import Array
+from translucent.bench.record import Slab
+from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.solution import BodySystem
+from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.formulas.two_stream import (
+    mirrored_reflectance,
+    mirrored_transmittance,
+    two_stream_absorption,
+    two_stream_reflectance,
+    two_stream_scattering,
+    two_stream_transmittance,
+)
+from translucent.geometry.mesh import Mesh
+from translucent.geometry.solids import Box
+from translucent.media.medium import Medium
+from translucent.planning.scattering import Diffusion
+from translucent.planning.scattering.choice import given_back
+from translucent.reference import slabs
+from translucent.scene.camera import Camera
+from translucent.scene.scene import Object, Scene
+
+#: What the table has: a medium holds three optical depths, one in each channel.
+ALBEDOS = (0.5, 0.8, 0.9, 0.99, 0.999, 0.9999)
+DEPTHS = ((0.5, 1.0, 2.0), (4.0, 8.0, 16.0), (32.0, 64.0, 100.0))
+ANISOTROPIES = (0.0, 0.5, 0.9)
+INDICES = (1.0, 1.5)
+
+#: Half of the width of the slab, and of the part in its middle that is looked at, in thicknesses.
+HALF_WIDTH, MIDDLE = 4.0, 1.0
+
+
+def measure_slabs(*, quick: bool) -> tuple[Slab, ...]:
+    """Slabs of all parameters; `quick` every other albedo, and those that scatter isotropically alone."""
+    return tuple(
+        one
+        for ior in INDICES
+        for anisotropy in (ANISOTROPIES[:1] if quick else ANISOTROPIES)
+        for albedo in (ALBEDOS[::2] if quick else ALBEDOS)
+        for depths in DEPTHS
+        for one in _measured(albedo, np.array(depths), anisotropy, ior)
+    )
+
+
+@np.errstate(under="ignore")
+def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> list[Slab]:
+    """Slabs, a metre thick, of three optical depths."""
+    medium = Medium((1.0 - albedo) * depths, albedo * depths, anisotropy=anisotropy, ior=ior)
+    layer, diffused = _layer(medium), _diffused(medium)
+    found = []
+    for i, depth in enumerate(depths.tolist()):
+        whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
+        passing = slabs.unscattered_shares(depth, ior)
+        ways = [(float(way[0, i]) + passing[0], float(way[1, i]) + passing[1]) for way in (diffused, layer)]
+        planned = _planned(albedo, depth, anisotropy, ior)
+        found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, ways[0], ways[1], planned))
+    return found
+
+
+def _layer(medium: Medium) -> Array:
+    """(2, 3): reflectance and transmittance of `ScatteringLayer`, of light that has been scattered.
+
+    The same as ``scattered_out`` in ``shaders/shade/interface_light.glsl``, for the light that enters from all sides.
+    """
+    bare = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
+    back, through = two_stream_reflectance(*bare), two_stream_transmittance(*bare)
+    mirror = diffuse_interface(medium.ior).reflected
+    all_back, all_through = (share(back, through, mirror) for share in (mirrored_reflectance, mirrored_transmittance))
+    seen = np.minimum([slabs.entering_transmittance(float(depth), medium.ior) for depth in medium.extinction], through)
+    return np.maximum(
+        [all_back - seen * mirror * all_through, all_through - seen * (1.0 - mirror + mirror * all_back)], 0.0
+    )
+
+
+def _diffused(medium: Medium) -> Array:
+    """(2, 3): reflectance and transmittance of `Diffusion`, of light that has been scattered."""
+    grid = _grid()
+    top, bottom = grid.face_normals[:, 1] > 0.9, grid.face_normals[:, 1] < -0.9
+    middle = np.abs(grid.points[:, [0, 2]]).max(axis=1) < MIDDLE
+    flux = np.repeat(top.astype(np.float64)[:, None], 3, axis=1)
+    from_itself = sparse.csr_array((len(flux), len(flux)))
+    found = BodySystem(grid, medium, 0.0).solved(flux, from_itself, np.zeros((grid.count, 3)))
+    leaving = np.stack([found.fluence[side & middle].mean(axis=0) for side in (top, bottom)])
+    return diffuse_interface(medium.ior).exit_share * leaving
+
+
+def _body(medium: Medium) -> Object:
+    return Object(_mesh(), medium)
+
+
+@cache
+def _mesh() -> Mesh:
+    return Box((-HALF_WIDTH, -0.5, -HALF_WIDTH), (HALF_WIDTH, 0.5, HALF_WIDTH)).tessellate()
+
+
+@cache
+def _grid() -> BodyGrid:
+    body = _body(Medium(scattering=1.0))
+    return body_grid(body, Diffusion().cell_size(body))
+
+
+def _planned(albedo: float, depth: float, anisotropy: float, ior: float) -> Literal["diffusion", "layer", "none"]:
+    """What the planner takes for such a slab of one optical depth."""
+    body = _body(Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
+    scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
+    back = given_back(scene, None)
+    return "diffusion" if back.diffused else "layer" if back.layered else "none"
