@@ -12,10 +12,11 @@ from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces,
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
 from translucent.planning.limits import marching_method, mesh_limits, open_limits
-from translucent.planning.methods import DepthPeeling, FragmentLists, Method, SignedDepth, ThinLayer
+from translucent.planning.methods import DepthPeeling, FragmentLists, Method, PathTraced, SignedDepth, ThinLayer
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.paths import check_paths, straight_scene, with_paths
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering, SingleScattering
 from translucent.planning.scattering.choice import check_scattering, given_back, shown
@@ -55,6 +56,9 @@ def plan(
     check_interfaces(interfaces)
     check_scattering(scattering)
     capabilities = capabilities or Capabilities()
+    if isinstance(method, PathTraced):
+        check_paths(scene, method, capabilities, interfaces, scattering)
+        return with_paths(scene, method, plan(straight_scene(scene), None, capabilities))
     if back := given_back(scene, scattering, layers=capabilities.opengl):
         once = SingleScattering()
         found = plan(shown(scene, back), method, capabilities, interfaces=interfaces, scattering=once)
@@ -146,6 +150,9 @@ def plan_over_backdrop(
             f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
             "leave them out, or to whoever draws the backdrop",
         )
+    if isinstance(method, PathTraced):
+        found = "what is drawn elsewhere has no mesh that a path could meet"
+        raise InputError(f"{method} before a backdrop", found, "leave out one of the two")
     check_interfaces(interfaces)
     if interfaces is not None and interfaces.traced:
         found = "what is drawn elsewhere has no mesh that a ray could meet"
