@@ -316,12 +316,23 @@ def method_option(command: F) -> F:
     return click.option("--method", "method_name", cls=_MethodOption, metavar="NAME")(command)
 
 
-def read_method(name: str | None, thickness: str | None) -> Method | None:
+def paths_option(command: F) -> F:
+    """Option for the number of random paths."""
+    told = "Of --method path-traced: random paths of each pixel. Default: 64. Four times as many halve the noise."
+    return click.option("--paths", type=int, metavar="N", help=told)(command)
+
+
+def read_method(name: str | None, thickness: str | None, paths: int | None = None) -> Method | None:
     """Thickness method of this name, if one is given."""
     from translucent.planning.methods import METHODS, method_from_name
     from translucent.units import parse_length
 
     method = method_from_name(name) if name else None
+    if paths is not None:
+        if method is None or not method.follows_paths:
+            names = " or ".join(name for name, known in METHODS.items() if known.follows_paths)
+            raise InputError("--paths", f"only --method {names} takes it", f"add --method {names}")
+        method = method.with_paths(paths)
     if thickness is None:
         return method
     if method is None or not method.makes_sheets:

@@ -12,6 +12,7 @@ from translucent.commands.common import (
     interface_options,
     medium_options,
     outside_option,
+    paths_option,
     read_any_medium,
     read_interfaces,
     read_method,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 @unit_option
 @outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
+@paths_option
 @interface_options
 @scattering_options
 @common_options
@@ -51,6 +53,7 @@ def explain(
     unit: str,
     allow_outside: bool,
     method_name: str | None,
+    paths: int | None,
     interfaces_name: str | None,
     interface_depth: int | None,
     interface_forks: int | None,
@@ -67,7 +70,7 @@ def explain(
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(None, preset_name)
     scene = read_scene(model, unit, medium, roughness=roughness, allow_outside=allow_outside)
-    method = read_method(method_name, None)
+    method = read_method(method_name, None, paths)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     scattering = read_scattering(scattering_name, diffusion_resolution)
     chosen = plan(scene, method, interfaces=interfaces, scattering=scattering) if scene.bodies else None

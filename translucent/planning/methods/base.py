@@ -103,6 +103,10 @@ class Method:
         """The method with that thickness, in metres, of faces that declare none; itself where it makes no sheets."""
         return self
 
+    def with_paths(self, paths: int) -> Method:
+        """The method with so many paths of each pixel; itself where it follows none."""
+        return self
+
 
 def check_count(what: str, value: object, most: int, *, least: int = 1, example: int = 8) -> None:
     """Raise `InputError` unless a value is a whole number from `least` to `most`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from translucent.errors import InputError
@@ -54,6 +54,10 @@ class PathTraced(Method):
             raise InputError(
                 f"PathTraced seed {self.seed!r}", "not a whole number in 0 to 2^32 - 1", "give for example 0"
             )
+
+    def with_paths(self, paths: int) -> PathTraced:
+        """The method with so many paths of each pixel."""
+        return replace(self, paths=paths)
 
     def check(self, scene: Scene) -> None:
         """Refuse what paths cannot follow: open bodies, layers, densities that vary, sheets that scatter or are rough."""
