@@ -30,6 +30,7 @@ uniform ivec2 tile_origin;   // of the texels in the picture, from its top left 
 uniform uint last_path;      // how many paths of each pixel are to end
 uniform int events;          // that are followed in this pass
 uniform float pass_number;
+uniform bool spread;         // paths start all over their pixels, and not at one place in them
 uniform bool all_closed;     // no solid has holes: what seems to leave through one passes an edge by rounding
 
 const int CHANNEL = 1;             // whose indices of refraction count
@@ -39,6 +40,13 @@ const float GOES_ON = 0.95;
 const float EDGE_ON = 1e-3;
 const uint MOST_DRAWN = 1u << 22;
 const float EYE_MARGIN = 1e-3;    // axial depth before the media at which paths begin
+
+// Place in the picture at which a path starts: an additive recurrence (Roberts 2018, "The unreasonable effectiveness of
+// quasirandom sequences").
+vec2 pixel_of(ivec2 texel, uint path) {
+    vec2 share = vec2(uvec2(path * 3242174889u, path * 2447445414u) >> 8u) / 16777216.0;
+    return vec2(texel) + (spread ? fract(share + 0.5) : 0.5 + frame_size.zw);
+}
 
 float largest_share(vec3 share) {
     return max(share.r, max(share.g, share.b));
@@ -366,7 +374,6 @@ void main() {
     read_bodies();
     ivec2 here = ivec2(gl_FragCoord.xy);
     ivec2 texel = here + tile_origin;
-    vec2 pixel = vec2(texel) + 0.5 + frame_size.zw;
     Statistics known = stored_statistics(here);
     uint drawn = texelFetch(path_counts, here, 0).y;
     float ended_in = texelFetch(path_spread, here, 0).w;
@@ -379,14 +386,15 @@ void main() {
     for (; event < most && !done; ++event) {
         if ((path.flags & FLAG_FOLLOWED) == 0u) {
             draws = Draws(draws.pixel, known.count, 0u);
-            begin_path(path, pixel, texel);
+            begin_path(path, pixel_of(texel, known.count), texel);
         }
+        vec2 pixel = pixel_of(texel, known.count);
         if (!path.ends) { follow(path, pixel, texel, draws); }
         bool broken = any(isnan(path.light)) || any(isinf(path.light)) || draws.count > MOST_DRAWN;
         if (path.ends || broken) {
             if (broken) { path.light = vec3(0.0); }
             // Where nothing was left to chance, all paths are the same.
-            uint count = draws.count == 0u ? last_path - known.count : 1u;
+            uint count = draws.count == 0u && !spread ? last_path - known.count : 1u;
             known.lost += path.lost || broken ? float(count) : 0.0;
             add_paths(known, path.light, count);
             path.flags = 0u;

@@ -22,7 +22,7 @@ class Progress:
 
     def __init__(self, what: str) -> None:
         self._what = what
-        self._begun = time.monotonic()
+        self._begun: tuple[float, float] | None = None
         self._told = 0.0
         self._terminal = sys.stderr.isatty()
         self._width = 0
@@ -30,18 +30,20 @@ class Progress:
     def __call__(self, share: float) -> None:
         """Tell the share, 0 to 1, if it is time."""
         now = time.monotonic()
-        spent = now - self._begun
+        # Shaders are compiled before the first share is known: that says nothing about the rest.
+        begun, least = self._begun = self._begun or (now, share)
+        spent = now - begun
         if share >= 1.0:
-            self._begun, self._told = now, 0.0  # of the next picture
+            self._begun, self._told = None, 0.0  # the next picture begins anew
             if self._width:
                 click.echo(f"\r{' ' * self._width}\r", nl=False, err=True)
                 self._width = 0
             return
         between = OFTEN if self._terminal else SELDOM
-        if share <= 0.0 or spent < PATIENCE or (self._told and now - self._told < between):
+        if share <= least or spent < PATIENCE or (self._told and now - self._told < between):
             return
         self._told = now
-        text = f"{self._what}: {share:.0%}, about {time_text(spent * (1.0 - share) / share)} left"
+        text = f"{self._what}: {share:.0%}, about {time_text(spent * (1.0 - share) / (share - least))} left"
         if self._terminal:
             click.echo(f"\r{text.ljust(self._width)}", nl=False, err=True)
             self._width = max(self._width, len(text))

@@ -226,6 +226,7 @@ class PathTracer:
         assert job.plan.paths is not None
         values = {
             "seed": job.plan.paths.seed,
+            "spread": job.samples > 1 and not job.features.has_opaque,
             "all_closed": all_closed(job.scene),
             "start_record": record_at_eye(job),
             "object_nodes": hierarchies.object_nodes,

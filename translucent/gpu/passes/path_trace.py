@@ -16,11 +16,17 @@ class PathTracePass:
         self._tracer = PathTracer(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Follow the paths that belong to this sample."""
+        """Follow the paths of this sample, or where nothing else depends on it those of all samples at once.
+
+        Opaque objects are drawn for each sample; paths that meet them first see that picture.
+        """
         assert job.plan.paths is not None
         paths = job.plan.paths.paths
-        last = paths * (job.sample + 1) // job.samples if job.averaging else paths
+        if job.features.has_opaque:
+            begun, last = (paths * (job.sample + i) // job.samples for i in range(2))
+        else:
+            begun, last = 0, 0 if job.sample < job.samples - 1 else paths
         if last > job.paths_traced:
             for progress in self._tracer.steps(job, last):
-                job.report((job.sample + progress.share) / job.samples)
+                job.report((begun + progress.share * (last - begun)) / paths)
         self._tracer.show(job)
