@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -85,28 +85,36 @@ class PathTracer:
         self._reflectance = reflectance_table(gl)
         self._unfinished = gl.query(samples=True)
         self._events = 4
+        self._rest = gl.framebuffer([gl.texture((1, 1), 1)])
 
-    def steps(self, job: FrameJob, last: int, seconds: float = PASS_SECONDS) -> Iterator[Progress]:
+    def steps(
+        self, job: FrameJob, last: int, *, spread: bool, seconds: float = PASS_SECONDS, tile: int = TILE
+    ) -> Generator[Progress, None, None]:
         """Follow paths of each pixel of a job from `job.paths_traced` on to before the `last`, a pass at a time.
 
-        Between two passes anything else may be drawn, as long as the job stays. Each leaves `Targets.paths` with what is
-        known of the tiles that are done.
+        Between two passes anything else may be drawn, as long as the job stays. `Targets.paths` has what is known of
+        tiles that are done.
 
         Parameters
         ----------
         job : FrameJob
         last : int
+        spread : bool
+            They start all over their pixels, rather than at the sample point of the job.
         seconds : float
             That a pass may take.
+        tile : int
+            Pixels along a side of a tile.
         """
         require_interfaces(job.gl.info)
         width, height = job.targets.size
-        corners = [(x, y) for y in range(0, height, TILE) for x in range(0, width, TILE)]
+        corners = [(x, y) for y in range(0, height, tile) for x in range(0, width, tile)]
         with ExitStack() as stack:
-            states = [self._state(stack, job) for _ in range(2)]
+            states = [self._state(stack, job, tile) for _ in range(2)]
             bodies, hierarchies, values = self._bodies(stack, job)
+            values["spread"] = spread
             for number, corner in enumerate(corners):
-                size = min(TILE, width - corner[0]), min(TILE, height - corner[1])
+                size = min(tile, width - corner[0]), min(tile, height - corner[1])
                 for part in self._tile(job, states, (bodies, hierarchies, values), corner, size, last, seconds):
                     yield Progress((number + part) / len(corners), False)
             job.paths_traced = last
@@ -199,9 +207,9 @@ class PathTracer:
         ended = float(np.frombuffer(data, np.uint32).mean(dtype=np.float64))
         return (ended - begun) / max(last - begun, 1)
 
-    def _state(self, stack: ExitStack, job: FrameJob) -> moderngl.Framebuffer:
+    def _state(self, stack: ExitStack, job: FrameJob, tile: int) -> moderngl.Framebuffer:
         width, height = job.targets.size
-        size = min(TILE, width), min(TILE, height)
+        size = min(tile, width), min(tile, height)
         try:
             textures = [self._gl.texture(size, 4, dtype="u4" if name in _UNSIGNED else "f4") for name in _STATE]
             framebuffer = self._gl.framebuffer(textures)
@@ -210,15 +218,13 @@ class PathTracer:
             raise RenderError(f"path tracing {width}x{height}", found, "render smaller") from error
         for resource in (framebuffer, *textures):
             stack.callback(resource.release)
-        stack.callback(job.targets.nothing().use)  # a released framebuffer must not be the bound one
+        stack.callback(self._rest.use)  # a released framebuffer must not be the bound one
         for texture in textures:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
         return framebuffer
 
-    def _bodies(
-        self, stack: ExitStack, job: FrameJob
-    ) -> tuple[moderngl.Texture, SceneHierarchies, dict[str, object]]:
-        """Texture of the objects, the hierarchies of their meshes, and the uniforms that are the same for all passes."""
+    def _bodies(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Texture, SceneHierarchies, dict[str, object]]:
+        """Texture of the objects, hierarchies of their meshes, and the uniforms that are the same for all passes."""
         hierarchies = job.resources.hierarchies.of(job.scene)
         rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
         bodies = self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4")
@@ -226,7 +232,6 @@ class PathTracer:
         assert job.plan.paths is not None
         values = {
             "seed": job.plan.paths.seed,
-            "spread": job.samples > 1 and not job.features.has_opaque,
             "all_closed": all_closed(job.scene),
             "start_record": record_at_eye(job),
             "object_nodes": hierarchies.object_nodes,

@@ -22,10 +22,13 @@ from translucent.gpu.context import GpuContext, adopt_context, open_context, req
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
+from translucent.gpu.passes.path_trace import PathTracePass
 from translucent.gpu.passes.present import PresentPass
+from translucent.gpu.path_tracer import PathTracer
 from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering.choice import shown
 from translucent.scene.backdrop import Backdrop
@@ -153,14 +156,28 @@ class GpuRenderer:
         scene = shown(scene, plan.given_back).with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
 
-    def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
+    def run(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
         self._timer.begin_frame()
-        self._run_passes(job, geometry_only=geometry_only)
+        self._run_passes(job, geometry_only=geometry_only, leave_out=leave_out)
 
-    def _run_passes(self, job: FrameJob, *, geometry_only: bool = False) -> None:
+    @property
+    def paths(self) -> PathTracer:
+        """Tracer of random paths, which `run` takes, too."""
+        step = self._pass(PathTracePass)
+        assert isinstance(step, PathTracePass)
+        return step.tracer
+
+    def noise(self, job: FrameJob) -> float:
+        """Root mean square of the standard error of a job's random paths so far, divided by their mean radiance."""
+        radiance, error, _ = _read_paths(job)
+        with np.errstate(under="ignore"):
+            mean, noise = radiance.mean(dtype=np.float64), np.square(error, dtype=np.float64).mean()
+        return float(np.sqrt(noise) / max(mean, np.finfo(np.float32).tiny))
+
+    def _run_passes(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
         for spec in job.plan.passes:
-            if geometry_only and not spec.geometry_passes:
+            if (geometry_only and not spec.geometry_passes) or spec.name in leave_out:
                 continue
             step = self._pass(PASSES[spec.name])  # compiles on first use, which is no part of the frame
             with self._timer.measure(spec.name):

@@ -31,7 +31,7 @@ def check_paths(
 
 
 def straight_scene(scene: Scene) -> Scene:
-    """The scene with media that only absorb, as much as theirs take away, and no interfaces: its thickness is the same."""
+    """The scene without interfaces, and with media that only absorb: thickness and optical depth are the same."""
     media = {id(body.medium): Medium(body.medium.extinction) for body in scene.bodies if body.medium is not None}
 
     def straight(body: Object) -> Object:

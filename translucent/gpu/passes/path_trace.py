@@ -10,10 +10,15 @@ from translucent.planning.passes import PassSpec
 
 
 class PathTracePass:
-    """Paths of each pixel, spread over the samples of a frame; see ``shaders/transport/path_trace.frag``."""
+    """Paths of each pixel, spread over the samples of a frame; see ``shaders/transport/path_trace.frag``.
+
+    Attributes
+    ----------
+    tracer : PathTracer
+    """
 
     def __init__(self, gl: moderngl.Context) -> None:
-        self._tracer = PathTracer(gl)
+        self.tracer = PathTracer(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the paths of this sample, or where nothing else depends on it those of all samples at once.
@@ -27,6 +32,6 @@ class PathTracePass:
         else:
             begun, last = 0, 0 if job.sample < job.samples - 1 else paths
         if last > job.paths_traced:
-            for progress in self._tracer.steps(job, last):
+            for progress in self.tracer.steps(job, last, spread=job.samples > 1 and not job.features.has_opaque):
                 job.report((begun + progress.share * (last - begun)) / paths)
-        self._tracer.show(job)
+        self.tracer.show(job)

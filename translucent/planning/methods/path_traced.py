@@ -18,7 +18,7 @@ MAX_PATHS = 1 << 20
 
 @dataclass(frozen=True)
 class PathTraced(Method):
-    """Random paths of light: all scattering, all interfaces, to an error that falls with the square root of their number.
+    """Random paths of light: all scattering, all interfaces; the error falls with the square root of their number.
 
     The estimator of `translucent.reference.path_trace` on the GPU, in float32: Fresnel and Snell by chance at
     interfaces, walks among the microfacets of rough ones (Heitz et al. 2016), free flights in media that scatter, with
@@ -60,7 +60,7 @@ class PathTraced(Method):
         return replace(self, paths=paths)
 
     def check(self, scene: Scene) -> None:
-        """Refuse what paths cannot follow: open bodies, layers, densities that vary, sheets that scatter or are rough."""
+        """Refuse open bodies, layers, densities that vary, and sheets that scatter or are rough."""
         if scene.scatters_ambient:
             found = "it stands for what paths find by themselves: light of the environment, and light scattered often"
             raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
@@ -96,7 +96,7 @@ class PathTraced(Method):
         notes = []
         bending = [body for body in scene.bodies if _bends(body)]
         if scene.lights and bending:
-            text = "light of point and directional lights that polished interfaces bend on its way: in media, as caustics"
+            text = "light of point and directional lights that polished interfaces bend: in media, and as caustics"
             notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
         surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
         if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:
