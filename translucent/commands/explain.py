@@ -12,10 +12,8 @@ from translucent.commands.common import (
     interface_options,
     medium_options,
     outside_option,
-    paths_option,
     read_any_medium,
     read_interfaces,
-    read_method,
     read_roughness,
     read_scattering,
     scattering_medium_options,
@@ -23,6 +21,7 @@ from translucent.commands.common import (
     unit_option,
 )
 from translucent.commands.console import echo
+from translucent.commands.method_options import paths_option, read_method
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:

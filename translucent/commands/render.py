@@ -13,14 +13,11 @@ from translucent.commands.common import (
     interface_options,
     look_options,
     medium_options,
-    method_option,
     outside_option,
     overwrite_option,
-    paths_option,
     read_any_medium,
     read_environment,
     read_interfaces,
-    read_method,
     read_roughness,
     read_scattering,
     read_size,
@@ -31,6 +28,7 @@ from translucent.commands.common import (
 )
 from translucent.commands.console import echo
 from translucent.commands.darkness import warn_if_black
+from translucent.commands.method_options import method_option, paths_option, read_method
 from translucent.commands.model import (
     DEFAULT_FOV,
     DEFAULT_UP,
