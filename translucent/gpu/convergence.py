@@ -8,7 +8,7 @@ from collections.abc import Generator
 import numpy as np
 
 from translucent.gpu.job import FrameJob
-from translucent.gpu.path_tracer import TILE, Progress
+from translucent.gpu.passes.path_trace import TILE, Progress
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan

@@ -22,9 +22,8 @@ from translucent.gpu.context import GpuContext, adopt_context, open_context, req
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
-from translucent.gpu.passes.path_trace import PathTracePass
+from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
-from translucent.gpu.path_tracer import PathTracer
 from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
