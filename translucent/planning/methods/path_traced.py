@@ -64,20 +64,36 @@ class PathTraced(Method):
         if scene.scatters_ambient:
             found = "it stands for what paths find by themselves: light of the environment, and light scattered often"
             raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
-        names = {
-            "not closed, so that paths do not know what they are in": [scene.objects[i] for i in open_bodies(scene)],
-            "the density varies, and free flights are drawn for even media": [
-                body for body in scene.bodies if body.density is not None
-            ],
-            "partly transparent layers are drawn over a picture": [body for body in scene.bodies if body.covers],
-            "a sheet that scatters": [body for body in _sheets(scene) if body.medium and body.medium.scatters],
-            "a sheet that is rough": [
-                body for body in _sheets(scene) if body.surface is not None and body.surface.roughness > 0.0
-            ],
-        }
-        for found, bodies in names.items():
+        sheets = [body for body in scene.bodies if body.sheet_thickness is not None]
+        refused: tuple[tuple[list[Object], str, str], ...] = (
+            (
+                [scene.objects[i] for i in open_bodies(scene)],
+                "not closed, so that paths do not know what they are in",
+                "close it, or declare it a sheet (sheet_thickness=...)",
+            ),
+            (
+                [body for body in scene.bodies if body.density is not None],
+                "the density varies, and free flights are drawn for even media",
+                "use tl.reference.path_trace(scene, size)",
+            ),
+            (
+                [body for body in scene.bodies if body.covers],
+                "partly transparent layers, which are drawn over a picture",
+                "leave them out, or use another method",
+            ),
+            (
+                [body for body in sheets if body.medium is not None and body.medium.scatters],
+                "a sheet that scatters",
+                "give it an inside, or use another method",
+            ),
+            (
+                [body for body in sheets if body.surface is not None and body.surface.roughness > 0.0],
+                "a sheet that is rough",
+                "use tl.reference.path_trace(scene, size)",
+            ),
+        )
+        for bodies, found, do in refused:
             if bodies:
-                do = "use tl.reference.path_trace for densities and rough sheets, or another method"
                 raise InputError(f"PathTraced of {object_names(bodies)}", found, do)
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
@@ -113,10 +129,6 @@ class PathTraced(Method):
             text = "shadows and mirror images on opaque objects: light reaches them through everything"
             notes.append(Note(NoteKind.SHADOWS, text))
         return tuple(notes)
-
-
-def _sheets(scene: Scene) -> list[Object]:
-    return [body for body in scene.bodies if body.sheet_thickness is not None]
 
 
 def _bends(body: Object) -> bool:
