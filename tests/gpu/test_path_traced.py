@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from pathlib import Path
 from types import ModuleType
@@ -21,12 +22,12 @@ Array = npt.NDArray[np.float64]
 
 CAMERA = tl.Camera.look_at((0.4, 0.5, 6.0), (0, 0, 0), fov_y=21)
 SIZE = (8, 8)
-BALL, CORE = Sphere().tessellate(10), Sphere(radius=0.6).tessellate(6)
+BALL, CORE = Sphere().tessellate(10), Sphere(radius=0.8).tessellate(6)
 FLOOR = Box((-3.0, -3.0, -4.0), (3.0, -1.05, 4.0)).tessellate()
 SUN = tl.DirectionalLight((0.3, -0.8, -0.5), 3.0)
 BLACK, WHITE = (tl.Environment.constant((level,) * 3) for level in (0.0, 1.0))
 SKY = tl.Environment.gradient((1.0, 0.5, 0.2), (0.1, 0.5, 1.0))
-SPECTRAL = tl.Medium(0.2, (0.5, 2.0, 5.0), (0.05, 0.1, 0.2), anisotropy=0.6)
+SPECTRAL = tl.Medium(0.1, (0.2, 2.0, 4.0), (0.05, 0.1, 0.2), anisotropy=0.8)
 GLASS = tl.Medium((0.1, 0.3, 0.6), ior=1.5)
 FROSTED = tl.Surface(roughness=0.6)
 
@@ -45,23 +46,23 @@ SCENES = {
         tl.Scene([ball(GLASS, FROSTED), tl.Object(FLOOR)], CAMERA, [SUN], SKY),
         80,
     ),
-    "milk": (tl.Scene([ball(tl.Medium((0.01, 0.1, 0.4), 4.0, anisotropy=0.7, ior=1.4))], CAMERA, [], WHITE), 40),
+    "milk": (tl.Scene([ball(tl.Medium((1.0, 2.0, 4.0), 4.0, anisotropy=0.7, ior=1.4))], CAMERA, [], WHITE), 40),
     "ball in a ball": (
         tl.Scene(
             [
                 ball(tl.Medium((0.1, 0.4, 0.9), ior=1.5)),
-                ball(tl.Medium((1.0, 0.5, 0.1), 1.0, 0.1, ior=1.2), mesh=CORE, priority=1),
+                ball(tl.Medium((1.0, 0.5, 0.1), 5.0, 0.1, ior=1.2), mesh=CORE, priority=1),
             ],
             CAMERA,
             [],
-            SKY,
+            SKY.with_background(tl.Environment.checkerboard((1.0, 0.4, 0.1), (0.1, 0.5, 0.9))),
             "priority",
         ),
         60,
     ),
     "two smokes, of two shapes": (
         tl.Scene(
-            [ball(SPECTRAL), ball(tl.Medium(0.5, (2.0, 1.0, 0.5), anisotropy=-0.5), mesh=CORE)],
+            [ball(SPECTRAL), ball(tl.Medium(0.1, (4.0, 2.0, 0.2), anisotropy=-0.8), mesh=CORE)],
             CAMERA,
             [SUN, tl.PointLight((2.0, 2.0, 3.0), 8.0)],
             BLACK,
@@ -98,8 +99,8 @@ def test_the_picture_is_that_of_the_reference(name: str, renderer: tl.Renderer) 
     quiet = variance.max(axis=2) <= 1e-12
     assert np.abs(difference[quiet]).max(initial=0.0) < 1e-5
     assert frame.valid.all()
-    np.testing.assert_allclose(frame.thickness, truth.thickness, atol=2e-5 * scene.diagonal)
-    assert np.abs(frame.transmittance - truth.transmittance).max() < 1e-5
+    assert np.median(np.abs(frame.thickness - truth.thickness)) < 1e-6 * scene.diagonal
+    assert np.median(np.abs(frame.transmittance - truth.transmittance)) < 1e-5
 
 
 def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
@@ -109,6 +110,22 @@ def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
     assert frame.standard_error is not None
     require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
     assert frame.standard_error.max() < 0.1
+
+
+def test_many_lamps_through_microfacets_are_a_furnace(renderer: tl.Renderer) -> None:
+    """A lossless cube in suns from everywhere: what its microfacets turn to them adds up to what white light shows."""
+    count = 30
+    up, turn = 1 - (2 * np.arange(count) + 1) / count, np.pi * (1 + math.sqrt(5)) * np.arange(count)
+    ways = np.stack([np.sqrt(1 - up**2) * np.cos(turn), up, np.sqrt(1 - up**2) * np.sin(turn)], axis=1)
+    suns = [tl.DirectionalLight(way, 4 * np.pi / count) for way in ways]
+    cube = tl.Object(Box().tessellate(), tl.Medium(ior=1.5), surface=tl.Surface(roughness=0.8))
+    camera = tl.Camera.look_at((2, 3, 4), (0, 0, 0), fov_y=2)
+    frame = renderer.render(tl.Scene([cube], camera, suns, BLACK), (4, 4), tl.PathTraced(6000))
+    assert frame.standard_error is not None
+    error = math.sqrt(np.square(frame.standard_error[..., 0], dtype=np.float64).sum()) / 16
+    assert error < 0.015
+    # And what the sum over so few directions is off.
+    assert abs(frame.radiance[..., 0].mean() - 1.0) < 4 * error + 0.02
 
 
 def test_seeds_differ_by_the_standard_error_which_falls_with_the_root_of_their_number(renderer: tl.Renderer) -> None:
