@@ -13,6 +13,7 @@ import pytest
 
 import translucent as tl
 from translucent import assets
+from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes import path_trace as path_tracer
 from translucent.planning.passes import PassName
@@ -46,7 +47,7 @@ SCENES = {
         tl.Scene([ball(GLASS, FROSTED), tl.Object(FLOOR)], CAMERA, [SUN], SKY),
         80,
     ),
-    "milk": (tl.Scene([ball(tl.Medium((1.0, 2.0, 4.0), 4.0, anisotropy=0.7, ior=1.4))], CAMERA, [], WHITE), 40),
+    "milk": (tl.Scene([ball(tl.Medium((1.0, 1.2, 1.5), 4.0, anisotropy=0.7, ior=1.4))], CAMERA, [], WHITE), 120),
     "ball in a ball": (
         tl.Scene(
             [
@@ -110,6 +111,19 @@ def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
     assert frame.standard_error is not None
     require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
     assert frame.standard_error.max() < 0.1
+
+
+def test_a_dark_pane_in_closed_form(renderer: tl.Renderer) -> None:
+    """What goes through carries so little that most of it ends by Russian roulette; the rest makes up for it."""
+    medium = tl.Medium((3.0, 4.0, 5.0), ior=1.5)
+    pane = tl.Object(Box((-50.0, -50.0, -0.5), (50.0, 50.0, 0.5)).tessellate(), medium)
+    camera = tl.Camera.look_at((0, 0, 6), (0, 0, 0), fov_y=0.01)
+    frame = renderer.render(tl.Scene([pane], camera, [], WHITE), (4, 4), tl.PathTraced(20_000))
+    assert frame.standard_error is not None
+    expected = slab_reflectance(0.04, medium.absorption) + slab_transmittance(0.04, medium.absorption)
+    error = np.sqrt(np.square(frame.standard_error, dtype=np.float64).sum(axis=(0, 1))) / 16
+    assert (error < 1e-3).all()
+    assert (np.abs(frame.radiance.mean(axis=(0, 1)) - expected) < 4 * error).all()
 
 
 def test_many_lamps_through_microfacets_are_a_furnace(renderer: tl.Renderer) -> None:
