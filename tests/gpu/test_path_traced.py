@@ -187,6 +187,21 @@ def test_passes_and_tiles_leave_no_trace(renderer: tl.Renderer, monkeypatch: pyt
     assert len(shares) > 9
 
 
+def test_loops_that_a_driver_cuts_short_are_gone_through_again(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With so many events in a pass that Mesa stops in their midst, after 65,535 turns of loops."""
+    dense = tl.Medium((0.1, 0.5, 2.0), (300.0, 200.0, 100.0), anisotropy=0.8, ior=1.4)
+    scene, size = tl.Scene([ball(dense)], CAMERA, [], SKY), (4, 4)
+    usual = renderer.render(scene, size, tl.PathTraced(4))
+    monkeypatch.setattr(path_tracer, "MOST_EVENTS", 1 << 20)
+    monkeypatch.setattr(renderer.gpu.paths, "_events", 1 << 20)
+    monkeypatch.setattr(path_tracer.PathTracer.steps, "__kwdefaults__", {"seconds": 1e9, "tile": path_tracer.TILE})
+    cut = renderer.render(scene, size, tl.PathTraced(4))
+    np.testing.assert_array_equal(usual.radiance, cut.radiance)
+    assert cut.valid.all()
+
+
 def test_paths_that_are_cut_short_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a limit on the random numbers of a path that light in milk exceeds."""
     shutil.copytree(assets._folder("shaders"), tmp_path / "shaders")
