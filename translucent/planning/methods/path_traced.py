@@ -64,35 +64,7 @@ class PathTraced(Method):
         if scene.scatters_ambient:
             found = "it stands for what paths find by themselves: light of the environment, and light scattered often"
             raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
-        sheets = [body for body in scene.bodies if body.sheet_thickness is not None]
-        refused: tuple[tuple[list[Object], str, str], ...] = (
-            (
-                [scene.objects[i] for i in open_bodies(scene)],
-                "not closed, so that paths do not know what they are in",
-                "close it, or declare it a sheet (sheet_thickness=...)",
-            ),
-            (
-                [body for body in scene.bodies if body.density is not None],
-                "the density varies, and free flights are drawn for even media",
-                "use tl.reference.path_trace(scene, size)",
-            ),
-            (
-                [body for body in scene.bodies if body.covers],
-                "partly transparent layers, which are drawn over a picture",
-                "leave them out, or use another method",
-            ),
-            (
-                [body for body in sheets if body.medium is not None and body.medium.scatters],
-                "a sheet that scatters",
-                "give it an inside, or use another method",
-            ),
-            (
-                [body for body in sheets if body.surface is not None and body.surface.roughness > 0.0],
-                "a sheet that is rough",
-                "use tl.reference.path_trace(scene, size)",
-            ),
-        )
-        for bodies, found, do in refused:
+        for bodies, found, do in _refusals(scene):
             if bodies:
                 raise InputError(f"PathTraced of {object_names(bodies)}", found, do)
 
@@ -135,3 +107,35 @@ def _bends(body: Object) -> bool:
     """Whether it has a polished interface that turns light."""
     polished = body.surface is None or body.surface.roughness == 0.0
     return body.has_interface and body.medium is not None and body.medium.ior != 1.0 and polished
+
+
+def _refusals(scene: Scene) -> tuple[tuple[list[Object], str, str], ...]:
+    """Bodies that paths cannot follow, by what they are, and what to do."""
+    sheets = [body for body in scene.bodies if body.sheet_thickness is not None]
+    return (
+        (
+            [scene.objects[i] for i in open_bodies(scene)],
+            "not closed, so that paths do not know what they are in",
+            "close it, or declare it a sheet (sheet_thickness=...)",
+        ),
+        (
+            [body for body in scene.bodies if body.density is not None],
+            "the density varies, and free flights are drawn for even media",
+            "use tl.reference.path_trace(scene, size)",
+        ),
+        (
+            [body for body in scene.bodies if body.covers],
+            "partly transparent layers, which are drawn over a picture",
+            "leave them out, or use another method",
+        ),
+        (
+            [body for body in sheets if body.medium is not None and body.medium.scatters],
+            "a sheet that scatters",
+            "give it an inside, or use another method",
+        ),
+        (
+            [body for body in sheets if body.surface is not None and body.surface.roughness > 0.0],
+            "a sheet that is rough",
+            "use tl.reference.path_trace(scene, size)",
+        ),
+    )
