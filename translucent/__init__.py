@@ -70,6 +70,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.planning.methods import DepthPeeling as DepthPeeling
     from translucent.planning.methods import FragmentLists as FragmentLists
     from translucent.planning.methods import KBuffer as KBuffer
+    from translucent.planning.methods import PathTraced as PathTraced
     from translucent.planning.methods import RayMarched as RayMarched
     from translucent.planning.methods import SignedDepth as SignedDepth
     from translucent.planning.methods import ThinLayer as ThinLayer
@@ -122,7 +123,7 @@ _NAMES = {
     "mesh_files": "load_mesh",
     "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
     "planning.scattering": "Diffusion ScatteringLayer SingleScattering",
-    "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer RayMarched SignedDepth ThinLayer",
+    "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer PathTraced RayMarched SignedDepth ThinLayer",
     "planning.plan": "plan",
     "planning.render_plan": "Capabilities RenderPlan",
     "renderer": "Renderer",

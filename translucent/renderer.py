@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeAlias, get_args
 from weakref import WeakKeyDictionary
@@ -145,6 +146,7 @@ class Renderer:
         transparent: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
 
@@ -154,7 +156,7 @@ class Renderer:
         size : (width, height)
             In pixels.
         method : Method, optional
-            How to find thickness; None lets the planner pick.
+            How to find thickness; None lets the planner pick. `PathTraced` makes the radiance by random paths, too.
         samples : int
             Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
             belong to the ray through the pixel center, as all do with 1.
@@ -171,6 +173,8 @@ class Renderer:
         scattering : Diffusion, ScatteringLayer or SingleScattering, optional
             How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
             back, or not at all; None lets the planner pick for each body.
+        progress : callable, optional
+            Takes the share of random paths that have ended, 0 to 1, some times a second: they may take long.
 
         Returns
         -------
@@ -200,6 +204,7 @@ class Renderer:
                 transparent=transparent,
                 interfaces=interfaces,
                 scattering=scattering,
+                progress=progress,
             )
         except BaseException as error:
             self._note_interruption(error)
@@ -219,32 +224,50 @@ class Renderer:
         transparent: bool,
         interfaces: Interfaces | None,
         scattering: Scattering | None,
+        progress: Callable[[float], None] | None,
     ) -> Frame:
-        if transparent:
-            return self._render_transparent(
-                scene, size, self.plan(scene, method, interfaces=interfaces, scattering=scattering), samples, backdrop
-            )
-        if backdrop is None:
-            return self._engine.render(
-                scene, size, self.plan(scene, method, interfaces=interfaces, scattering=scattering), samples
-            )
+        if transparent or backdrop is None:
+            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering)
+            if transparent:
+                return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
+            return self._run(scene, size, chosen, samples, progress)
         _check_backdrop(backdrop, size)
         chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering)
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
+    def _run(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        chosen: RenderPlan,
+        samples: int,
+        progress: Callable[[float], None] | None,
+    ) -> Frame:
+        engine = self._engine
+        if isinstance(engine, GpuRenderer):
+            return engine.render(scene, size, chosen, samples, report=progress)
+        return engine.render(scene, size, chosen, samples)
+
     def _render_transparent(
-        self, scene: Scene, size: tuple[int, int], chosen: RenderPlan, samples: int, backdrop: object
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        chosen: RenderPlan,
+        samples: int,
+        backdrop: object,
+        progress: Callable[[float], None] | None,
     ) -> Frame:
         if backdrop is not None:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
         before_black, before_white = (
-            self._engine.render(
+            self._run(
                 dataclasses.replace(
                     scene, environment=scene.environment.with_background(Environment.constant((level,) * 3))
                 ),
                 size,
                 chosen,
                 samples,
+                progress,
             )
             for level in (0.0, 1.0)
         )

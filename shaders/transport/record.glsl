@@ -71,15 +71,29 @@ int dominant_body(uvec4 record) {
 struct Filling {
     vec3 extinction;
     vec3 emission;
+    vec3 scattering;
 };
+
+#if !(ONE_OBJECT || PRIORITY)
+// Whether an entry fills the place: in a union, a medium does so once.
+bool counts_in(uvec4 record, int index) {
+#if UNION
+    float slot = traced_body(int(record_entry(record, index)) - 1).slot;
+    for (int k = 0; k < index; ++k) {
+        if (traced_body(int(record_entry(record, k)) - 1).slot == slot) { return false; }
+    }
+#endif
+    return true;
+}
+#endif
 
 // What fills a place.
 Filling filling_of(uvec4 record, int dominant) {
-    Filling sum = Filling(vec3(0.0), vec3(0.0));
+    Filling sum = Filling(vec3(0.0), vec3(0.0), vec3(0.0));
 #if ONE_OBJECT || PRIORITY
     if (dominant != AIR) {
         TracedBody body = traced_body(dominant);
-        sum = Filling(body.extinction, body.emission);
+        sum = Filling(body.extinction, body.emission, body.scattering);
     }
 #if ONE_OBJECT && !PRIORITY && !UNION
     // A body that fills a place twice absorbs twice.
@@ -87,21 +101,17 @@ Filling filling_of(uvec4 record, int dominant) {
     for (int i = 0; i < RECORD_SIZE; ++i) { turns += record_entry(record, i) != 0u ? 1 : 0; }
     sum.extinction *= float(turns);
     sum.emission *= float(turns);
+    sum.scattering *= float(turns);
 #endif
 #else
     for (int i = 0; i < RECORD_SIZE; ++i) {
         uint entry = record_entry(record, i);
         if (entry == 0u) { break; }
+        if (!counts_in(record, i)) { continue; }
         TracedBody body = traced_body(int(entry) - 1);
-#if UNION
-        bool counted = false;
-        for (int k = 0; k < i; ++k) {
-            counted = counted || traced_body(int(record_entry(record, k)) - 1).slot == body.slot;
-        }
-        if (counted) { continue; }
-#endif
         sum.extinction += body.extinction;
         sum.emission += body.emission;
+        sum.scattering += body.scattering;
     }
 #endif
     return sum;

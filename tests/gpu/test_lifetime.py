@@ -27,6 +27,7 @@ METHODS = (
     tl.FragmentLists(),
     tl.DepthPeeling(),
     tl.KBuffer(),
+    tl.PathTraced(2),
 )
 
 

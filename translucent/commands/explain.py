@@ -14,7 +14,6 @@ from translucent.commands.common import (
     outside_option,
     read_any_medium,
     read_interfaces,
-    read_method,
     read_roughness,
     read_scattering,
     scattering_medium_options,
@@ -22,6 +21,7 @@ from translucent.commands.common import (
     unit_option,
 )
 from translucent.commands.console import echo
+from translucent.commands.method_options import paths_option, read_method
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 @unit_option
 @outside_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
+@paths_option
 @interface_options
 @scattering_options
 @common_options
@@ -51,6 +52,7 @@ def explain(
     unit: str,
     allow_outside: bool,
     method_name: str | None,
+    paths: int | None,
     interfaces_name: str | None,
     interface_depth: int | None,
     interface_forks: int | None,
@@ -67,7 +69,7 @@ def explain(
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(None, preset_name)
     scene = read_scene(model, unit, medium, roughness=roughness, allow_outside=allow_outside)
-    method = read_method(method_name, None)
+    method = read_method(method_name, None, paths)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     scattering = read_scattering(scattering_name, diffusion_resolution)
     chosen = plan(scene, method, interfaces=interfaces, scattering=scattering) if scene.bodies else None

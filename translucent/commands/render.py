@@ -13,13 +13,11 @@ from translucent.commands.common import (
     interface_options,
     look_options,
     medium_options,
-    method_option,
     outside_option,
     overwrite_option,
     read_any_medium,
     read_environment,
     read_interfaces,
-    read_method,
     read_roughness,
     read_scattering,
     read_size,
@@ -30,6 +28,7 @@ from translucent.commands.common import (
 )
 from translucent.commands.console import echo
 from translucent.commands.darkness import warn_if_black
+from translucent.commands.method_options import method_option, paths_option, read_method
 from translucent.commands.model import (
     DEFAULT_FOV,
     DEFAULT_UP,
@@ -40,6 +39,7 @@ from translucent.commands.model import (
     require_translucent,
 )
 from translucent.commands.pictures import Pictures, picture_options
+from translucent.commands.progress import Progress
 from translucent.errors import InputError
 
 
@@ -62,6 +62,7 @@ from translucent.errors import InputError
 @click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
 @look_options
 @method_option
+@paths_option
 @interface_options
 @scattering_options
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
@@ -99,6 +100,7 @@ def render(
     tone: str,
     roughness: float | None,
     method_name: str | None,
+    paths: int | None,
     interfaces_name: str | None,
     interface_depth: int | None,
     interface_forks: int | None,
@@ -136,7 +138,7 @@ def render(
     pixels = read_size(size)
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(roughness, preset_name)
-    method = read_method(method_name, thickness)
+    method = read_method(method_name, thickness, paths)
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
     scene = read_scene(model, unit, medium, options, pixels, lit, roughness, allow_outside=allow_outside)
@@ -152,6 +154,7 @@ def render(
             transparent=transparent,
             interfaces=interfaces,
             scattering=scattering,
+            progress=Progress(f"path tracing on {renderer.provenance.get('renderer', 'the CPU')}"),
         )
         if opaque_with is not None:
             from translucent.interop.pyrender import render_scene

@@ -28,6 +28,9 @@ LAYER_ARRAYS = ("layers", "truncated")
 #: Additional arrays of frames without a background, and of bodies with interfaces.
 MATTE_ARRAYS = ("alpha", "normals")
 
+#: Additional array of frames of random paths.
+NOISE_ARRAYS = ("standard_error",)
+
 #: Largest exposure in stops, beyond which radiance would overflow float64 or be black.
 MAX_EXPOSURE = 100.0
 
@@ -63,6 +66,8 @@ class Frame:
     normals : (h, w, 3) float, optional
         Unit normals, in world axes, of the interfaces where rays enter bodies; 0 where there is none. Only of frames
         whose plan has interfaces.
+    standard_error : (h, w, 3) float, optional
+        Of the radiance, where it is a mean over random paths; None where it has no noise to be told.
     """
 
     radiance: npt.NDArray[Any]
@@ -78,6 +83,7 @@ class Frame:
     truncated: npt.NDArray[np.int32] | None = None
     alpha: npt.NDArray[Any] | None = None
     normals: npt.NDArray[Any] | None = None
+    standard_error: npt.NDArray[Any] | None = None
 
     def __repr__(self) -> str:
         covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())
@@ -91,7 +97,7 @@ class Frame:
     @property
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """The arrays that the frame has, by name."""
-        every = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS, *MATTE_ARRAYS)}
+        every = {name: getattr(self, name) for name in (*ARRAYS, *LAYER_ARRAYS, *MATTE_ARRAYS, *NOISE_ARRAYS)}
         return {name: array for name, array in every.items() if array is not None}
 
     def summary(self) -> dict[str, Any]:

@@ -89,6 +89,11 @@ class FrameFeatures:
         return self.plan.has(PassName.TRACED)
 
     @property
+    def path_traced(self) -> bool:
+        """Whether radiance is that of random paths."""
+        return self.plan.has(PassName.PATH_TRACE)
+
+    @property
     def finds_exits(self) -> bool:
         """Whether the intervals give each ray's first exit from all bodies: touching interfaces need it."""
         return self.has_surfaces and self.plan.method.finds_exits

@@ -223,13 +223,18 @@ class SceneHierarchies:
         medium, surface = body.medium or Medium(), body.surface or Surface()
         metres = 1.0 if sheet is None else sheet
         opaque = body.medium is None
+        extinction = bounded_extinction(medium, scene.diagonal)
+        with np.errstate(under="ignore"):
+            albedo = medium.scattering / np.where(medium.extinction > 0, medium.extinction, 1.0)
         return {
             "local_x": rows[0],
             "local_y": rows[1],
             "local_z": rows[2],
             "first_node": divmod(span.first, 1 << 12),
             "node_count": divmod(span.count, 1 << 12),
-            "extinction": metres * bounded_extinction(medium, scene.diagonal),
+            "extinction": metres * extinction,
+            "scattering": metres * extinction * albedo,
+            "anisotropy": medium.anisotropy,
             "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
             "emission": metres * np.asarray(medium.emission),
             "kind": _kind(body, sheet),

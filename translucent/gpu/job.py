@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import cached_property
 
 import moderngl
@@ -53,6 +54,10 @@ class FrameJob(SceneView):
         The samples of the frame are being summed up.
     sample, samples : int
         Number of the sample that is drawn, from 0, and how many are summed up; 0 of 1 at the pixel centers.
+    paths_traced : int
+        Random paths of each pixel that have ended so far.
+    report : callable
+        Takes the share of the frame's paths that have ended, now and then.
     covered : Part
         Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
         the bottom, as geometry is drawn.
@@ -72,6 +77,8 @@ class FrameJob(SceneView):
         self.backdrop = backdrop
         self.averaging = False
         self.sample, self.samples = 0, 1
+        self.paths_traced = 0
+        self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
         placed = PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
@@ -126,7 +133,8 @@ class FrameJob(SceneView):
     @property
     def picture(self) -> moderngl.Framebuffer:
         """Framebuffer whose first attachment is the frame's radiance."""
-        return self.targets.surfaced() if self.features.has_surfaces else self.targets.result()
+        apart = self.features.has_surfaces or self.features.path_traced
+        return self.targets.surfaced() if apart else self.targets.result()
 
     def sums_after(self, name: str) -> bool:
         """Whether the pass of this name adds a sample to the averages, in place of showing it."""
@@ -173,13 +181,13 @@ def _contents(
 ) -> dict[UniformBlock, bytes]:
     """Contents of the uniform blocks that are the same for all samples of a frame."""
     scene = placed.scene
-    shine = features.has_opaque or features.has_surfaces or features.has_layers
+    shine = features.has_opaque or features.has_surfaces or features.has_layers or features.path_traced
     contents = {
         SHADE: shade_uniforms(scene, balance),
         MEDIA: media_uniforms(placed, features.slots),
         LIGHTS: light_uniforms(scene, shine),
         ENVIRONMENT: environment_uniforms(scene.environment),
     }
-    if features.has_surfaces:
+    if features.has_surfaces or features.path_traced:
         contents[SURFACES] = surface_uniforms(placed, size)
     return contents

@@ -371,6 +371,8 @@ TRACED_BODY = PackedTable(
         ("one_sided", "f4", ()),
         ("rank", "f4", ()),  # the higher, the more it decides on the medium of a ray; 0: not at all
         ("slot", "f4", ()),  # the same for objects of one medium
+        ("anisotropy", "f4", ()),
+        ("scattering", "f4", (3,)),
     ),
 )
 

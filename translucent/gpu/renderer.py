@@ -6,7 +6,7 @@ import os
 import threading
 import time
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import moderngl
@@ -22,10 +22,12 @@ from translucent.gpu.context import GpuContext, adopt_context, open_context, req
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
+from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering.choice import shown
 from translucent.scene.backdrop import Backdrop
@@ -99,13 +101,16 @@ class GpuRenderer:
         plan: RenderPlan,
         samples: int,
         backdrop: Backdrop | TextureBackdrop | None = None,
+        report: Callable[[float], None] | None = None,
     ) -> Frame:
         """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples.
 
-        A plan over a backdrop needs it, in the size of the frame.
+        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of random paths that have
+        ended, now and then.
         """
         with self._alone(), self.context.current():
             job = self.prepare(scene, size, plan, backdrop)
+            job.report = report or job.report
             try:
                 self._timer.begin_frame()
                 if samples > 1:
@@ -150,14 +155,28 @@ class GpuRenderer:
         scene = shown(scene, plan.given_back).with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
 
-    def run(self, job: FrameJob, *, geometry_only: bool = False) -> None:
+    def run(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
         """Run the passes of the job's plan, each timed; `geometry_only` leaves out those over pixels."""
         self._timer.begin_frame()
-        self._run_passes(job, geometry_only=geometry_only)
+        self._run_passes(job, geometry_only=geometry_only, leave_out=leave_out)
 
-    def _run_passes(self, job: FrameJob, *, geometry_only: bool = False) -> None:
+    @property
+    def paths(self) -> PathTracer:
+        """Tracer of random paths, which `run` takes, too."""
+        step = self._pass(PathTracePass)
+        assert isinstance(step, PathTracePass)
+        return step.tracer
+
+    def noise(self, job: FrameJob) -> float:
+        """Root mean square of the standard error of a job's random paths so far, divided by their mean radiance."""
+        radiance, error, _ = _read_paths(job)
+        with np.errstate(under="ignore"):
+            mean, noise = radiance.mean(dtype=np.float64), np.square(error, dtype=np.float64).mean()
+        return float(np.sqrt(noise) / max(mean, np.finfo(np.float32).tiny))
+
+    def _run_passes(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
         for spec in job.plan.passes:
-            if geometry_only and not spec.geometry_passes:
+            if (geometry_only and not spec.geometry_passes) or spec.name in leave_out:
                 continue
             step = self._pass(PASSES[spec.name])  # compiles on first use, which is no part of the frame
             with self._timer.measure(spec.name):
@@ -177,6 +196,7 @@ class GpuRenderer:
         else:
             transmittance = _read_floats(result, 1, 3)
             radiance = _read_floats(job.picture, 0, 3)
+        radiance, standard_error, lost = _read_paths(job) if job.features.path_traced else (radiance, None, None)
         flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
         result.read_into(flags, components=1, attachment=4, alignment=1)
         optical_depth, thickness = _read_floats(result, 2, 3), _read_floats(result, 3, 1)
@@ -187,6 +207,8 @@ class GpuRenderer:
             # Rays that end inside a body, or in more of them than they can remember, have no right color.
             picture, whole = (job.targets.average(), samples) if samples > 1 else (job.targets.surfaced(), 1)
             sound = _read_floats(picture, 1, 4)[..., 3] >= np.float32(whole * (1.0 - MOST_LOST))
+        if lost is not None:
+            sound = lost <= MOST_LOST
         layers = truncated = None
         if job.plan.ordered:
             counts = _read_floats(job.targets.ordered(), 2, 4)[::-1]
@@ -202,6 +224,7 @@ class GpuRenderer:
             plan=job.plan,
             seconds=seconds,
             provenance=dict(self.provenance),
+            standard_error=standard_error,
             layers=layers,
             truncated=truncated,
             normals=_read_normals(job) if job.features.has_surfaces else None,
@@ -292,3 +315,13 @@ def _read_normals(job: FrameJob) -> npt.NDArray[np.float32]:
         found = _read_floats(job.targets.entered(), 0, 4)[::-1]
         np.copyto(normals, found[..., :3], where=found[..., 3:] < float(CONSTANTS["NOTHING"]))
     return normals
+
+
+def _read_paths(job: FrameJob) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """Radiance (h, w, 3) of random paths, its standard error, and the share (h, w) of them that were lost."""
+    count = job.paths_traced
+    known = job.targets.paths()
+    mean, squares = _read_floats(known, 0, 4), _read_floats(known, 1, 3)
+    with np.errstate(under="ignore"):
+        error = np.sqrt(squares / np.float32(count * (count - 1.0)))
+        return np.ascontiguousarray(mean[..., :3]), error, mean[..., 3] / np.float32(count)

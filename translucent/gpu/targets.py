@@ -83,6 +83,10 @@ class Targets:
         """RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer."""
         return self._get("average", (4, 4), with_depth=True)
 
+    def paths(self) -> moderngl.Framebuffer:
+        """RGBA32F means of random paths and how many were lost, and sums of squared differences from the means."""
+        return self._get("paths", (4, 4))
+
     def layers(self) -> moderngl.Framebuffer:
         """RGBA32F layers in front of all bodies, and those behind the first one on a ray."""
         return self._get("layers", (4, 4))

@@ -245,6 +245,12 @@ class Viewport:
             engine.context.drain()
         chosen.step += 1
 
+    def take(self, side: int, job: FrameJob) -> None:
+        """Show the picture of a job of the viewport's size in place of a side's samples."""
+        chosen = self._side(side, self.size)
+        self._add(job, chosen, (0, 0), first=True)
+        chosen.stride = 1
+
     def steps(self, side: int) -> int:
         """Number of samples that a side has."""
         found = self._sides[side]

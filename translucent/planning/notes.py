@@ -42,6 +42,7 @@ class NoteKind(StrEnum):
     OPAQUE_SURFACES = "opaque surfaces"
     LAYERS = "layers"
     GLOW = "glow"
+    TEXTURES = "textures"
     HOLES = "holes"
     INVISIBLE = "invisible"
     UNUSED_PRIORITIES = "unused priorities"

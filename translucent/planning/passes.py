@@ -27,12 +27,12 @@ class PassName(StrEnum):
     SURFACES = "surfaces"
     TRACED = "traced_interfaces"
     LAYERS = "layers"
+    PATH_TRACE = "path_trace"  # also without OpenGL
 
     # Without OpenGL.
     INTERSECT = "intersect"
     SHADE = "shade"
     MARCH = "march"
-    PATH_TRACE = "path_trace"
 
     # Printed as the word that it is, also where frames show their seconds.
     __repr__ = str.__repr__

@@ -13,10 +13,19 @@ from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces,
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
 from translucent.planning.limits import LEAST_STEPS, marching_method, mesh_limits, open_limits
-from translucent.planning.methods import DepthPeeling, FragmentLists, Method, RayMarched, SignedDepth, ThinLayer
+from translucent.planning.methods import (
+    DepthPeeling,
+    FragmentLists,
+    Method,
+    PathTraced,
+    RayMarched,
+    SignedDepth,
+    ThinLayer,
+)
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.order import why_order_matters
 from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.paths import check_paths, straight_scene, with_paths
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering, SingleScattering
 from translucent.planning.scattering.choice import check_scattering, given_back, shown
@@ -56,6 +65,9 @@ def plan(
     check_interfaces(interfaces)
     check_scattering(scattering)
     capabilities = capabilities or Capabilities()
+    if isinstance(method, PathTraced):
+        check_paths(scene, method, capabilities, interfaces, scattering)
+        return with_paths(scene, method, plan(straight_scene(scene), None, capabilities))
     opengl = capabilities.opengl
     # Where nothing bends, a method that is asked for is the sum that is asked for, of light scattered once; and ambient
     # light stands for what is scattered often.
@@ -67,8 +79,8 @@ def plan(
         return with_given_back_told(found, scene, back)
     if scene.scatters_ambient:
         emitted = scene.with_ambient_emitted
-        once = scattering or SingleScattering()
-        return with_ambient_told(plan(emitted, method, capabilities, interfaces=interfaces, scattering=once))
+        shown_once = scattering or SingleScattering()
+        return with_ambient_told(plan(emitted, method, capabilities, interfaces=interfaces, scattering=shown_once))
     if not scene.bodies:
         raise InputError(
             f"rendering {object_names(scene.objects)}",
@@ -155,6 +167,9 @@ def plan_over_backdrop(
             f"the scene has opaque objects of its own: {object_names(scene.opaque)}",
             "leave them out, or to whoever draws the backdrop",
         )
+    if isinstance(method, PathTraced):
+        found = "what is drawn elsewhere has no mesh that a path could meet"
+        raise InputError(f"{method} before a backdrop", found, "leave out one of the two")
     check_interfaces(interfaces)
     if interfaces is not None and interfaces.traced:
         found = "what is drawn elsewhere has no mesh that a ray could meet"

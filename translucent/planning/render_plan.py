@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from translucent.planning.interfaces import Interfaces
-from translucent.planning.methods import Method
+from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.scattering.choice import NOTHING_GIVEN_BACK, GivenBack
@@ -54,6 +54,8 @@ class RenderPlan:
     traced : bool
         Rays are traced on the processors, which finds all surfaces on each. Of the `method` only one thing counts
         then: whether bodies are sheets.
+    paths : PathTraced, optional
+        The random paths that make the radiance, in place of interfaces and of what is given back; None where none do.
     """
 
     method: Method
@@ -64,10 +66,13 @@ class RenderPlan:
     interfaces: Interfaces | None = None
     given_back: GivenBack = NOTHING_GIVEN_BACK
     traced: bool = False
+    paths: PathTraced | None = None
 
     @property
     def runs(self) -> str:
-        """Description of how thickness is found: the method, or the ray tracing in place of it."""
+        """Description of how thickness is found: the method, or the ray tracing in place of it; and of random paths."""
+        if self.paths is not None:
+            return f"{self.paths}, thickness by {self.method}"
         if not self.traced:
             return str(self.method)
         what = "all surfaces on each ray, in float64"

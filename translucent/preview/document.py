@@ -130,6 +130,8 @@ class Display:
         Measure against the reference while the view is still, and show that reference in a corner.
     antialias : bool
         Refine the edges while the view is still.
+    converge : bool
+        Path trace the picture while the view is still.
     unit : str
         In which lengths are shown.
     """
@@ -142,7 +144,13 @@ class Display:
     split: float = 0.5
     inset: bool = True
     antialias: bool = True
+    converge: bool = False
     unit: str = "mm"
+
+    @property
+    def converges(self) -> bool:
+        """Whether a still picture is path traced: there is one, and nothing beside it."""
+        return self.converge and self.mode == "picture" and self.compare == "off"
 
 
 @dataclass(frozen=True)
@@ -192,7 +200,8 @@ class _Range:
     words: tuple[str, ...] = ()
 
 
-_METHODS = (AUTO, *METHODS)
+#: Methods of pictures that move: those of random paths are seen by `Display.converge`.
+METHOD_NAMES = (AUTO, *(name for name, method in METHODS.items() if not method.follows_paths))
 _POSITIVE = _Range(0.0, 1e12, above=True)
 
 #: Ranges of fields that cannot hold every value of their type, by section and name.
@@ -216,8 +225,8 @@ RANGES: dict[str, _Range] = {
     "look.light_yaw": _Range(-1e6, 1e6),
     "look.light_pitch": _Range(-MAX_PITCH, MAX_PITCH),
     "look.light_irradiance": _Range(0.0, MAX_RADIANCE),
-    "display.method": _Range(words=_METHODS),
-    "display.method_b": _Range(words=_METHODS),
+    "display.method": _Range(words=METHOD_NAMES),
+    "display.method_b": _Range(words=METHOD_NAMES),
     "display.scattering": _Range(words=(AUTO, *SCATTERINGS)),
     "display.mode": _Range(words=get_args(Mode)),
     "display.compare": _Range(words=get_args(Compare)),

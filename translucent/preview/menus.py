@@ -17,6 +17,7 @@ HELP = (
     ("wheel", "zoom to the cursor"),
     ("F", "frame the model, or what was clicked"),
     ("O", "orthographic or perspective"),
+    ("C", "converge: path trace the still picture"),
     ("L drag", "move the light"),
     ("E drag", "turn the environment"),
     ("Ctrl Z, Ctrl Y", "undo, redo"),

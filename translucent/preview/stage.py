@@ -20,6 +20,7 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
+from translucent.preview.converging import Converging
 from translucent.preview.diffusing import Diffusing
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of, scattering_of
@@ -64,6 +65,8 @@ class Stage:
         Why the picture is not what it should be, or nothing.
     shader_problem : str
         The compiler's message, while the last good shaders go on.
+    converging : Converging
+        Paths of the still picture.
     simpler : str
         What is drawn more simply while the picture moves, and why, or nothing.
     drawing : float
@@ -85,9 +88,8 @@ class Stage:
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
         self.problem = self.shader_problem = self.simpler = ""
-        self.drawing = 0.0
+        self.drawing, self._begun = 0.0, False
         self._moving: RenderPlan | None = None
-        self._begun = False
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._asked: Task | None = None
@@ -96,9 +98,8 @@ class Stage:
         self._strides = [4, 4]
         self._truth: Truth | None = None
         self._scattering: Scattering | None = None
-        self._diffusing = Diffusing()
-        self._watched = time.monotonic()
-        self._newest = newest_shader()
+        self._diffusing, self.converging = Diffusing(), Converging()
+        self._watched, self._newest = time.monotonic(), newest_shader()
 
     def current(self) -> AbstractContextManager[Any]:
         """Context manager that makes the context current: a window's always is."""
@@ -138,13 +139,14 @@ class Stage:
         self.viewport.resize(size)
         if scene is None:
             return False
-        material = workspace.document.material
+        material, both = workspace.document.material, display.compare == "method"
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
-        both = display.compare == "method"
         scattering = self._scattering = self._known_scattering(workspace, scene, methods[0])
         wanted = (scene, methods[0], methods[1] if both else None, scattering, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             return True
+        if (not display.converges or wanted != self._shown) and self.converging.stop():
+            self._shown = ()  # the interactive picture is drawn again
         fresh = wanted != self._shown
         if not fresh:
             self._begin(workspace, scene)
@@ -166,9 +168,11 @@ class Stage:
                 return self._draw_at_once(scene, methods[0], workspace)
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
-        drawn = any(self._step(side, scene, display.antialias) for side in sides)
+        more = drawn = any(self._step(side, scene, display.antialias) for side in sides)
+        if display.converges and not drawn:
+            more, drawn = self.converging.step(scene, self.renderer, self.viewport, BUDGET)
         self._present(workspace, scene, changed=drawn)
-        return drawn
+        return more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
@@ -311,7 +315,7 @@ class Stage:
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
-        return [plan for plan in (*self.plans, self._moving) if plan is not None]
+        return [plan for plan in (*self.plans, self._moving, self.converging.plan) if plan is not None]
 
     def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Request missing programs; until they are there, the same picture is not tried again."""
@@ -377,6 +381,7 @@ class Stage:
         workspace.tell("info", "shaders reloaded")
 
     def _take_over(self, fresh: Renderer) -> None:
+        self.converging.stop()
         size, self.shader_problem = self.viewport.size, ""
         self.viewport.release()
         self.renderer.close()
@@ -388,6 +393,7 @@ class Stage:
     def close(self) -> None:
         """Free all resources."""
         with self.current():
+            self.converging.stop()
             self.viewport.release()
             self.renderer.close()
         if self._own is not None:

@@ -16,6 +16,7 @@ from translucent.gpu.passes.k_buffer import KBufferPass
 from translucent.gpu.passes.layers import LayersPass
 from translucent.gpu.passes.light_views import LightViewsPass
 from translucent.gpu.passes.opaque import OpaquePass
+from translucent.gpu.passes.path_trace import PathTracePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.surfaces import SurfacesPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
@@ -53,4 +54,5 @@ PASSES: dict[PassName, type[Pass]] = {
     PassName.SURFACES: SurfacesPass,
     PassName.TRACED: TracedInterfacesPass,
     PassName.LAYERS: LayersPass,
+    PassName.PATH_TRACE: PathTracePass,
 }

@@ -64,7 +64,7 @@ class TracedInterfacesPass:
         blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        record = _record_at_eye(job)
+        record = record_at_eye(job)
         gl.enable_only(blending)
         if not any(record):
             self._no_interface.draw(job, framebuffer, blending)
@@ -83,7 +83,7 @@ class TracedInterfacesPass:
         values = {
             "faintest_share": faintest_share(forks),
             "most_interfaces": depth,
-            "all_closed": _all_closed(job.scene),
+            "all_closed": all_closed(job.scene),
             "start_record": record,
             "sample_number": job.sample,
             "blurred_share": blurred_share(job.samples),
@@ -167,12 +167,12 @@ def blurred_share(samples: int) -> float:
     return 1.0 if samples < FEW_SAMPLES else float(samples**-0.15)
 
 
-def _all_closed(scene: Scene) -> bool:
+def all_closed(scene: Scene) -> bool:
     """Whether rays can leave each solid only through its surface."""
     return all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
 
 
-def _record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
+def record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
     """The bodies that contain the eye, as the shader keeps them."""
     entries = [
         number + 1

@@ -10,6 +10,7 @@ from translucent.planning.methods.base import Method
 from translucent.planning.methods.depth_peeling import DepthPeeling
 from translucent.planning.methods.fragment_lists import FragmentLists
 from translucent.planning.methods.k_buffer import KBuffer
+from translucent.planning.methods.path_traced import PathTraced
 from translucent.planning.methods.ray_marched import RayMarched
 from translucent.planning.methods.signed_depth import SignedDepth
 from translucent.planning.methods.thin_layer import ThinLayer
@@ -21,6 +22,7 @@ __all__ = [
     "FragmentLists",
     "KBuffer",
     "Method",
+    "PathTraced",
     "RayMarched",
     "SignedDepth",
     "ThinLayer",
@@ -30,7 +32,7 @@ __all__ = [
 #: Names on the command line.
 METHODS: dict[str, type[Method]] = {
     method.name: method
-    for method in (SignedDepth, BackFaceDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched)
+    for method in (SignedDepth, BackFaceDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched, PathTraced)
 }
 
 

@@ -46,6 +46,9 @@ class Method:
         Draws the geometry again for every layer or two.
     marches : bool
         Steps through the intervals, so that what fills them may vary.
+    follows_paths : bool
+        Follows random paths of light, in place of all that shows interfaces and scattering; thickness is found by
+        another method.
     """
 
     name: ClassVar[str] = ""
@@ -59,6 +62,7 @@ class Method:
     finds_exits: ClassVar[bool] = False
     peels: ClassVar[bool] = False
     marches: ClassVar[bool] = False
+    follows_paths: ClassVar[bool] = False
 
     @property
     def layer_limit(self) -> int | None:
@@ -97,6 +101,10 @@ class Method:
 
     def with_thickness(self, thickness: float) -> Method:
         """The method with that thickness, in metres, of faces that declare none; itself where it makes no sheets."""
+        return self
+
+    def with_paths(self, paths: int) -> Method:
+        """The method with so many paths of each pixel; itself where it follows none."""
         return self
 
 

@@ -89,6 +89,8 @@ def _keys(desk: Desk) -> None:
         return
     if imgui.is_key_pressed(imgui.Key.f):
         desk.frame()
+    if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
+        desk.change("display.converge", not desk.get("display.converge"), step=True)
     if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
         (desk.work.redo if io.key_shift else desk.work.undo)()
     elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
@@ -260,7 +262,11 @@ def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) ->
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
     stage = desk.stage
-    lines = [text for text in (stage.problem, stage.shader_problem, stage.simpler, stage.diffusing) if text]
+    lines = [
+        text
+        for text in (stage.problem, stage.shader_problem, stage.simpler, stage.diffusing, stage.converging.told)
+        if text
+    ]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
     lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]
     for text in lines:

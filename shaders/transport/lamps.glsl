@@ -1,0 +1,57 @@
+// Light of point and directional lights that comes straight to a place: through media, and interfaces that bend nothing.
+// No path finds what polished interfaces bend of it. Needs <Lights>, <Surfaces>, <View>, place.glsl and what that needs.
+
+struct Lamp {
+    vec3 towards;     // unit
+    float distance_m;
+    vec3 irradiance;  // on what faces it, if nothing is between
+};
+
+Lamp lamp_at(int number, vec3 point) {
+    vec4 at = light_position[number];
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    vec3 way = at.xyz - at.w * from_eye;
+    float distance_m = max(length(way), 1e-18);
+    vec3 irradiance = light_power[number].rgb;
+    if (at.w == 0.0) { return Lamp(way / distance_m, NOTHING, irradiance); }
+    return Lamp(way / distance_m, distance_m, irradiance / distance_m / distance_m);
+}
+
+// Share of a lamp's light that arrives straight. skipped: metres between the place and the origin, which lies beside a
+// surface that is not to be met.
+vec3 straight_share(vec3 origin, float skipped, uvec4 record, vec3 towards, float distance_m, int channel) {
+    vec3 share = vec3(1.0);
+    for (int surface = 0; surface < MOST_STEPS; ++surface) {
+        int before = dominant_body(record);
+        vec3 extinction = filling_of(record, before).extinction;
+        Hit hit = nearest_hit(origin, towards, 0.0, distance_m, uvec4(0u));
+        if (hit.object < 0) {
+            // Out of closed bodies no way leads but through their surfaces: it has passed an edge by rounding.
+            return distance_m < NOTHING ? share * transmittance(extinction * (distance_m + skipped)) : share;
+        }
+        share *= transmittance(extinction * (hit.path + skipped));
+        if (share == vec3(0.0)) { return share; }
+        bool sound = true;
+        Place place = place_at(origin, towards, record, hit, before, channel, sound);
+        TracedBody body = traced_body(place.object);
+        int kind = int(body.kind);
+        share *= place.coat;
+        if (kind == KIND_OPAQUE && (place.outside || body.one_sided == 0.0)) { return vec3(0.0); }
+        int after = dominant_body(place.record);
+        if (kind == KIND_SHEET || alters_light(before, after, channel)) {
+            float ior = kind == KIND_SHEET ? body.ior : index_of(after, channel);
+            if (ior != index_of(before, channel)) { return vec3(0.0); }
+            share *= body.transmission * (kind == KIND_SHEET || place.object == after ? body.color : vec3(1.0));
+            if (kind == KIND_SHEET) {
+                vec3 glow = vec3(0.0);
+                pass_film(body, -dot(place.face_normal, towards), glow, share);
+            }
+        }
+        float offset = SURFACE_OFFSET * surface_reach;
+        skipped = offset / max(abs(dot(place.face_normal, towards)), 1e-2);
+        origin += place.path * towards - offset * place.face_normal;
+        distance_m = max(distance_m - place.path - skipped, 0.0);
+        record = place.record;
+    }
+    return vec3(0.0);
+}

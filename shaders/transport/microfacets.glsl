@@ -1,0 +1,83 @@
+// Rough interfaces: a random walk of light among the microfacets of a GGX surface, which loses none (Heitz et al. 2016,
+// "Multiple-scattering microfacet BSDFs with the Smith model"). Heights are not correlated, and evenly spread from 0 to 1.
+// The float64 twin is translucent/reference/microfacets.py. Needs lib/interface.glsl and random.glsl.
+
+const int MOST_MEETINGS = 100;  // with microfacets; at a roughness of 1 one path in a million gets as far
+const float LEVEL = 1e-6;       // largest slope of directions that stay at their height
+
+// Smith's Lambda of GGX, upwards and downwards.
+float microfacet_slope(float z, float alpha) {
+    float up = clamp(abs(z), LEVEL, 1.0);
+    float sine = alpha * alpha * (1.0 - up) * (1.0 + up);
+    float upwards = 0.5 * sine / (up * (sqrt(up * up + sine) + up));
+    return z > 0.0 ? upwards : -1.0 - upwards;
+}
+
+// Moves light to the height of the next microfacet on its way; whether it leaves the surface instead.
+bool leaves_surface(vec3 way, float alpha, float chance, inout float height) {
+    float slope = microfacet_slope(way.z, alpha);
+    if (abs(way.z) < LEVEL) { return false; }
+    if (way.z > 0.0 && (slope == 0.0 || chance <= pow(height, slope))) { return true; }
+    height = clamp(height * min(pow(chance, -1.0 / slope), 1e30), 0.0, 1.0);
+    return false;
+}
+
+// A microfacet that is seen from a direction, from above or from below (Heitz 2018, "Sampling the GGX distribution of
+// visible normals").
+vec3 visible_facet(vec3 towards, float alpha, vec2 shares) {
+    vec3 stretched = normalize(vec3(alpha * towards.xy, towards.z));
+    float across = length(stretched.xy);
+    vec3 first = across > 1e-7 ? vec3(-stretched.y, stretched.x, 0.0) / across : vec3(1.0, 0.0, 0.0);
+    vec3 second = cross(stretched, first);
+    float radius = sqrt(shares.x);
+    float x = radius * cos(2.0 * PI * shares.y);
+    float y = mix(sqrt(max(1.0 - x * x, 0.0)), radius * sin(2.0 * PI * shares.y), 0.5 * (1.0 + stretched.z));
+    vec3 normal = x * first + y * second + sqrt(max(1.0 - x * x - y * y, 0.0)) * stretched;
+    return normalize(vec3(alpha * normal.xy, max(normal.z, 0.0)));
+}
+
+// Density in 1/sr with which microfacets at a height turn light on its way to a light, unseen by others (Walter et al. 2007,
+// eq. 13 to 17).
+float turned_to(vec3 to_light, vec3 way, float height, float ior, float alpha) {
+    bool back = to_light.z > 0.0;
+    float across = back ? 1.0 : ior;
+    vec3 half_way = across * to_light - way;
+    float size = length(half_way);
+    float area = microfacet_slope(way.z, alpha) * way.z;
+    if (size <= LEVEL || area <= 0.0) { return 0.0; }
+    half_way *= (half_way.z < 0.0 ? -1.0 : 1.0) / size;
+    float cos_way = -dot(way, half_way), cos_light = dot(to_light, half_way);
+    if (cos_way <= 0.0 || (cos_light > 0.0) != back) { return 0.0; }
+    float base = dot(half_way.xy, half_way.xy) + alpha * alpha * half_way.z * half_way.z;
+    float facets = alpha / base * (alpha / base) / PI;
+    float fresnel = fresnel_dielectric(min(cos_way, 1.0), ior);
+    float leaving = pow(back ? height : 1.0 - height, microfacet_slope(max(abs(to_light.z), LEVEL), alpha));
+    return (back ? fresnel : 1.0 - fresnel) * cos_way * facets * across * across * abs(cos_light) / (size * size)
+        * leaving / area;
+}
+
+// Direction of light that leaves a rough interface; zero where it does not after very many meetings. Directions are in a
+// frame whose third axis is the normal, on the side that light comes from; ior is that of the other side relative to this.
+// seen: density in 1/sr with which it turns to a light.
+vec3 scattered_at_microfacets(vec3 way, float ior, float alpha, vec3 to_light, inout Draws draws, out float seen) {
+    float height = 1.0;
+    float side = 1.0;  // below the surface all is as above it, turned upside down
+    seen = 0.0;
+    for (int meeting = 0; meeting < MOST_MEETINGS; ++meeting) {
+        vec4 shares = random_shares(draws);
+        if (leaves_surface(side * way, alpha, shares.x, height)) { return way; }
+        float relative = side > 0.0 ? ior : 1.0 / ior;
+#if LAMPS
+        seen += turned_to(side * to_light, side * way, height, relative, alpha);
+#endif
+        vec3 facet = side * visible_facet(-side * way, alpha, shares.yz);
+        float cosine = clamp(-dot(way, facet), 0.0, 1.0);
+        bool passes = shares.w >= fresnel_dielectric(cosine, relative);
+        way = normalize(passes ? refracted_direction(way, facet, relative) : reflected_direction(way, facet));
+        if (passes) {
+            side = -side;
+            height = 1.0 - height;  // heights count upwards on either side
+        }
+    }
+    return vec3(0.0);
+}

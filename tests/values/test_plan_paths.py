@@ -1,0 +1,119 @@
+"""Plans of random paths: how thickness is found beside them, what they leave out, and what they refuse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.geometry.solids import Box
+from translucent.planning.notes import NoteKind
+from translucent.planning.passes import PassName
+from translucent.planning.plan import plan, plan_over_backdrop
+from translucent.scene.surface import Surface
+
+METHOD = tl.PathTraced(paths=16)
+MILK = tl.Medium(0.1, (3.0, 2.0, 1.0), 0.5, anisotropy=0.5, ior=1.4)
+CLEAR = tl.Medium(1.0, ior=1.5)
+SUN = tl.DirectionalLight((0, -1, 0), 1.0)
+
+
+def body(medium: tl.Medium | None = MILK, x: float = 0.0, **options: Any) -> tl.Object:
+    return tl.Object(Box((x, 0, 0), (x + 1, 1, 1)).tessellate(), medium, **options)
+
+
+def scene(*objects: tl.Object, **options: Any) -> tl.Scene:
+    return tl.Scene(objects or [body()], tl.Camera.look_at((0.5, 0.5, 9), (0.5, 0.5, 0)), **options)
+
+
+def test_thickness_is_found_as_if_light_went_straight() -> None:
+    """Scattering, emission and interfaces ask for nothing: paths follow them."""
+    found = plan(scene(body(), body(tl.Medium(1.0, 2.0, 3.0), 2.0), lights=[SUN]), METHOD)
+    assert [step.name for step in found.passes] == [PassName.SIGNED_DEPTH, PassName.TRANSMITTANCE, PassName.PATH_TRACE]
+    assert (found.method, found.paths, found.interfaces) == (tl.SignedDepth(), METHOD, None)
+    assert "16 random paths for each pixel" in found.passes[-1].reason
+    assert found.says(NoteKind.NOISE)
+    assert not found.exact
+    assert str(found).startswith("PathTraced(paths=16, seed=0), thickness by SignedDepth(anchored=True): not exact")
+    assert found.summary()["method"] == found.runs
+    overlapping = scene(body(), body(tl.Medium(1.0), 0.5, priority=1), overlap="priority")
+    assert plan(overlapping, METHOD).method == tl.FragmentLists()
+    assert plan(scene(body(), body(None, 2.0)), METHOD).passes[0].name is PassName.OPAQUE
+    assert plan(scene(), tl.PathTraced(32)).cost > plan(scene(), METHOD).cost
+
+
+def test_nobody_gets_paths_unasked() -> None:
+    for one in (scene(), scene(lights=[SUN]), scene(body(tl.Medium(1.0)))):
+        assert plan(one).paths is None
+        assert not plan(one).has(PassName.PATH_TRACE)
+
+
+@pytest.mark.parametrize(
+    ("objects", "kind", "words"),
+    [
+        ([body()], NoteKind.LIGHTS_LEFT_OUT, "polished interfaces bend"),
+        ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "bend all colors alike"),
+        ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "surfaces that glow"),
+        ([body(), body(None, 2.0)], NoteKind.SHADOWS, "opaque objects"),
+    ],
+)
+def test_what_no_path_shows_is_told(objects: list[tl.Object], kind: NoteKind, words: str) -> None:
+    notes = [note for note in plan(scene(*objects, lights=[SUN]), METHOD).unmodelled if note.kind is kind]
+    assert len(notes) == 1
+    assert words in notes[0]
+
+
+def test_textures_of_interfaces_are_told() -> None:
+    mesh = body().mesh
+    colored = tl.Mesh(mesh.vertices, mesh.faces, colors=np.ones((len(mesh.vertices), 4)))
+    assert plan(scene(tl.Object(colored, MILK)), METHOD).says(NoteKind.TEXTURES)
+
+
+def test_frosted_and_matched_bodies_leave_no_light_out() -> None:
+    for one in (body(surface=Surface(roughness=0.5)), body(tl.Medium(1.0, 2.0))):
+        assert not plan(scene(one, lights=[SUN]), METHOD).unmodelled
+
+
+@pytest.mark.parametrize(
+    ("objects", "options", "message"),
+    [
+        ([tl.Object(tl.Mesh(body().mesh.vertices, body().mesh.faces[1:]), MILK)], {}, "not closed, .* close it, or"),
+        ([body(density=tl.LinearDensity(2, 0.5, 1.0))], {}, r"density varies, .* tl\.reference\.path_trace"),
+        ([body(sheet_thickness=0.1)], {}, "a sheet that scatters; give it an inside"),
+        (
+            [body(tl.Medium(1.0, ior=1.5), sheet_thickness=0.1, surface=Surface(roughness=0.5))],
+            {},
+            "a sheet that is rough",
+        ),
+        ([body(tl.Medium(), sheet_thickness=0.1, surface=Surface(opacity=0.5))], {}, "partly transparent layers"),
+        ([body()], {"ambient": (1, 1, 1)}, "PathTraced with ambient radiance; .* leave ambient out"),
+    ],
+)
+def test_what_paths_cannot_follow_is_refused(objects: list[tl.Object], options: dict[str, Any], message: str) -> None:
+    with pytest.raises(tl.InputError, match=message):
+        plan(scene(*objects, **options), METHOD)
+
+
+def test_what_paths_take_the_place_of_cannot_be_asked_for() -> None:
+    with pytest.raises(tl.InputError, match=r"interfaces=TracedInterfaces\(.*; paths take the place of interfaces"):
+        plan(scene(), METHOD, interfaces=tl.TracedInterfaces())
+    with pytest.raises(tl.InputError, match=r"scattering=Diffusion\(.*; paths take the place of scattering"):
+        plan(scene(), METHOD, scattering=tl.Diffusion())
+    with pytest.raises(tl.InputError, match=r"before a backdrop; .* no mesh that a path could meet"):
+        plan_over_backdrop(scene(), METHOD)
+    with pytest.raises(tl.InputError, match=r"works on the CPU; use tl\.reference\.path_trace\(scene, size, paths\)"):
+        plan(scene(), METHOD, tl.Capabilities(opengl=False))
+
+
+@pytest.mark.parametrize("paths", [1, 0, -3, (1 << 20) + 1, 2.0, True, "8", None])
+def test_paths_are_counted_in_whole_numbers(paths: Any) -> None:
+    with pytest.raises(tl.InputError, match=r"PathTraced paths .* not a whole number in 2 to 1048576; give"):
+        tl.PathTraced(paths)
+
+
+@pytest.mark.parametrize("seed", [-1, 1 << 32, 0.5, True])
+def test_seeds_are_whole_numbers(seed: Any) -> None:
+    with pytest.raises(tl.InputError, match="PathTraced seed"):
+        tl.PathTraced(seed=seed)

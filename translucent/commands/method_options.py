@@ -1,0 +1,61 @@
+"""Options that choose the method, and the reader of their values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from translucent.errors import InputError
+
+if TYPE_CHECKING:
+    from translucent.planning.methods import Method
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class _MethodOption(click.Option):
+    """An option whose help names the methods, which are imported only where it is shown."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from translucent.planning.methods import METHODS
+
+        record = super().get_help_record(ctx)
+        *names, last = METHODS
+        sheets = " and ".join(name for name, method in METHODS.items() if method.makes_sheets)
+        told = (
+            f"{', '.join(names)} or {last}. Default: by plan. Without OpenGL all but {sheets} give way to all surfaces "
+            "on each ray."
+        )
+        return None if record is None else (record[0], told)
+
+
+def method_option(command: F) -> F:
+    """The option for how thickness is found."""
+    return click.option("--method", "method_name", cls=_MethodOption, metavar="NAME")(command)
+
+
+def paths_option(command: F) -> F:
+    """Option for the number of random paths."""
+    told = "Of --method path-traced: random paths of each pixel. Default: 64. Four times as many halve the noise."
+    return click.option("--paths", type=int, metavar="N", help=told)(command)
+
+
+def read_method(name: str | None, thickness: str | None, paths: int | None = None) -> Method | None:
+    """Thickness method of this name, if one is given."""
+    from translucent.planning.methods import METHODS, method_from_name
+    from translucent.units import parse_length
+
+    method = method_from_name(name) if name else None
+    if paths is not None:
+        if method is None or not method.follows_paths:
+            names = " or ".join(name for name, known in METHODS.items() if known.follows_paths)
+            raise InputError("--paths", f"only --method {names} takes it", f"add --method {names}")
+        method = method.with_paths(paths)
+    if thickness is None:
+        return method
+    if method is None or not method.makes_sheets:
+        names = " or ".join(name for name, known in METHODS.items() if known.makes_sheets)
+        raise InputError("--thickness", f"only --method {names} takes it", f"add --method {names}")
+    return method.with_thickness(parse_length(thickness))

@@ -1,0 +1,318 @@
+"""Random paths of light on the GPU: followed some events at a time, tile by tile, with their state kept in textures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from translucent.errors import RenderError
+from translucent.gpu.drivers import require_interfaces
+from translucent.gpu.hierarchies import SceneHierarchies
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.traced_interfaces import all_closed, record_at_eye
+from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import set_uniform
+from translucent.gpu.textures import reflectance_table
+from translucent.gpu.uniforms import media_center
+from translucent.planning.passes import PassSpec
+
+_STATE = ("path_origin", "path_direction", "path_light", "path_record", "path_counts", "path_mean", "path_spread")
+_COUNTS = _STATE.index("path_counts")
+_UNSIGNED = ("path_record", "path_counts")
+_UNITS = {
+    name: unit
+    for unit, name in enumerate(
+        (
+            *_STATE,
+            "traced_bodies",
+            "hierarchy_nodes",
+            "hierarchy_triangles",
+            "light_map",
+            "opaque_axial_depth",
+            "opaque_radiance",
+            "light_irradiance",
+            "light_levels",
+            "reflectance_table",
+            "seen_map",
+        )
+    )
+}
+
+#: Pixels along a side of a tile: 220 bytes each are kept of it.
+TILE = 512
+
+#: Largest number of events of a path in one pass: some drivers cut loops short that turn too often.
+MOST_EVENTS = 64
+
+#: Seconds that a pass over a tile may take, by which the number of events is chosen; no driver stops that.
+PASS_SECONDS = 0.1
+
+
+@dataclass(frozen=True)
+class Progress:
+    """State of paths that are being followed.
+
+    Attributes
+    ----------
+    share : float
+        That has been done, 0 to 1; of the paths of a tile only now and then.
+    done : bool
+    """
+
+    share: float
+    done: bool
+
+
+class PathTracer:
+    """Tracer of random paths; see ``shaders/transport/path_trace.frag``.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        vertex = "geometry/fullscreen.vert"
+        self._begin = Variants(gl, vertex, "transport/path_begin.frag", known_mean=0, known_spread=1)
+        self._trace = Variants(gl, vertex, "transport/path_trace.frag", **_UNITS)
+        self._end = Variants(gl, vertex, "transport/path_end.frag", path_mean=0, path_spread=1)
+        self._picture = Variants(gl, vertex, "transport/path_picture.frag", path_mean=0, straight_transmittance=1)
+        self._reflectance = reflectance_table(gl)
+        self._unfinished = gl.query(samples=True)
+        self._events = 4
+        self._rest = gl.framebuffer([gl.texture((1, 1), 1)])
+
+    def steps(
+        self, job: FrameJob, last: int, *, spread: bool, seconds: float = PASS_SECONDS, tile: int = TILE
+    ) -> Generator[Progress, None, None]:
+        """Follow paths of each pixel of a job from `job.paths_traced` on to before the `last`, a pass at a time.
+
+        Between two passes anything else may be drawn, as long as the job stays. `Targets.paths` has what is known of
+        tiles that are done.
+
+        Parameters
+        ----------
+        job : FrameJob
+        last : int
+        spread : bool
+            They start all over their pixels, rather than at the sample point of the job.
+        seconds : float
+            That a pass may take.
+        tile : int
+            Pixels along a side of a tile.
+        """
+        require_interfaces(job.gl.info)
+        width, height = job.targets.size
+        corners = [(x, y) for y in range(0, height, tile) for x in range(0, width, tile)]
+        with ExitStack() as stack:
+            states = [self._state(stack, job, tile) for _ in range(2)]
+            bodies, hierarchies, values = self._bodies(stack, job)
+            values["spread"] = spread
+            for number, corner in enumerate(corners):
+                size = min(tile, width - corner[0]), min(tile, height - corner[1])
+                for part in self._tile(job, states, (bodies, hierarchies, values), corner, size, last, seconds):
+                    yield Progress((number + part) / len(corners), False)
+            job.paths_traced = last
+        yield Progress(1.0, True)
+
+    def show(self, job: FrameJob) -> None:
+        """Write the picture so far, or add the transmittance of a sample where several are being summed up."""
+        sums = job.averaging
+        framebuffer = job.targets.average() if sums else job.targets.surfaced()
+        job.targets.paths().color_attachments[0].use(0)
+        job.targets.result().color_attachments[1].use(1)
+        program = self._picture.program()
+        self._gl.enable_only(moderngl.BLEND if sums else moderngl.NOTHING)
+        self._gl.blend_equation = moderngl.FUNC_ADD
+        self._gl.blend_func = moderngl.ONE, moderngl.ONE
+        framebuffer.use()
+        self._picture.draw_fullscreen(program)
+
+    def _tile(
+        self,
+        job: FrameJob,
+        states: list[moderngl.Framebuffer],
+        scene: tuple[moderngl.Texture, SceneHierarchies, dict[str, object]],
+        corner: tuple[int, int],
+        size: tuple[int, int],
+        last: int,
+        seconds: float,
+    ) -> Iterator[float]:
+        """Follow the paths of a tile to their ends; the share that has been done, after each pass."""
+        begun = job.paths_traced
+        self._start(job, states[1], corner, size)
+        looked, share, number = time.perf_counter(), 0.0, 0
+        program = self._program(job)
+        while True:
+            number += 1
+            clock = time.perf_counter()
+            into, source = states[(number + 1) % 2], states[number % 2]
+            values = {"tile_origin": corner, "last_path": last, "events": self._events, "pass_number": float(number)}
+            self._bind(job, scene, source)
+            self._set(program, {**scene[2], **values})
+            self._aim(into, size)
+            with self._unfinished:
+                self._trace.draw_fullscreen(program)
+            into.scissor = None
+            left = self._unfinished.samples
+            taken = time.perf_counter() - clock
+            self._events = int(np.clip(self._events * np.clip(seconds / max(taken, 1e-6), 0.25, 2.0), 1, MOST_EVENTS))
+            if not left:
+                break
+            if time.perf_counter() - looked > 0.5:
+                looked = time.perf_counter()
+                share = self._share(into, size, begun, last)
+            yield share
+        self._finish(job, source, corner, size)
+
+    def _start(
+        self, job: FrameJob, state: moderngl.Framebuffer, corner: tuple[int, int], size: tuple[int, int]
+    ) -> None:
+        known = job.targets.paths()
+        for unit, texture in enumerate(known.color_attachments):
+            texture.use(unit)
+        program = self._begin.program()
+        self._set(program, {"tile_origin": corner, "first_path": job.paths_traced})
+        self._aim(state, size)
+        self._begin.draw_fullscreen(program)
+        state.scissor = None
+
+    def _finish(
+        self, job: FrameJob, state: moderngl.Framebuffer, corner: tuple[int, int], size: tuple[int, int]
+    ) -> None:
+        into = job.targets.paths()
+        for unit, texture in enumerate(state.color_attachments[-2:]):
+            texture.use(unit)
+        program = self._end.program()
+        self._set(program, {"tile_origin": corner})
+        into.scissor = *corner, *size
+        into.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        self._end.draw_fullscreen(program)
+        into.scissor = None
+
+    def _aim(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> None:
+        framebuffer.scissor = 0, 0, *size
+        framebuffer.use()
+        self._gl.enable_only(moderngl.NOTHING)
+
+    def _share(self, state: moderngl.Framebuffer, size: tuple[int, int], begun: int, last: int) -> float:
+        """Share of the paths of a tile that have ended."""
+        data = state.read((0, 0, *size), components=1, attachment=_COUNTS, alignment=1, dtype="u4")
+        ended = float(np.frombuffer(data, np.uint32).mean(dtype=np.float64))
+        return (ended - begun) / max(last - begun, 1)
+
+    def _state(self, stack: ExitStack, job: FrameJob, tile: int) -> moderngl.Framebuffer:
+        width, height = job.targets.size
+        size = min(tile, width), min(tile, height)
+        try:
+            textures = [self._gl.texture(size, 4, dtype="u4" if name in _UNSIGNED else "f4") for name in _STATE]
+            framebuffer = self._gl.framebuffer(textures)
+        except moderngl.Error as error:
+            found = f"OpenGL has no room for the state of paths ({error})"
+            raise RenderError(f"path tracing {width}x{height}", found, "render smaller") from error
+        for resource in (framebuffer, *textures):
+            stack.callback(resource.release)
+        stack.callback(self._rest.use)  # a released framebuffer must not be the bound one
+        for texture in textures:
+            texture.filter = moderngl.NEAREST, moderngl.NEAREST
+        return framebuffer
+
+    def _bodies(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Texture, SceneHierarchies, dict[str, object]]:
+        """Texture of the objects, hierarchies of their meshes, and the uniforms that are the same for all passes."""
+        hierarchies = job.resources.hierarchies.of(job.scene)
+        rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
+        bodies = self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4")
+        stack.callback(bodies.release)
+        assert job.plan.paths is not None
+        values = {
+            "seed": job.plan.paths.seed,
+            "all_closed": all_closed(job.scene),
+            "start_record": record_at_eye(job),
+            "object_nodes": hierarchies.object_nodes,
+            "objects_frame": frame,
+        }
+        return bodies, hierarchies, values
+
+    def _program(self, job: FrameJob) -> moderngl.Program:
+        scene, environment = job.scene, job.scene.environment
+        media = [body.medium for body in scene.bodies if body.medium is not None]
+        seen_map = environment.seen.kind == "image"
+        return self._trace.program(
+            FROM_EYE=job.placed.starts_inside,
+            ONE_OBJECT=len(scene.objects) == 1,
+            PRIORITY=scene.overlap == "priority",
+            UNION=scene.overlap == "union",
+            SCATTER=any(medium.scatters for medium in media),
+            EMISSION=any(medium.emits for medium in media),
+            LAMPS=bool(scene.lights),
+            ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
+            DISPERSION=False,
+            OPAQUE=job.features.has_opaque,
+            SEEN_MAP=seen_map,
+            SEEN_LIGHTS=seen_map and environment.seen is environment,
+        )
+
+    def _bind(
+        self,
+        job: FrameJob,
+        scene: tuple[moderngl.Texture, SceneHierarchies, dict[str, object]],
+        source: moderngl.Framebuffer,
+    ) -> None:
+        environment, environments = job.scene.environment, job.resources.environments
+        maps = environments.light(environment)
+        textures = {
+            **dict(zip(_STATE, source.color_attachments, strict=True)),
+            "traced_bodies": scene[0],
+            "hierarchy_nodes": scene[1].nodes,
+            "hierarchy_triangles": scene[1].triangles,
+            "light_map": environments.sharp(environment),
+            "light_irradiance": maps.irradiance,
+            "light_levels": maps.levels,
+            "reflectance_table": self._reflectance,
+        }
+        if job.features.has_opaque:
+            textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
+        if environment.seen.kind == "image":
+            textures["seen_map"] = environments.sharp(environment.seen)
+        for name, texture in textures.items():
+            texture.use(_UNITS[name])
+
+    def _set(self, program: moderngl.Program, values: dict[str, object]) -> None:
+        for name, value in values.items():
+            if name in program:  # each variant uses some of them
+                set_uniform(program, name, value)
+
+
+class PathTracePass:
+    """Paths of each pixel, spread over the samples of a frame; see ``shaders/transport/path_trace.frag``.
+
+    Attributes
+    ----------
+    tracer : PathTracer
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self.tracer = PathTracer(gl)
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Follow the paths of this sample, or where nothing else depends on it those of all samples at once.
+
+        Opaque objects are drawn for each sample; paths that meet them first see that picture.
+        """
+        assert job.plan.paths is not None
+        paths = job.plan.paths.paths
+        if job.features.has_opaque:
+            begun, last = (paths * (job.sample + i) // job.samples for i in range(2))
+        else:
+            begun, last = 0, 0 if job.sample < job.samples - 1 else paths
+        if last > job.paths_traced:
+            for progress in self.tracer.steps(job, last, spread=job.samples > 1 and not job.features.has_opaque):
+                job.report((begun + progress.share * (last - begun)) / paths)
+        self.tracer.show(job)

@@ -1,0 +1,141 @@
+"""Path tracing: random paths of light through media and interfaces, the picture without approximations but noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from translucent.errors import InputError
+from translucent.planning.bodies import indices, open_bodies
+from translucent.planning.methods.base import Method, check_count
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Object, Scene, object_names
+
+#: Largest number of paths of each pixel.
+MAX_PATHS = 1 << 20
+
+
+@dataclass(frozen=True)
+class PathTraced(Method):
+    """Random paths of light: all scattering, all interfaces; the error falls with the square root of their number.
+
+    The estimator of `translucent.reference.path_trace` on the GPU, in float32: Fresnel and Snell by chance at
+    interfaces, walks among the microfacets of rough ones (Heitz et al. 2016), free flights in media that scatter, with
+    the balance heuristic over the channels (Wilkie et al. 2014). It takes the place of `interfaces` and `scattering`,
+    which choose approximations. `Frame.standard_error` tells the noise; thickness, optical depth and transmittance are
+    those of the planner's own choice of method, and exact.
+
+    Light of point and directional lights that polished interfaces bend is found by no path.
+
+    Parameters
+    ----------
+    paths : int
+        Of each pixel, from 2 to 2^20.
+    seed : int
+        Of the random numbers, 0 to 2^32 - 1.
+
+    Raises
+    ------
+    InputError
+        If a value is not one of these.
+    """
+
+    name: ClassVar[str] = "path-traced"
+    cost: ClassVar[float] = 40.0  # of each path
+    follows_paths: ClassVar[bool] = True
+
+    paths: int = 64
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_count("PathTraced paths", self.paths, MAX_PATHS, least=2, example=64)
+        if not isinstance(self.seed, int) or isinstance(self.seed, bool) or not 0 <= self.seed < 1 << 32:
+            raise InputError(
+                f"PathTraced seed {self.seed!r}", "not a whole number in 0 to 2^32 - 1", "give for example 0"
+            )
+
+    def with_paths(self, paths: int) -> PathTraced:
+        """The method with so many paths of each pixel."""
+        return replace(self, paths=paths)
+
+    def check(self, scene: Scene) -> None:
+        """Refuse open bodies, layers, densities that vary, and sheets that scatter or are rough."""
+        if scene.scatters_ambient:
+            found = "it stands for what paths find by themselves: light of the environment, and light scattered often"
+            raise InputError("PathTraced with ambient radiance", found, "leave ambient out")
+        for bodies, found, do in _refusals(scene):
+            if bodies:
+                raise InputError(f"PathTraced of {object_names(bodies)}", found, do)
+
+    def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
+        """The pass that follows the paths; those that find thickness are the planner's."""
+        reason = f"{why}: {self.paths} random paths for each pixel, scattered, reflected and refracted without limit"
+        bodies = indices(scene, lambda body: body.medium is not None)
+        return (PassSpec(PassName.PATH_TRACE, reason, bodies, cost=self.cost * self.paths),)
+
+    def limits(self, scene: Scene) -> list[Note]:
+        """Note that radiance has noise."""
+        text = f"radiance is a mean over {self.paths} random paths: it has noise, of which standard_error tells"
+        return [Note(NoteKind.NOISE, text)]
+
+    def unmodelled(self, scene: Scene) -> tuple[Note, ...]:
+        """Notes on what no path finds or shows."""
+        notes = []
+        bending = [body for body in scene.bodies if _bends(body)]
+        if scene.lights and bending:
+            text = "light of point and directional lights that polished interfaces bend: in media, and as caustics"
+            notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
+        surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
+        if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:
+            text = f"dispersion: {object_names(dispersive)} bend all colors alike"
+            notes.append(Note(NoteKind.REFRACTION, text))
+        textured = [body for body, surface in surfaces if any(one is not None for one in surface.textures)]
+        textured += [body for body in scene.bodies if body.mesh.colors is not None and body not in textured]
+        if textured:
+            text = f"textures and vertex colors of interfaces: {object_names(textured)} are the same all over"
+            notes.append(Note(NoteKind.TEXTURES, text))
+        if glowing := [body for body, surface in surfaces if surface.glows]:
+            notes.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {object_names(glowing)}"))
+        if scene.opaque:
+            text = "shadows and mirror images on opaque objects: light reaches them through everything"
+            notes.append(Note(NoteKind.SHADOWS, text))
+        return tuple(notes)
+
+
+def _bends(body: Object) -> bool:
+    """Whether it has a polished interface that turns light."""
+    polished = body.surface is None or body.surface.roughness == 0.0
+    return body.has_interface and body.medium is not None and body.medium.ior != 1.0 and polished
+
+
+def _refusals(scene: Scene) -> tuple[tuple[list[Object], str, str], ...]:
+    """Bodies that paths cannot follow, by what they are, and what to do."""
+    sheets = [body for body in scene.bodies if body.sheet_thickness is not None]
+    return (
+        (
+            [scene.objects[i] for i in open_bodies(scene)],
+            "not closed, so that paths do not know what they are in",
+            "close it, or declare it a sheet (sheet_thickness=...)",
+        ),
+        (
+            [body for body in scene.bodies if body.density is not None],
+            "the density varies, and free flights are drawn for even media",
+            "use tl.reference.path_trace(scene, size)",
+        ),
+        (
+            [body for body in scene.bodies if body.covers],
+            "partly transparent layers, which are drawn over a picture",
+            "leave them out, or use another method",
+        ),
+        (
+            [body for body in sheets if body.medium is not None and body.medium.scatters],
+            "a sheet that scatters",
+            "give it an inside, or use another method",
+        ),
+        (
+            [body for body in sheets if body.surface is not None and body.surface.roughness > 0.0],
+            "a sheet that is rough",
+            "use tl.reference.path_trace(scene, size)",
+        ),
+    )
