@@ -25,4 +25,17 @@ vec3 diffused_out(int object, vec3 point, float cosine) {
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
     return max(emergent * scale, vec3(0.0)) / (4.0 * PI * row.ior * row.ior);
 }
+
+// Of an object's extinction, in 1/m, the part by light that is scattered ahead: by similarity g sigma_s.
+vec3 scattered_ahead(int object) {
+    return surface_table_row(object).scattered_ahead;
+}
+
+// Radiance that comes along a ray by light which is scattered ahead, and which diffusion takes for unscattered: from the
+// environment behind, blurred, and where it is mirrored on its way out, half as much as diffuse light, from both sides.
+vec3 haze(int object, vec3 direction) {
+    float mirrored = HAZE_MIRRORED * surface_table_row(object).inner_mirror;
+    vec3 behind = environment_light(direction, HAZE_ROUGHNESS);
+    return mix(behind, environment_light(-direction, HAZE_ROUGHNESS), 0.5 * mirrored);
+}
 #endif

@@ -159,14 +159,15 @@ def test_directions_are_even_by_the_cosine(rng: np.random.Generator) -> None:
 
 def test_slabs_are_measured_by_all_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slab_bench, "ALBEDOS", (0.99,))
-    monkeypatch.setattr(slab_bench, "DEPTHS", ((0.1, 4.0, 16.0),))
+    monkeypatch.setattr(slab_bench, "DEPTHS", ((0.005, 4.0, 16.0),))
     found = {(slab.ior, slab.depth): slab for slab in slab_bench.measure_slabs(quick=True)}
     assert len(found) == 6
     for slab in found.values():
         assert abs(slab.error("diffusion")) < 0.04
         assert abs(slab.error("layer")) < 0.04
-        assert slab.planned == ("none" if slab.ior == 1.0 or slab.depth < 0.5 else "diffusion")
-    thin = found[1.5, 0.1]
+        fog = slab.ior == 1.0 and slab.depth < 16.0
+        assert slab.planned == ("none" if slab.depth < 0.01 else "volume" if fog else "diffusion")
+    thin = found[1.5, 0.005]
     assert thin.error("planned") == pytest.approx(
         max(thin.unscattered[0] - thin.reflectance, thin.unscattered[1] - thin.transmittance, key=abs)
     )
@@ -188,6 +189,6 @@ def test_claims_on_slabs_fall_where_one_is_off() -> None:
     assert held(slab(8.0, 0.32)) == [True, True]
     assert held(slab(8.0, 0.32), slab(8.0, 0.34)) == [False, True]
     assert held(slab(8.0, 0.32), slab(8.0, 0.34, anisotropy=0.9)) == [True, True], "its reduced depth is below 4"
-    assert held(slab(8.0, 0.36, ior=1.0)) == [False, None], "the planner gives fog no more than single scattering"
+    assert held(slab(8.0, 0.36, ior=1.0)) == [False, None], "what the planner takes for fog is no slab"
     assert held(slab(8.0, 0.36)) == [False, False]
     assert held() == [None, None]

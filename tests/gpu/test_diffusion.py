@@ -13,6 +13,7 @@ import pytest
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.diffusion.field import DiffusingBody, DiffusionField
+from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.notes import NoteKind
 
@@ -145,6 +146,31 @@ def test_bodies_keep_their_own_light(renderer: tl.Renderer, solved: list[tl.Medi
     # Which the other medium would not pass for: of red one gives back much more.
     means = [both.radiance[:, half][both.coverage[:, half]].mean(axis=0) for half in (slice(0, 24), slice(24, 48))]
     assert means[0][0] / means[0][2] > 1.2 * means[1][0] / means[1][2]
+
+
+@pytest.mark.parametrize(("scattering", "anisotropy"), [(4.0, 0.5), (20.0, 0.9)])
+def test_what_is_scattered_ahead_is_not_lost(renderer: tl.Renderer, scattering: float, anisotropy: float) -> None:
+    """A lossless ball in uniform light, in all of which it is 1, on both backends: diffusion counts it as unscattered,
+    and rays do not. What is missing is what the tree of rays leaves out, and diffusion gets wrong.
+    """
+    scene = lit_ball(tl.Medium(scattering=scattering, anisotropy=anisotropy, ior=1.33), lights=[])
+    with tl.Renderer(backend="cpu") as other:
+        found, same = (one.render(scene, (16, 16)).radiance for one in (renderer, other))
+    assert found.mean() == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(found, same, atol=2e-3)
+
+
+def test_bodies_without_an_interface_are_seen_by_their_angle(renderer: tl.Renderer) -> None:
+    """A dense ball in uniform light shows on the mean over its disk what a half-space gives back, on both backends."""
+    camera = tl.Camera.orthographic((0, 0, 5), (0, 0, 0), height=2.0)
+    scene = lit_ball(tl.Medium(absorption=60.0, scattering=240.0), lights=[], camera=camera)
+    with tl.Renderer(backend="cpu") as other:
+        frames = [one.render(scene, (24, 24)) for one in (renderer, other)]
+    assert all(frame.plan.given_back.diffused == (0,) for frame in frames)
+    disk = frames[0].thickness > 0.0
+    for frame in frames:
+        assert frame.radiance[disk].mean() == pytest.approx(half_space_reflectance(0.8, 1.0), rel=0.03)
+    np.testing.assert_allclose(frames[0].radiance, frames[1].radiance, atol=2e-3)
 
 
 def test_a_lamp_at_the_surface_is_no_brighter_than_its_light(renderer: tl.Renderer) -> None:

@@ -18,6 +18,7 @@ from translucent.planning.methods import (
     FragmentLists,
     KBuffer,
     Method,
+    PathTraced,
     RayMarched,
     SignedDepth,
     ThinLayer,
@@ -165,7 +166,7 @@ def _marched() -> Iterable[Contender]:
 def _as_they_are() -> Iterable[Contender]:
     """Contenders of methods without parameters worth rows of their own: none is left out."""
     for method in METHODS.values():
-        if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched):
+        if method not in (SignedDepth, ThinLayer, DepthPeeling, FragmentLists, KBuffer, RayMarched, PathTraced):
             yield Contender(method.__name__, method.__name__, method())
 
 
@@ -217,6 +218,9 @@ _SCATTERINGS: dict[str, tuple[Scattering, bool]] = {
     "Diffusion, resolution 48": (Diffusion(48), False),
 }
 
+#: Paths of each pixel; with fewer than two there is no standard error.
+_PATHS = (2, 4, 16)
+
 #: What engines show of it.
 _ENGINES: tuple[Engine, ...] = (PaintLayer(), NormalizedDiffusion(), Frostbite())
 
@@ -243,6 +247,18 @@ def _with_scattering() -> Iterable[Contender]:
             quick=quick,
             pictured=every,
             scattering=scattering,
+        )
+
+
+def _path_traced() -> Iterable[Contender]:
+    for paths in _PATHS:
+        yield Contender(
+            f"PathTraced, {paths} paths",
+            "PathTraced",
+            PathTraced(paths=paths),
+            effects=_WHOLE_FRAMES,
+            quick=False,
+            pictured=_WHOLE_FRAMES if paths == _PATHS[-1] else (),
         )
 
 
@@ -276,6 +292,7 @@ CONTENDERS: tuple[Contender, ...] = (
     *_marched(),
     *_with_interfaces(),
     *_with_scattering(),
+    *_path_traced(),
     Contender("cpu backend", "cpu backend", FragmentLists(), "cpu", "cpu", (*_ALL, "interfaces"), quick=False),
 )
 

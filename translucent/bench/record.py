@@ -202,8 +202,9 @@ class Slab:
         What of them was never scattered, which is exact in all pictures.
     diffusion, layer : (reflectance, transmittance)
         By `Diffusion` and by `ScatteringLayer`.
-    planned : {"diffusion", "layer", "none"}
-        What the planner takes; none: nothing beyond what is scattered once.
+    planned : {"diffusion", "layer", "volume", "none"}
+        What the planner takes; volume: rays that gather light on their way, where there is no interface, which is
+        measured on whole pictures alone; none: nothing beyond what is scattered once.
     """
 
     albedo: float
@@ -215,7 +216,7 @@ class Slab:
     unscattered: tuple[float, float]
     diffusion: tuple[float, float]
     layer: tuple[float, float]
-    planned: Literal["diffusion", "layer", "none"]
+    planned: Literal["diffusion", "layer", "volume", "none"]
 
     @property
     def reduced_depth(self) -> float:

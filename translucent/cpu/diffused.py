@@ -9,6 +9,7 @@ import numpy as np
 from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.vectors import dot
 from translucent.diffusion.field import DiffusionField
+from translucent.formulas.diffuse_interface import diffuse_interface
 
 
 class DiffusedLight:
@@ -30,6 +31,20 @@ class DiffusedLight:
     def leaves(self, before: Integers, after: Integers) -> Mask:
         """(k,): whether it leaves one of two bodies where they meet, bent or not."""
         return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
+
+    def scattered_ahead(self, body: Integers) -> Array:
+        """(k, 3): part of the extinction around rays in bodies (k,) by light that is scattered ahead, in 1/m."""
+        found = np.zeros((len(body), 3))
+        for number, field in self._fields.items():
+            found[body == number] = field.scattered_ahead
+        return found
+
+    def mirrored(self, body: Integers) -> Array:
+        """(k,): share of diffuse light inside bodies (k,) that their interfaces mirror."""
+        found = np.zeros(len(body))
+        for number, field in self._fields.items():
+            found[body == number] = diffuse_interface(field.ior).reflected
+        return found
 
     def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
         """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +50,11 @@ class Surroundings:
         if mirrored.size:
             seen[mirrored] = self._light(environment, beams.where(mirrored))
         return seen
+
+    def blurred(self, beams: Beams, directions: Array, roughness: float) -> Array:
+        """(n, 3): light of the environment in directions (n, 3), as mirrors of this roughness would blur it."""
+        hazy = replace(beams, directions=directions, blur=np.full(len(beams), roughness**4))
+        return self._light(self.environment, hazy)
 
     def _light(self, environment: Environment, beams: Beams) -> Array:
         blur = beams.blur

@@ -24,6 +24,8 @@ from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, 
 from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
 from translucent.cpu.vectors import dot, largest, unit
+from translucent.formulas import optics
+from translucent.formulas.diffusion import HAZE_MIRRORED, HAZE_ROUGHNESS
 from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
@@ -221,10 +223,26 @@ class _Growth:
         emitted, passed = self.legs.along(self._rays(own), own.record, length[inside] * self.caster.radius)
         if emitted is not None:
             self._add(own, emitted)
+        if self.tree.diffused:
+            self._add_haze(own, passed, length[inside] * self.caster.radius)
         throughput = beams.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
         return replace(beams, throughput=throughput)
+
+    def _add_haze(self, beams: Beams, passed: Array, length: Array) -> None:
+        """Add what is scattered ahead, over lengths in metres (n,), where diffusion takes it for unscattered."""
+        ahead = self.tree.diffused.scattered_ahead(self.media.dominant(beams.record))
+        hazy = np.flatnonzero(ahead.any(axis=1))
+        if hazy.size:
+            own, ahead = beams.where(hazy), ahead[hazy]
+            extinction = self.media.coefficients(own.record)[0]
+            through = optics.transmittance(np.maximum(extinction - ahead, 0.0) * length[hazy, None])
+            mirrored = 0.5 * HAZE_MIRRORED * self.tree.diffused.mirrored(self.media.dominant(own.record))[:, None]
+            behind, before = (
+                self.tree.surroundings.blurred(own, sign * own.directions, HAZE_ROUGHNESS) for sign in (1.0, -1.0)
+            )
+            self._add(own, (through - passed[hazy]) * ((1.0 - mirrored) * behind + mirrored * before))
 
     def _at_surfaces(self, beams: Beams) -> Beams:
         """Cross the surfaces that beams, with their origins there, have come to; what continues from there."""

@@ -64,6 +64,8 @@ class DiffusionField:
         In the system.
     ior : float
         Of the medium.
+    scattered_ahead : (3,) float64
+        Part of its extinction by light that is scattered ahead, g sigma_s in 1/m, which counts as unscattered here.
     """
 
     fluence: npt.NDArray[np.float32]
@@ -78,6 +80,7 @@ class DiffusionField:
     steps: int
     cells: int
     ior: float
+    scattered_ahead: Array
 
     @property
     def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
@@ -229,6 +232,7 @@ def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight
         steps=found.steps,
         cells=grid.count,
         ior=medium.ior,
+        scattered_ahead=np.asarray(medium.scattering) * max(medium.anisotropy, 0.0),
     )
 
 

@@ -14,6 +14,13 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 
+#: Roughness of the mirror that blurs the environment as media blur what they scatter ahead: half of the directions are
+#: within 40 degrees, as after one to three events with g = .8.
+HAZE_ROUGHNESS = 0.8
+
+#: Share of the mirror of diffuse light at which interfaces mirror it: it is half-way from rays to diffuse light.
+HAZE_MIRRORED = 0.5
+
 
 @np.errstate(under="ignore")
 def emergent_radiance(

@@ -59,6 +59,7 @@ class DiffusedLight:
                 "emergent_fluxes": field.fluxes,
                 "exit_share": field.exit_share,
                 "mean_cosine": field.mean_cosine,
+                "scattered_ahead": field.scattered_ahead,
             }
             for number, field in self.fields.surfaces.items()
         }

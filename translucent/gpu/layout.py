@@ -337,6 +337,7 @@ SURFACE_ROW = PackedTable(
         ("emergent_fluxes", "f4", (4,)),
         ("exit_share", "f4", ()),
         ("mean_cosine", "f4", ()),
+        ("scattered_ahead", "f4", (3,)),  # part of its extinction, in 1/m
     ),
 )
 

@@ -12,7 +12,9 @@ from translucent.arrays import Array
 from translucent.bench.record import Slab
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem
+from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.formulas.diffusion import HAZE_MIRRORED
 from translucent.formulas.two_stream import (
     mirrored_reflectance,
     mirrored_transmittance,
@@ -35,6 +37,8 @@ ALBEDOS = (0.5, 0.8, 0.9, 0.99, 0.999, 0.9999)
 DEPTHS = ((0.5, 1.0, 2.0), (4.0, 8.0, 16.0), (32.0, 64.0, 100.0))
 ANISOTROPIES = (0.0, 0.5, 0.9)
 INDICES = (1.0, 1.5)
+
+_Way = Literal["diffusion", "layer", "volume", "none"]
 
 #: Half of the width of the slab, and of the part in its middle that is looked at, in thicknesses.
 HALF_WIDTH, MIDDLE = 4.0, 1.0
@@ -61,7 +65,11 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
     for i, depth in enumerate(depths.tolist()):
         whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
         passing = slabs.unscattered_shares(depth, ior)
-        ways = [(float(way[0, i]) + passing[0], float(way[1, i]) + passing[1]) for way in (diffused, layer)]
+        hazy = _hazy_shares(depth, depth * (1.0 - albedo * anisotropy), ior)
+        ways = [
+            (float(way[0, i]) + passing[0] + more[0], float(way[1, i]) + passing[1] + more[1])
+            for way, more in ((diffused, hazy), (layer, (0.0, 0.0)))
+        ]
         planned = _planned(albedo, depth, anisotropy, ior)
         found.append(Slab(albedo, depth, anisotropy, ior, *whole, passing, ways[0], ways[1], planned))
     return found
@@ -94,6 +102,22 @@ def _diffused(medium: Medium) -> Array:
     return diffuse_interface(medium.ior).exit_share * leaving
 
 
+def _hazy_shares(depth: float, reduced: float, ior: float) -> tuple[float, float]:
+    """What pictures with `Diffusion` show beside unscattered light: what is scattered ahead on each way across.
+
+    The same as in ``shaders/transport/traced_interfaces.frag``: it leaves where the way ends, or is mirrored there.
+    """
+    mu, weight = slabs.cosines(ior)
+    mirror = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
+    flux = mu * weight * (1.0 - mirror)
+    ahead = np.exp(-reduced / mu) - np.exp(-depth / mu)
+    again = mirror * np.exp(-depth / mu)
+    across = ahead / (1.0 - again**2)
+    back, on = (float((flux * way).sum() / flux.sum()) for way in (across * again, across))
+    mirrored = 0.5 * HAZE_MIRRORED * diffuse_interface(ior).reflected
+    return (1.0 - mirrored) * back + mirrored * on, (1.0 - mirrored) * on + mirrored * back
+
+
 def _body(medium: Medium) -> Object:
     return Object(_mesh(), medium)
 
@@ -109,9 +133,9 @@ def _grid() -> BodyGrid:
     return body_grid(body, Diffusion().cell_size(body))
 
 
-def _planned(albedo: float, depth: float, anisotropy: float, ior: float) -> Literal["diffusion", "layer", "none"]:
+def _planned(albedo: float, depth: float, anisotropy: float, ior: float) -> _Way:
     """What the planner takes for such a slab of one optical depth."""
     body = _body(Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
     scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
     back = given_back(scene, None)
-    return "diffusion" if back.diffused else "layer" if back.layered else "none"
+    return "diffusion" if back.diffused else "layer" if back.layered else "volume" if back.volumes else "none"

@@ -13,13 +13,9 @@ from translucent.media.medium import Medium
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
 from translucent.scene.scene import Object, Scene
 
-#: Least reduced scattering across a body, sigma_s' times its mean thickness, at which the planner shows more than
-#: single scattering: below, less than a tenth of the scattered light is scattered again.
-LEAST_DEPTH = 0.2
-
-#: The same where nothing bends: there, single scattering leaves out all light of the environment.
-LEAST_MATCHED_DEPTH = 0.02
-
+#: Least reduced scattering across a body, sigma_s' times its mean thickness, at which the planner shows more than what
+#: single scattering does: of the environment's light, that is nothing.
+LEAST_DEPTH = 0.01
 
 #: Optical depth across a cell from which on light of a body of one density leaves through its surface.
 MOST_CELL_DEPTH = 1.0
@@ -148,9 +144,7 @@ def given_back(
 def _is_deep(body: Object, medium: Medium) -> bool:
     reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     densest = 1.0 if body.density is None else body.density.maximum
-    return bool(
-        reduced.max() * densest * body.mean_thickness > (LEAST_DEPTH if body.has_interface else LEAST_MATCHED_DEPTH)
-    )
+    return bool(reduced.max() * densest * body.mean_thickness > LEAST_DEPTH)
 
 
 def _is_volume(body: Object, wanted: Scattering) -> bool:
