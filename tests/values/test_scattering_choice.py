@@ -75,7 +75,7 @@ def test_smaller_cells_let_light_diffuse_in_thinner_bodies() -> None:
 @pytest.mark.parametrize(
     "what",
     [
-        body(tl.Medium(scattering=0.05)),
+        body(tl.Medium(scattering=0.02)),
         sheet(WAX),
         body(GLASS),
         body(tl.Medium(absorption=1.0, ior=1.5)),
