@@ -16,3 +16,8 @@ def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = 
     """Print text; what is not printable in it is escaped, but for line ends, tabs and swatches."""
     parts = _KEPT.split(text)
     click.echo("".join(part if i % 2 else printable(part) for i, part in enumerate(parts)), err=err, nl=nl, color=color)
+
+
+def overwrite(text: str) -> None:
+    """Print text over the last line on stderr, which has no end."""
+    click.echo(f"\r{printable(text)}", nl=False, err=True)

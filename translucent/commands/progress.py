@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
-import click
+from translucent.commands.console import echo, overwrite
 
 #: Seconds before anything is told, between two tellings in a terminal, and between two in a file.
 PATIENCE, OFTEN, SELDOM = 1.0, 0.5, 30.0
@@ -36,7 +36,8 @@ class Progress:
         if share >= 1.0:
             self._begun, self._told = None, 0.0  # the next picture begins anew
             if self._width:
-                click.echo(f"\r{' ' * self._width}\r", nl=False, err=True)
+                overwrite(" " * self._width)
+                overwrite("")
                 self._width = 0
             return
         between = OFTEN if self._terminal else SELDOM
@@ -45,10 +46,10 @@ class Progress:
         self._told = now
         text = f"{self._what}: {share:.0%}, about {time_text(spent * (1.0 - share) / (share - least))} left"
         if self._terminal:
-            click.echo(f"\r{text.ljust(self._width)}", nl=False, err=True)
+            overwrite(text.ljust(self._width))
             self._width = max(self._width, len(text))
         else:
-            click.echo(text, err=True)
+            echo(text, err=True)
 
 
 def time_text(seconds: float) -> str:
