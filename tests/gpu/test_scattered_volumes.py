@@ -147,6 +147,16 @@ def test_several_clouds_have_their_own_light(renderer: tl.Renderer) -> None:
     np.testing.assert_allclose(together.radiance[both], alone.radiance[both], rtol=0.03)
 
 
+def test_ways_of_scattering_have_their_own_views_from_lights(renderer: tl.Renderer) -> None:
+    """In any order: what a march reads of the way to a light is not what points of an interval read."""
+    scene = tl.Scene([tl.Object(Sphere().tessellate(16), tl.Medium(scattering=4.0))], CAMERA, [SUN], DARK)
+    ways = [None, tl.SingleScattering(), tl.Diffusion(12), tl.ScatteringLayer()]
+    first = [renderer.render(scene, SIZE, scattering=way).radiance for way in ways]
+    again = [renderer.render(scene, SIZE, scattering=way).radiance for way in reversed(ways)]
+    for one, other in zip(first, reversed(again), strict=True):
+        np.testing.assert_allclose(other, one, atol=1e-3 * one.max())
+
+
 def test_only_what_changes_the_light_is_solved_for_again(
     renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -253,8 +254,10 @@ def test_light_is_scattered_on_in_fog_and_leaves_dense_bodies_through_their_surf
         assert (back.volumes, back.diffused) == (((0,), ()) if share < 1.0 else ((), (0,)))
     fog, dense = scene(body(MILK), lights=LIT), scene(body(DENSE), lights=LIT)
     for machine in (NO_STORAGE, Capabilities(opengl=False)):
-        assert not plan(fog, capabilities=machine).given_back
+        assert plan(fog, capabilities=machine).given_back.diffused == (0,)
         assert plan(dense, capabilities=machine).given_back.diffused == (0,)
+        assert not plan(scene(CLOUD, lights=LIT), capabilities=replace(machine, opengl=False)).given_back
+    assert plan(fog, tl.SignedDepth(), scattering=tl.Diffusion()).given_back.diffused == (0,)
     assert not plan(scene(body(MILK), ambient=(1, 1, 1))).given_back
     assert isinstance(plan(fog).method, tl.RayMarched)
     assert not plan(fog, tl.FragmentLists()).given_back

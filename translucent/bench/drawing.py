@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from typing import Protocol
@@ -11,6 +12,7 @@ from translucent.bench.scattering.engines import Engine
 from translucent.bench.scattering.shot import shot_of
 from translucent.bench.timing import Sample
 from translucent.frames.frame import Frame
+from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.depth_only import DepthOnlyPass
@@ -21,6 +23,7 @@ from translucent.gpu.timer import PassTimer
 from translucent.planning.methods import RayMarched, SignedDepth
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import SingleScattering
 from translucent.planning.scattering.choice import shown
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -102,12 +105,13 @@ class _OnGpu:
         self._studio = studio
         scene = shown(scene, plan.given_back)
         # Only the light of the last scene is kept: each drawing of light that diffuses has its own.
-        self._own = Resources(studio.gl) if plan.given_back.diffused else None
-        if self._own is not None:
+        resources, self._own = copy.copy(studio.resources), DiffusionCache(studio.gl)
+        resources.diffusion = self._own
+        if plan.given_back.solved:
             began = time.perf_counter()
-            self._own.diffusion.solve(scene, plan.given_back.diffusion)
+            self._own.solve(scene, plan.given_back.diffusion)
             self.solve_seconds = time.perf_counter() - began
-        self._job = FrameJob(studio.gl, scene, plan, targets, self._own or studio.resources)
+        self._job = FrameJob(studio.gl, scene, plan, targets, resources)
 
     def read(self) -> Frame:
         """Read the frame of the last drawing."""
@@ -121,10 +125,9 @@ class _OnGpu:
         return self._job.targets.bytes_per_pixel() + lights
 
     def release(self) -> None:
-        """Free the uniform buffers, and resources of its own."""
+        """Free the uniform buffers, and light of its own."""
         self._job.release()
-        if self._own is not None:
-            self._own.release()
+        self._own.release()
 
 
 class Floor:
@@ -239,7 +242,7 @@ class OnProcessor:
         """Draw the frame, with thickness and shading in one time."""
         began, work = time.perf_counter(), self._clock()
         if self._march is None:
-            self._frame = self._renderer.render(self._scene, self._size)
+            self._frame = self._renderer.render(self._scene, self._size, scattering=SingleScattering())
         else:
             self._frame = reference.march(self._scene, self._size, self._march)
         seconds, spent = time.perf_counter() - began, self._clock() - work

@@ -67,7 +67,7 @@ def plan_of(studio: Studio, contender: Contender, scene: Scene, cpu: Renderer | 
     if contender.technique in ("cpu", "march"):
         if cpu is None:
             raise InputError(contender.name, "Embree cannot be loaded", "pip install embreex")
-        return cpu.plan(scene)
+        return cpu.plan(scene, scattering=SingleScattering())  # as the reference has it
     if contender.interfaces is not None:
         return studio.renderer.plan(scene, interfaces=contender.interfaces)
     if contender.engine is not None or contender.scattering is not None:

@@ -116,7 +116,14 @@ class FieldCache:
 def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
     """Everything that the diffused light of a scene depends on; the camera is no part of it."""
     bodies = tuple(
-        (i, _place(body := scene.objects[i]), body.density, _coefficients(medium), _roughness(body))
+        (
+            i,
+            type(scene.objects[i].medium),
+            _place(body := scene.objects[i]),
+            body.density,
+            _coefficients(medium),
+            _roughness(body),
+        )
         for i, medium in _marked(scene).items()
     )
     opaque = tuple(_place(item) for item in scene.opaque)

@@ -178,7 +178,8 @@ def _seen(job: FrameJob) -> object:
         )
         for body in scene.objects
     )
-    return objects, tuple(_light_key(light) for light in scene.lights), scene.overlap
+    # What lists hold depends on whether media vary.
+    return objects, tuple(_light_key(light) for light in scene.lights), scene.overlap, job.features.varies
 
 
 def _light_key(light: Light) -> tuple[object, ...]:

@@ -99,7 +99,7 @@ def given_back(
     matched : bool
         Bodies without an interface can give back light, too.
     volumes : bool
-        Rays can gather it on their way through them.
+        Rays can gather it on their way through them; else it leaves through their surface.
 
     Raises
     ------
@@ -115,7 +115,8 @@ def given_back(
         if body.medium is not None
         and body.medium.scatters
         and not body.covers
-        and (body.has_interface or (matched and (volumes or not _is_volume(body, wanted))))
+        and (body.has_interface or matched)
+        and (body.density is None or volumes)
         and (asked is not None or _is_deep(body, body.medium))
     }
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
@@ -133,9 +134,9 @@ def given_back(
         return GivenBack(layered=layered)
     solved = [i for i in bodies if i not in refused]
     return GivenBack(
-        tuple(i for i in solved if not _is_volume(bodies[i], wanted)),
+        tuple(i for i in solved if not (volumes and _is_volume(bodies[i], wanted))),
         layered,
-        tuple(i for i in solved if _is_volume(bodies[i], wanted)),
+        tuple(i for i in solved if volumes and _is_volume(bodies[i], wanted)),
         wanted,
         tuple((i, why) for i, why in refused.items() if i in layered),
     )
@@ -147,9 +148,9 @@ def _is_deep(body: Object, medium: Medium) -> bool:
     return bool(reduced.max() * densest * body.mean_thickness > LEAST_DEPTH)
 
 
-def _is_volume(body: Object, wanted: Scattering) -> bool:
-    """Whether rays gather scattered light on their way: where they see more than a skin that no cell resolves."""
-    if body.has_interface or not isinstance(wanted, Diffusion):
+def _is_volume(body: Object, wanted: Diffusion) -> bool:
+    """Whether rays should gather scattered light on their way: where they see more than a skin beneath all cells."""
+    if body.has_interface:
         return False
     if body.density is not None:
         return True
