@@ -99,7 +99,7 @@ CASES: dict[str, tuple[FrameFeatures, set[str], str]] = {
         "transmittance",
     ),
     "unlit": (
-        features(scene(body(MILK), lights=[LIGHT]), capabilities=NO_STORAGE),
+        features(scene(body(MILK), lights=[LIGHT]), tl.SignedDepth(), capabilities=NO_STORAGE),
         {"accumulates", "has_unlit"},
         "transmittance",
     ),

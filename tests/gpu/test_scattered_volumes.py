@@ -53,7 +53,6 @@ def cloud(
 TRUTHS = {
     "sky": (cloud([], SKY), 0.03),
     "sun": (cloud([SUN], DARK), 0.08),
-    "thin": (cloud([SUN], SKY, 4.0), 0.03),
     "profile": (cloud([], SKY, density=tl.LinearDensity(1, 1.0, 0.05)), 0.03),
     "ahead": (cloud([], SKY, 40.0, anisotropy=0.8), 0.12),
 }
@@ -64,8 +63,8 @@ def test_clouds_are_near_full_light_transport(renderer: tl.Renderer, scene: tl.S
     """Root mean square error over the mean, without the noise of the truth. Measured with 24 x 24 pixels and 192 paths:
     .004, .042, .00, .003, .078; of single scattering .4 to 1.0.
     """
-    one, other = (tl.reference.path_trace(scene, SIZE, paths=48, seed=seed)[0] for seed in (1, 2))
-    frame = renderer.render(scene, SIZE, scattering=tl.Diffusion(24))
+    one, other = (tl.reference.path_trace(scene, SIZE, paths=32, seed=seed)[0] for seed in (1, 2))
+    frame = renderer.render(scene, SIZE, scattering=tl.Diffusion(20))
     once = renderer.render(scene, SIZE, scattering=tl.SingleScattering())
     inside = one.thickness > 0.05
 
@@ -138,10 +137,11 @@ def test_several_clouds_have_their_own_light(renderer: tl.Renderer) -> None:
     aside[:3, 3] = 0.0, 1.1, 0.0
     other = replace(body, transform=aside, density=tl.LinearDensity(0, 0.2, 1.0))
     drop = tl.Object(Sphere((0.0, 5.0, 0.0), 0.1).tessellate(8), tl.Medium(absorption=1.0))
-    together = renderer.render(replace(scene, objects=[body, other, drop]), SIZE)
-    alone = renderer.render(scene, SIZE)
+    coarse = tl.Diffusion(16)
+    together = renderer.render(replace(scene, objects=[body, other, drop]), SIZE, scattering=coarse)
+    alone = renderer.render(scene, SIZE, scattering=coarse)
     assert together.plan.given_back.volumes == (0, 1)
-    clear = renderer.render(replace(scene, objects=[other]), SIZE).thickness == 0.0
+    clear = renderer.render(replace(scene, objects=[other]), SIZE, scattering=coarse).thickness == 0.0
     both = clear & (alone.thickness > 0.0)
     assert both.any()
     np.testing.assert_allclose(together.radiance[both], alone.radiance[both], rtol=0.03)

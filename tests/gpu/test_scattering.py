@@ -149,7 +149,7 @@ def test_a_light_inside_the_body(renderer: tl.Renderer) -> None:
 
 @pytest.mark.parametrize("position", [(0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)], ids=str)
 def test_a_light_on_the_surface_or_in_the_center_gives_finite_light(renderer: tl.Renderer, position: Any) -> None:
-    frame = renderer.render(ball_scene(tl.PointLight(position, (1, 1, 1)), 4.0), SIZE)
+    frame = renderer.render(ball_scene(tl.PointLight(position, (1, 1, 1)), 4.0), SIZE, scattering=ONCE)
     assert np.isfinite(frame.radiance).all()
     assert frame.radiance.max() > 0
 
@@ -164,11 +164,10 @@ def test_a_camera_10_000_diameters_away_sees_the_same(renderer: tl.Renderer) -> 
     assert close.mean() >= 0.99
 
 
-@pytest.mark.parametrize("name", ["bear", "goblet"])
-@pytest.mark.parametrize("light", ["far", "back"])
+@pytest.mark.parametrize(("name", "light"), [("bear", "far"), ("goblet", "back")])
 def test_concave_bodies_equal_the_reference(renderer: tl.Renderer, name: str, light: str) -> None:
     mesh = tl.load_mesh(mesh_path(name))
-    d, size = mesh.diagonal, (18, 18)
+    d, size = mesh.diagonal, (14, 14)
     lights = {
         "far": tl.PointLight(mesh.center + np.array([5, 6, 3]) * d, (100 * d**2,) * 3),
         "back": tl.DirectionalLight((0.1, -0.2, 1), (1, 1, 1)),
@@ -188,7 +187,7 @@ def test_concave_bodies_equal_the_reference(renderer: tl.Renderer, name: str, li
 def test_overlapping_bodies_and_shadows_equal_the_reference(renderer: tl.Renderer, policy: Any) -> None:
     milk = tl.Medium(absorption=0.2, scattering=(2.0, 1.0, 0.5))
     tea = tl.Medium(absorption=(0.5, 1.0, 2.0), scattering=0.5, emission=(0.1, 0.0, 0.0))
-    box, ball, size = Box().tessellate(), Sphere().tessellate(64), (24, 18)
+    box, ball, size = Box().tessellate(), Sphere().tessellate(64), (18, 14)
     shade = tl.Object(Box.slab((0.5, 0.5), 0.05).tessellate(), None, _moved((0.2, 1.2, 0.1)), color=(0, 0, 0))
     objects = [tl.Object(ball, milk, _moved((-0.4, 0, 0)), priority=1), tl.Object(box, tea, _moved((0.5, 0, 0))), shade]
     lights = [tl.DirectionalLight((-0.2, -1, 0.1), (3, 3, 3)), tl.PointLight((2, 1, 2), (5, 5, 5))]

@@ -65,7 +65,7 @@ def test_a_furnace_as_hot_as_its_walls(density: Density | None) -> None:
     absorption = np.array([0.5, 2.0, 4.0])
     hot = Medium(absorption, scattering=(3.0, 2.0, 1.0), emission=absorption * (1, 0.5, 0.2), anisotropy=0.4)
     scene = Scene([Object(BOX, hot, density=density)], CAMERA, environment=Environment.constant((1, 0.5, 0.2)))
-    frame, error = path_trace(scene, (12, 9), paths=1000)
+    frame, error = path_trace(scene, (12, 9), paths=300)
     # Where hardly any path meets anything, the error bars are as rare.
     seen = frame.transmittance.max(axis=-1) < 0.7
     assert seen.sum() > 30
@@ -94,7 +94,7 @@ def test_one_event_is_single_scattering(light: Light, density: Density | None) -
     objects = [Object(BOX, media[0], density=density), Object(RING, media[1]), roof]
     scene = Scene(objects, CAMERA, [light], DARK)
     truth = render(scene, (8, 6), tolerance=1e-4)
-    frame, error = path_trace(scene, (8, 6), paths=600, max_events=1)
+    frame, error = path_trace(scene, (8, 6), paths=400, max_events=1)
     seen = (truth.radiance.min(axis=-1) > 0) & (truth.transmittance.max(axis=-1) < 0.7)
     assert seen.sum() > 15
     assert_normal(scores(frame.radiance[seen], error[seen], truth.radiance[seen]), 3 * int(seen.sum()))

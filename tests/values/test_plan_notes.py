@@ -66,7 +66,7 @@ def test_every_pass_has_a_name_and_every_note_a_kind(kind: str) -> None:
         (scene(body()), tl.RayMarched(), Capabilities(), NoteKind.STEPS),
         (scene(body()), tl.SignedDepth(anchored=False), Capabilities(), NoteKind.DISTANCE_FROM_CAMERA),
         (scene(body(), body(x=3)), tl.BackFaceDepth(), Capabilities(), NoteKind.SEVERAL_BODIES),
-        (scene(body(MILK), lights=LIT), None, NO_STORAGE, NoteKind.UNLIT),
+        (scene(body(MILK), lights=LIT), tl.DepthPeeling(), NO_STORAGE, NoteKind.UNLIT),
         (scene(body(MILK), lights=LIT), tl.SignedDepth(), Capabilities(), NoteKind.LIGHTS_LEFT_OUT),
         (scene(body(MILK), lights=LIT), tl.FragmentLists(), Capabilities(), NoteKind.SCATTERED_AGAIN),
         (scene(body(MILK)), tl.FragmentLists(), Capabilities(), NoteKind.ONLY_REMOVES),

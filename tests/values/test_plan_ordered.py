@@ -249,5 +249,5 @@ def test_without_opengl_slots_and_emitting_sheets_are_no_limit() -> None:
 )
 def test_without_opengl_light_may_be_followed_or_not(scattering: bool, told: str) -> None:
     lit = scene(body(tl.Medium(scattering=1.0)), lights=[tl.DirectionalLight((0, -1, 0), (1, 1, 1))])
-    found = plan(lit, None, Capabilities(opengl=False, scattering=scattering))
+    found = plan(lit, None, Capabilities(opengl=False, scattering=scattering), scattering=tl.SingleScattering())
     assert found.unmodelled[0].startswith(told)
