@@ -173,7 +173,8 @@ class Planned(_OnGpu):
         self._shading = [spec for spec in plan.passes if not spec.geometry_passes]
 
     def draw(self) -> Sample:
-        """Draw the plan."""
+        """Draw the plan; paths that have been followed before are no part of it."""
+        self._job.paths_traced = 0
 
         def geometry() -> None:
             self._job.place((0.0, 0.0))
