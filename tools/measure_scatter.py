@@ -1,4 +1,4 @@
-"""How near baked scattered light is to the light that diffuses in pictures.
+"""Measure how near baked scattered light is to the light that diffuses in pictures.
 
 ``python tools/measure_scatter.py [MODEL...] [--preset NAME]...`` prints three things; default: bear and sphere of the
 toolkit, in wax, jade and milk. The check of each bake, as `translucent bake --check` makes it. The error at the

@@ -52,7 +52,7 @@ def bear() -> tl.Mesh:
 
 @lru_cache(maxsize=1)
 def jade() -> tuple[Array, LitAlone]:
-    """What is baked at the vertices of a bear, and the same as pictures have it."""
+    """Light baked at the vertices of a bear, and the same as pictures have it."""
     alone = LitAlone(tl.Object(bear(), medium=tl.preset("jade").medium), 16)
     return alone.transfer().at(bear().vertices), alone
 

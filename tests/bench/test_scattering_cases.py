@@ -112,7 +112,7 @@ def ball(medium: tl.Medium, environment: tl.Environment, *lights: tl.PointLight)
 
 
 def test_paint_without_interfaces_is_the_layer(renderer: tl.Renderer) -> None:
-    """Where next to nothing mirrors inside, NumPy and the shader agree."""
+    """NumPy and the shader agree where next to nothing mirrors inside."""
     sky = tl.Environment.gradient((0.2, 0.1, 0.3), (1.0, 1.4, 0.8))
     scene = ball(tl.Medium(absorption=(0.1, 0.3, 1.0), scattering=(2.0, 1.0, 4.0), anisotropy=0.3, ior=1.0005), sky)
     shot = shot_of(renderer, scene, (24, 24))

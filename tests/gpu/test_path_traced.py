@@ -114,7 +114,7 @@ def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
 
 
 def test_a_dark_pane_in_closed_form(renderer: tl.Renderer) -> None:
-    """What goes through carries so little that most of it ends by Russian roulette; the rest makes up for it."""
+    """Russian roulette ends most of the little that goes through; the rest makes up for it."""
     medium = tl.Medium((3.0, 4.0, 5.0), ior=1.5)
     pane = tl.Object(Box((-50.0, -50.0, -0.5), (50.0, 50.0, 0.5)).tessellate(), medium)
     camera = tl.Camera.look_at((0, 0, 6), (0, 0, 0), fov_y=0.01)

@@ -99,6 +99,13 @@ def test_what_loses_nothing_is_invisible_in_uniform_light(
     assert np.abs(found).mean() < mean
 
 
+@pytest.mark.parametrize("depth", [2.0, 100.0])
+def test_there_is_no_less_than_no_light_where_media_scatter_backwards(depth: float) -> None:
+    found = field(cloud([SUN], DARK, depth, anisotropy=-0.8)).mean_radiance
+    assert found.min() >= 0.0
+    assert found.max() > 0.05
+
+
 def test_light_adds_up() -> None:
     both, sky, sun = (
         field(cloud(lights, environment)).mean_radiance

@@ -24,7 +24,7 @@ def test_a_lossless_slab_loses_nothing(anisotropy: float, ior: float) -> None:
 
 
 def test_a_deep_slab_depends_on_reduced_scattering_alone() -> None:
-    """Where light is scattered often: similarity (van de Hulst 1980, chapter 14), to a percent."""
+    """Similarity of media that scatter often (van de Hulst 1980, chapter 14), to a percent."""
     g, depth, absorbed = 0.9, 100.0, 1e-3
     forwards = slabs.whole_shares(1 - absorbed, depth, 1.0, g)
     reduced = (1 - absorbed) * (1 - g) / ((1 - absorbed) * (1 - g) + absorbed)

@@ -18,6 +18,7 @@ from translucent.planning.notes import NoteKind
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities
 from translucent.planning.scattering.choice import LEAST_DEPTH, MOST_CELL_DEPTH, MOST_DIFFUSED, shown
+from translucent.planning.slots import MAX_SLOTS
 
 WAX = tl.Medium(absorption=0.1, scattering=5.0, ior=1.4)
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
@@ -276,3 +277,36 @@ def test_a_density_behind_an_interface_is_refused() -> None:
     marbled = body(WAX, density=VARYING)
     assert tl.Diffusion().refusal(marbled) == "its density varies, and it has an interface"
     assert not plan(scene(marbled)).given_back
+
+
+def test_more_fogs_than_winding_numbers_give_back_light_through_their_surfaces() -> None:
+    """As many as a ray keeps apart are fogs, beside what else is there; one more, and none of one density is."""
+    for others, most in ((0, MAX_SLOTS), (3, MAX_SLOTS - 3)):
+        rest = [body(tl.Medium(absorption=i + 1.0), x=-3.0 * i - 3) for i in range(others)]
+        for count in (most, most + 1):
+            found = plan(scene(*(body(MILK, x=3.0 * i) for i in range(count)), *rest)).given_back
+            assert (len(found.volumes), len(found.diffused)) == ((count, 0) if count == most else (0, count))
+
+
+@pytest.mark.parametrize(
+    ("asked", "bodies", "capabilities", "message"),
+    [
+        (tl.Diffusion(), body(WAX, density=VARYING), None, "'box': its density varies, and it has an interface"),
+        (tl.Diffusion(), body(MILK, density=VARYING), Capabilities(opengl=False), "no steps of a ray gather its light"),
+        (tl.ScatteringLayer(), body(WAX), Capabilities(opengl=False), "'box': this renderer draws no layers"),
+    ],
+)
+def test_what_can_be_done_for_no_body_is_refused(
+    asked: Any, bodies: tl.Object, capabilities: Capabilities | None, message: str
+) -> None:
+    with pytest.raises(tl.InputError, match=f"{re.escape(message)}.*use SingleScattering"):
+        plan(scene(bodies), capabilities=capabilities, scattering=asked)
+
+
+def test_fog_is_stepped_through_at_a_few_points_but_around_a_lamp_inside() -> None:
+    fog = body(MILK)
+    for lamp, found in (
+        ((0.0, 0.0, 3.0), tl.RayMarched(steps=16, quadrature="gauss")),
+        ((0.0, 0.2, 0.1), tl.RayMarched(steps=64, quadrature="equiangular")),
+    ):
+        assert plan(scene(fog, lights=[tl.PointLight(lamp, (1, 1, 1))])).method == found

@@ -1,4 +1,4 @@
-"""What beams see that leave a scene: its environment's light in reflections, else its background."""
+"""Surroundings that beams see when they leave a scene: its environment's light in reflections, else its background."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def environment_parts(environment: Environment, directions: Array) -> Array:
 
 
 def nearest_parts(directions: Array) -> tuple[Integers, Array]:
-    """Which direction is nearest to each texel of a map of all, and the solid angle of the texels of each, (k,)."""
+    """Number of the direction nearest to each texel of a map of all, and the texels' solid angle of each, (k,)."""
     return _nearest_parts(directions.tobytes())
 
 

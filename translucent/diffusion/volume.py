@@ -128,7 +128,9 @@ class DiffusingVolume:
         unturned, ahead = _from_lights(volume.grid, self._density, scene, medium)
         emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
         scattered, steps = self._scattered(sky + unturned, emission)
-        found = sky + scattered + (1.0 - medium.anisotropy) * ahead
+        # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
+        # is taken away, and no more than there is.
+        found = np.maximum(sky + scattered + (1.0 - medium.anisotropy) * ahead, 0.0)
         # Beyond the body each cell has what the nearest inside has, for what is interpolated at its surface.
         nearest = distance_transform_edt(~volume.inside, return_distances=False, return_indices=True)
         mean = found[tuple(nearest)] / (4.0 * np.pi)

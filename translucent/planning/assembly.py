@@ -1,4 +1,4 @@
-"""What any plan has beside the passes of its method: sheets, fallbacks, lights, opaque objects, interfaces, shading."""
+"""Parts of a plan beside the passes of its method: sheets, fallbacks, lights, opaque objects, interfaces, shading."""
 
 from __future__ import annotations
 

@@ -6,11 +6,13 @@ import numpy as np
 
 from translucent.errors import InputError
 from translucent.media.density import DensityGrid
+from translucent.media.given_back import DiffusedVolume
 from translucent.planning.bodies import open_bodies, scatters, sheets_of
 from translucent.planning.methods import Method, RayMarched
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.render_plan import Capabilities
+from translucent.scene.lights import PointLight
 from translucent.scene.scene import Scene, object_names
 
 #: Largest number of lights that are followed into media.
@@ -21,6 +23,9 @@ DENSE = 1e5
 
 #: Smallest number of steps through an interval of varying density, unless told otherwise.
 LEAST_STEPS = 64
+
+#: Gauss-Legendre points through an interval of fog of one density.
+FOG_POINTS = 16
 
 #: Note of a plan for an OpenGL version that cannot follow lights into media.
 UNLIT = Note(
@@ -77,6 +82,19 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
             "use RayMarched, or leave the choice to the planner",
         )
     return method
+
+
+def scattered_again_method(scene: Scene) -> RayMarched:
+    """Ray marching through fog of one density.
+
+    A few Gauss-Legendre points, which are more accurate than four times as many steps; near a lamp inside, where light
+    falls off as 1 / r^2 from a peak, steps of equal angles instead.
+    """
+    lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PointLight)]
+    fogs = [body.bounds for body in scene.bodies if isinstance(body.medium, DiffusedVolume)]
+    if any((low <= lamp).all() and (lamp <= high).all() for lamp in lamps for low, high in fogs):
+        return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
+    return RayMarched(steps=FOG_POINTS, quadrature="gauss")
 
 
 def mesh_limits(scene: Scene, method: Method) -> list[Note]:

@@ -12,13 +12,12 @@ from translucent.planning.effects import unmodelled_effects, with_ambient_told, 
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
-from translucent.planning.limits import LEAST_STEPS, marching_method, mesh_limits, open_limits
+from translucent.planning.limits import marching_method, mesh_limits, open_limits, scattered_again_method
 from translucent.planning.methods import (
     DepthPeeling,
     FragmentLists,
     Method,
     PathTraced,
-    RayMarched,
     SignedDepth,
     ThinLayer,
 )
@@ -109,7 +108,7 @@ def _choice(
     if scene.varies:
         return marching_method(scene, method, capabilities), "the density varies from place to place"
     if method is None and any(isinstance(body.medium, DiffusedVolume) for body in scene.bodies):
-        return RayMarched(steps=LEAST_STEPS), "light scattered again into the rays: steps look it up"
+        return scattered_again_method(scene), "light scattered again into the rays: steps look it up"
     if method is not None and method.ordered:
         return method, "asked for"
     if (why := why_order_matters(scene, method, interfaces)) is not None:

@@ -32,7 +32,7 @@ from translucent.units import metres_per_unit
 
 @dataclass(frozen=True)
 class ScatterJob:
-    """What to bake, and how.
+    """Task of one bake: what, and how.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ HARMONICS: Record = {
 
 @dataclass(frozen=True, eq=False)
 class BakedScatter:
-    """What maps and values at vertices have in common.
+    """Common part of maps and of values at vertices.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class BakedScatter:
         return scattered_radiance(self.values, light)
 
     def meaning(self) -> Record:
-        """What the values are, and what they were made for, as values that JSON can hold."""
+        """Description of the values and of what they were made for, as values that JSON can hold."""
         medium = self.medium
         return {
             "mode": "scatter",

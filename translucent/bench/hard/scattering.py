@@ -36,8 +36,8 @@ def _diffused(checks: Checks, scene: Scene, side: int, diffusion: Diffusion) -> 
 
 
 def _hollow(checks: Checks) -> None:
-    """What a lossless wall lets out is all that the lamp inside sends, but for what passes unscattered: so seen from
-    afar the mean radiance of the ball is its intensity over the area of the disk.
+    """Balance of a lossless wall, which lets out all that the lamp inside sends, but for what passes unscattered: so
+    seen from afar the mean radiance of the ball is its intensity over the area of the disk.
     """
     side, height = 48, 2.2
     camera = Camera.orthographic((0, 0, 4), (0, 0, 0), height=height)

@@ -1,4 +1,4 @@
-"""What engines show of light that is scattered many times, as counter-examples: NumPy stands for their shaders.
+"""Ways of engines to show light that is scattered many times, as counter-examples: NumPy stands for their shaders.
 
 Each takes the mirror of its interface, and what passes unscattered, from our own frames: it is the scattering that
 differs. Shadows of the body on itself are exact.

@@ -25,7 +25,7 @@ _UNITS = {
 
 
 class NoInterface:
-    """What is behind, through the media on a straight ray; see ``shaders/shade/no_interface.frag``."""
+    """Draw what is behind, through the media on a straight ray; see ``shaders/shade/no_interface.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/no_interface.frag", **_UNITS)

@@ -11,6 +11,7 @@ from translucent.errors import InputError
 from translucent.media.given_back import DiffusedMedium, DiffusedVolume, LayeredMedium
 from translucent.media.medium import Medium
 from translucent.planning.scattering import Diffusion, Scattering, ScatteringLayer, SingleScattering
+from translucent.planning.slots import MAX_SLOTS, medium_slots
 from translucent.scene.scene import Object, Scene
 
 #: Least reduced scattering across a body, sigma_s' times its mean thickness, at which the planner shows more than what
@@ -22,6 +23,9 @@ MOST_CELL_DEPTH = 1.0
 
 #: Bodies in which light diffuses unless asked for: each takes its tenths of a second and its share of a texture.
 MOST_DIFFUSED = 32
+
+#: Reason against light scattered again where density varies.
+_NO_STEPS = "its density varies, and no steps of a ray gather its light: that takes OpenGL 4.3 and RayMarched"
 
 
 @dataclass(frozen=True)
@@ -116,10 +120,11 @@ def given_back(
         and body.medium.scatters
         and not body.covers
         and (body.has_interface or matched)
-        and (body.density is None or volumes)
         and (asked is not None or _is_deep(body, body.medium))
     }
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
+    if not volumes:
+        refused |= {i: _NO_STEPS for i, body in bodies.items() if body.density is not None}
     if asked is None and len(bodies) - len(refused) > MOST_DIFFUSED:
         many = f"light would diffuse in more than {MOST_DIFFUSED} bodies, which takes long"
         refused = dict.fromkeys(bodies, many) | refused
@@ -127,19 +132,29 @@ def given_back(
     layered = tuple(
         i for i, body in bodies.items() if layers and (i in refused or wanted == layer) and layer.refusal(body) is None
     )
-    if asked is not None and bodies and len(refused) == len(bodies) and wanted == layer:
-        i, why = next(iter(refused.items()))
+    solved = [i for i in bodies if i not in refused] if isinstance(wanted, Diffusion) else []
+    if asked is not None and bodies and not solved and not layered:
+        i = next(iter(bodies))
+        why = refused.get(i, "this renderer draws no layers")
         raise InputError(str(asked), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering()")
     if not isinstance(wanted, Diffusion):
         return GivenBack(layered=layered)
-    solved = [i for i in bodies if i not in refused]
+    fogs = _volumes(scene, solved, wanted) if volumes else ()
     return GivenBack(
-        tuple(i for i in solved if not (volumes and _is_volume(bodies[i], wanted))),
+        tuple(i for i in solved if i not in fogs),
         layered,
-        tuple(i for i in solved if volumes and _is_volume(bodies[i], wanted)),
+        fogs,
         wanted,
         tuple((i, why) for i, why in refused.items() if i in layered),
     )
+
+
+def _volumes(scene: Scene, solved: list[int], wanted: Diffusion) -> tuple[int, ...]:
+    """Those of the bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
+    varying = tuple(i for i in solved if scene.objects[i].density is not None)
+    even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], wanted))
+    fogs = tuple(sorted(varying + even))
+    return fogs if len(medium_slots(shown(scene, GivenBack(volumes=fogs)))) <= MAX_SLOTS else varying
 
 
 def _is_deep(body: Object, medium: Medium) -> bool:
@@ -149,11 +164,9 @@ def _is_deep(body: Object, medium: Medium) -> bool:
 
 
 def _is_volume(body: Object, wanted: Diffusion) -> bool:
-    """Whether rays should gather scattered light on their way: where they see more than a skin beneath all cells."""
+    """Whether rays gather light in a body of one density: where they see more than a skin beneath all cells."""
     if body.has_interface:
         return False
-    if body.density is not None:
-        return True
     medium = _medium(body)
     reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     return float(reduced.max()) * wanted.cell_size(body) < MOST_CELL_DEPTH
