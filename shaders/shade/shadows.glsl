@@ -18,17 +18,21 @@ struct ShadowView {
     vec2 corner;
     float size;
     bool perspective;
+    bool ends;  // opaque objects are in the way of some rays
 };
 
 ShadowView shadow_view(int number) {
     vec4 place = shadow_views[4 * number + 3];
-    return ShadowView(shadow_views[4 * number], shadow_views[4 * number + 1], shadow_views[4 * number + 2], place.xy, place.z, place.w == 1.0);
+    return ShadowView(shadow_views[4 * number], shadow_views[4 * number + 1], shadow_views[4 * number + 2], place.xy, place.z,
+        mod(place.w, 2.0) == 1.0, place.w >= 2.0);
 }
 
 ShadowView sky_view(int number) {
-    int place = int(sky_views[4 * number + 3].w);
+    float numbered = sky_views[4 * number + 3].w;
+    int place = int(abs(numbered)) - 1;
     vec2 corner = float(sky_size) * vec2(place % sky_columns, place / sky_columns);
-    return ShadowView(sky_views[4 * number], sky_views[4 * number + 1], sky_views[4 * number + 2], corner, float(sky_size), false);
+    return ShadowView(sky_views[4 * number], sky_views[4 * number + 1], sky_views[4 * number + 2], corner, float(sky_size),
+        false, numbered < 0.0);
 }
 
 // Which of the six views of a cube looks at a point, given from the light.
@@ -73,7 +77,7 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal) {
         float tilt = view.perspective ? dot(plane, vec3(there, 1.0)) : plane.z;
         float rise = spread * dot(plane.xy, place - there) / (abs(tilt) > 1e-6 ? tilt : 1e-6);
         ivec2 at = ivec2(view.corner + texel);
-        if (ahead + clamp(rise, -steepest, steepest) > texelFetch(shadow_ends, at, 0).r + SHADOW_MARGIN * texel_metres) { continue; }
+        if (view.ends && ahead + clamp(rise, -steepest, steepest) > texelFetch(shadow_ends, at, 0).r + SHADOW_MARGIN * texel_metres) { continue; }
         vec2 weights = mix(1.0 - share, share, aside);
         sum += weights.x * weights.y * texel_transmittance(at, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0);
     }

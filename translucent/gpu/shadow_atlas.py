@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import moderngl
 import numpy as np
@@ -39,21 +40,29 @@ class ShadowView:
         Of its texels in the atlas.
     size : int
         Texels along a side.
+    ends : bool
+        Opaque objects are in the way of some rays.
     """
 
     camera: Camera
     corner: tuple[int, int]
     size: int
+    ends: bool
 
     def rows(self, center: Array) -> npt.NDArray[np.float64]:
         """(4, 4): from points, given from `center`, to right and up (at the edges of the map 1, in perspective after
-        division) and metres ahead of the light, with where their zero is; and corner, size and perspective of the map.
+        division) and metres ahead of the light, with where their zero is; and corner and size of the map, and 1 if in
+        perspective, with 2 if it has ends.
         """
         camera = self.camera
         half_width, half_height = camera.half_extent((self.size, self.size))
         axes = np.stack([camera.right / half_width, camera.up / half_height, camera.forward])
         perspective = camera.fov_y is not None
-        return np.concatenate([np.column_stack([axes, axes @ (center - camera.eye)]), [[*self.corner, self.size, perspective]]])
+        return np.concatenate([np.column_stack([axes, axes @ (center - camera.eye)]), [[*self.corner, self.size, perspective + 2 * self.ends]]])
+
+
+#: Cameras of a light, and whether opaque objects are in its way.
+Seen: TypeAlias = tuple[Sequence[Camera], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +84,23 @@ class ShadowViews:
     extent: tuple[int, int]
 
     @classmethod
-    def of(cls, lights: Sequence[Sequence[Camera]], sky: Sequence[Camera], size: int, limit: int) -> ShadowViews:
+    def of(cls, lights: Sequence[Seen], sky: Sequence[Seen], size: int, limit: int) -> ShadowViews:
         """Places for the maps of cameras, `size` texels wide, or smaller ones where they take more room than there is.
+
+        Parameters
+        ----------
+        lights, sky : sequence of (sequence of Camera, bool)
+            Of each light, and whether opaque objects are in its way.
+        size : int
+        limit : int
+            Largest width of a texture.
 
         Raises
         ------
         RenderError
             If not even small maps fit into a texture of `limit` texels along a side.
         """
-        count = sum(len(cameras) for cameras in lights)
+        count = sum(len(cameras) for cameras, _ in lights)
         side = size
         while side >= LEAST_TEXELS * SKY_SHARE:
             small = side // SKY_SHARE
@@ -135,7 +152,8 @@ class ShadowViews:
         for row, view, light in zip(rows, self.sky, irradiance, strict=False):
             row[:] = view.rows(center)
             x, y = np.floor_divide(view.corner, view.size)
-            row[3] = [*light, y * self._columns + x]
+            number = y * self._columns + x + 1
+            row[3] = [*light, -number if view.ends else number]
         return SKY_SHADOWS.pack(sky_views=rows.reshape(-1, 4))
 
     @property
@@ -145,19 +163,20 @@ class ShadowViews:
 
 
 def _placed(
-    lights: Sequence[Sequence[Camera]], sky: Sequence[Camera], side: int, small: int, columns: int
+    lights: Sequence[Seen], sky: Sequence[Seen], side: int, small: int, columns: int
 ) -> tuple[tuple[tuple[ShadowView, ...], ...], tuple[ShadowView, ...]]:
     across, number, groups = columns // SKY_SHARE, 0, []
-    for cameras in lights:
+    for cameras, ends in lights:
         places = [divmod(number + i, across) for i in range(len(cameras))]
         groups.append(
-            tuple(ShadowView(camera, (x * side, y * side), side) for camera, (y, x) in zip(cameras, places, strict=True))
+            tuple(ShadowView(camera, (x * side, y * side), side, ends) for camera, (y, x) in zip(cameras, places, strict=True))
         )
         number += len(cameras)
     first = -(-number // across) * SKY_SHARE * columns
     places = [divmod(first + i, columns) for i in range(len(sky))]
     return tuple(groups), tuple(
-        ShadowView(camera, (x * small, y * small), small) for camera, (y, x) in zip(sky, places, strict=True)
+        ShadowView(cameras[0], (x * small, y * small), small, ends)
+        for (cameras, ends), (y, x) in zip(sky, places, strict=True)
     )
 
 
@@ -194,9 +213,11 @@ class ShadowAtlas:
             self.release()
             self._framebuffers = self._made(views.extent, spectral)
         self.views, self.spectral = views, spectral
-        for framebuffer, nothing in ((self.sums, 0.0), (self.ends, float(CONSTANTS["NOTHING"]))):
+        for framebuffer in (self.sums, self.ends):
             framebuffer.viewport = (0, 0, *views.extent)
-            framebuffer.clear(nothing, depth=1.0)
+        self.sums.clear()
+        if any(view.ends for view in views):
+            self.ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
 
     @property
     def sums(self) -> moderngl.Framebuffer:

@@ -26,8 +26,8 @@ class ShadowThrowers:
     ----------
     light : Light
     scene : Scene
-    vertices : sequence of (n, 3) float64
-        Of its objects, as `world_vertices` gives them.
+    corners : sequence of (n, 3) float64
+        Of its objects, as `outermost` gives them.
 
     Attributes
     ----------
@@ -37,20 +37,20 @@ class ShadowThrowers:
         No opaque object is between the light and any other object.
     """
 
-    def __init__(self, light: Light, scene: Scene, vertices: Sequence[Array]) -> None:
-        self._light, self._scene, self._vertices = light, scene, vertices
+    def __init__(self, light: Light, scene: Scene, corners: Sequence[Array]) -> None:
+        self._light, self._scene, self._corners = light, scene, corners
         grounds: list[int] = []
         for i, item in enumerate(scene.objects):
             if item.medium is None and self._lights(i, (*grounds, i)) and all(self._lights(j, (i,)) for j in grounds):
                 grounds.append(i)
         self.grounds = tuple(grounds)
-        everything = range(len(vertices))
+        everything = range(len(corners))
         opaque = (i for i, item in enumerate(scene.objects) if item.medium is None)
         self.open_ways = all(i in grounds and self._lights(i, everything) for i in opaque)
 
     def cameras(self) -> list[Camera]:
         """Cameras of the light that see all but the grounds; what they do not see is lit."""
-        throwing = [points for i, points in enumerate(self._vertices) if i not in self.grounds]
+        throwing = [points for i, points in enumerate(self._corners) if i not in self.grounds]
         if not throwing:
             return []
         points = np.concatenate(throwing)
@@ -60,10 +60,12 @@ class ShadowThrowers:
 
     def _lights(self, ground: int, others: Iterable[int]) -> bool:
         """Whether an object shadows none of the others: all that they have is on the lit side of each of its faces."""
-        points = np.concatenate([self._vertices[i] for i in others])
-        faces, vertices = self._scene.objects[ground].mesh.faces, self._vertices[ground]
+        points = np.concatenate([self._corners[i] for i in others])
+        item = self._scene.objects[ground]
+        faces = item.mesh.faces
         if len(faces) * len(points) > _MOST_PAIRS:
             return False
+        vertices = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
         first, second, third = (vertices[faces[:, corner]] for corner in range(3))
         normal = np.cross(second - first, third - first)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)

@@ -14,7 +14,7 @@ from translucent.arrays import Array
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
-from translucent.gpu.light_cameras import world_vertices
+from translucent.gpu.light_cameras import outermost
 from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
@@ -118,23 +118,26 @@ class ShadowMapsPass:
     def _render(self, job: FrameJob) -> None:
         """Render all maps."""
         scene, atlas = job.scene, job.resources.shadows
-        vertices = [world_vertices(item) for item in scene.objects]
-        lights, sky = ([ShadowThrowers(light, scene, vertices) for light in group] for group in (scene.lights, _sky_lights(scene)))
+        corners = [outermost(item) for item in scene.objects]
+        lights, sky = ([ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene)))
         limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
-        groups, rest = [found.cameras() for found in lights], [camera for found in sky for camera in found.cameras()]
-        views = ShadowViews.of(groups, rest, job.plan.shadows.size, limit)
+        views = ShadowViews.of(
+            [(found.cameras(), not found.open_ways) for found in lights],
+            [(found.cameras(), not found.open_ways) for found in sky],
+            job.plan.shadows.size,
+            limit,
+        )
         everything = self._planned(scene, opaque=True)
-        bodies = self._planned(scene, opaque=False)
+        bodies = self._planned(scene, opaque=False) if any(found.open_ways for found in (*lights, *sky)) else everything
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
         atlas.make(views, spectral=everything[1].spectral or not in_place)
         center = media_center(scene)
-        throwers = [found for found, group in zip(lights, groups, strict=True) for _ in group] + sky
-        for view, found in zip(views, throwers, strict=True):
+        for view in views:
             if view.size not in self._targets:
                 self._targets[view.size] = Targets(self._gl, (view.size, view.size))
             # Where no opaque object is in the way, none has to be drawn.
-            seen, chosen = bodies if found.open_ways else everything
+            seen, chosen = everything if view.ends else bodies
             before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
             if in_place:
                 self._add_up(MapJob(self._gl, *before, view, center))
