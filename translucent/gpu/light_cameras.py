@@ -63,7 +63,7 @@ def light_cameras(light: Light, scene: Scene) -> list[Camera]:
 
 
 def cameras_towards(points: Array, light: Light, center: Array, radius: float) -> list[Camera]:
-    """Cameras of a light: one that sees all points (n, 3) in a ball, or six where the light is among them or close by."""
+    """Cameras of a light: one that sees points (n, 3) in a ball, or six where the light is among or near them."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction)
         eye = center - 2.0 * radius * direction

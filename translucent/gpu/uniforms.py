@@ -48,7 +48,8 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
     if opaque is not None:
         reach = ((opaque.near - media.near) / media.length, media.length / opaque.length)
     return VIEW.pack(
-        frame_size=[*view.size, *view.shift],
+        # Shaders count from the corner of their target.
+        frame_size=[*view.size, view.shift[0] - view.corner[0], view.shift[1] + view.corner[1]],
         ray_right=[*(camera.right * half_width * perspective), 0.0],
         ray_up=[*(camera.up * half_height * perspective), 0.0],
         ray_forward=[*camera.forward, 0.0],

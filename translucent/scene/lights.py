@@ -79,7 +79,8 @@ class DirectionalLight(Frozen):
         direction = _vector("light direction", self.direction)
         if not (length := float(np.linalg.norm(direction))) > 0:
             raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
-        direction = direction / length
+        # What has unit length keeps it to the last bit, so that copies of a light have the same direction.
+        direction = direction / length if abs(length - 1.0) > 1e-15 else direction.copy()
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "irradiance", positive_triple("light irradiance", self.irradiance))
