@@ -21,7 +21,7 @@ from translucent.reference.legs import Legs
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
 from translucent.reference.opaque import irradiance_at, seen_from
 from translucent.reference.straight_light import StraightLight
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 
 #: Number of passages through a rough sheet after which light counts as lost.
 MOST_PASSAGES = 64
@@ -238,7 +238,7 @@ class Meetings:
         to_eye = -self.legs.rays.directions[rough]
         for light in scene.lights if rough.size else ():
             light = seen_from(light, scene.camera.eye)
-            if isinstance(light, PointLight):
+            if isinstance(light, PositionalLight):
                 to_light = np.asarray(light.position) - points
                 to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), np.finfo(np.float64).tiny)
             else:

@@ -10,7 +10,7 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.rays import Rays
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
 
@@ -93,4 +93,4 @@ def irradiance_at(scene: Scene, points: Array, normals: Array) -> Array:
 
 def seen_from(light: Light, eye: Array) -> Light:
     """Light with its position, if it has one, relative to the eye."""
-    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light
