@@ -100,7 +100,9 @@ def test_lights_have_position_direction_and_power(tmp_path: Path) -> None:
 def test_spots_have_cones(tmp_path: Path) -> None:
     angles = {"innerConeAngle": 0.25, "outerConeAngle": float(np.float32(np.pi / 2))}
     lamp = {"type": "spot", "intensity": 2.0, "color": [1.0, 0.5, 0.25], "spot": angles}
-    scene = lit_scene(tmp_path, lamp, {"type": "spot", "spot": {}}, rotation=TURN, translation=[1, 2, 3], scale=[2, 3, 4])
+    scene = lit_scene(
+        tmp_path, lamp, {"type": "spot", "spot": {}}, rotation=TURN, translation=[1, 2, 3], scale=[2, 3, 4]
+    )
     wide, plain = scene.lights
     assert isinstance(wide, tl.SpotLight)
     assert np.asarray(wide.position).tolist() == [1.0, 2.0, 3.0]

@@ -188,7 +188,10 @@ def test_light_is_solved_for_anew_where_a_cone_changes() -> None:
 def test_fog_is_marched_by_equal_angles_from_spots() -> None:
     fog = tl.Medium(scattering=2.0)
     box = Box().tessellate()
-    for light, quadrature in ((tl.PointLight((0, 0, 3), 1), "gauss"), (tl.SpotLight((0, 0, 3), DOWN, 1), "equiangular")):
+    for light, quadrature in (
+        (tl.PointLight((0, 0, 3), 1), "gauss"),
+        (tl.SpotLight((0, 0, 3), DOWN, 1), "equiangular"),
+    ):
         method = tl.plan(scene(light, medium=fog, mesh=box)).method
         assert isinstance(method, tl.RayMarched)
         assert method.quadrature == quadrature
