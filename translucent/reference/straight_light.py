@@ -14,7 +14,7 @@ from translucent.scene.scene import Light
 
 
 class StraightLight:
-    """Light of point and directional lights, as far as no interface bends it.
+    """Light of point, spot and directional lights, as far as no interface bends it.
 
     A path that polished interfaces bend meets such a light with probability 0, so that nothing random finds it.
 
