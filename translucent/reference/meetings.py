@@ -55,8 +55,8 @@ class Meetings:
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     lamps : StraightLight, optional
-        To add the light of point, spot and directional lights that rough interfaces of solids turn into the legs, on either
-        side, attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
+        To add the light of `Scene.lights` that rough interfaces of solids turn into the legs, on either side,
+        attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
     """
 
     def __init__(
@@ -233,7 +233,7 @@ class Meetings:
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Add highlights of point, spot and directional lights in rough interfaces, by single reflection without shadows."""
+        """Add highlights of `Scene.lights` in rough interfaces, by single reflection without shadows."""
         scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
         to_eye = -self.legs.rays.directions[rough]
         for light in scene.lights if rough.size else ():
