@@ -115,6 +115,23 @@ def test_beams_in_smoke_are_those_of_the_reference(
     assert (rms <= (3e-3 if where == "outside" else 2e-4)).all()
 
 
+def test_beams_end_at_opaque_objects_among_other_lights(renderer: tl.Renderer, follows: None) -> None:
+    """Away from the edge of the shadow, which is as sharp as a texel of the view."""
+    stop = np.diag([0.15, 0.15, 0.15, 1.0])
+    stop[:3, 3] = (0.0, 0.3, 0.1)
+    spots = [tl.SpotLight((-0.6, 0.5, 0.1), (1.0, -0.35, 0.0), 1.0, 5, 20), tl.SpotLight((0, 3, 1), (0, -3, -1), 5.0)]
+    lights = [spots[0], tl.PointLight((2, 2, 2), 2.0), spots[1], tl.DirectionalLight((1, -0.3, -1), 0.1)]
+    ball = Sphere().tessellate(8)
+    objects = [tl.Object(ball, SMOKE), tl.Object(ball, None, stop, color=(0.0, 0.0, 0.0))]
+    scene = tl.Scene(objects, near_camera(), lights, BLACK)
+    frame = renderer.render(scene, (8, 8), tl.FragmentLists(light_points=8))
+    truth = references.render(scene, (8, 8))
+    off = np.abs(frame.radiance - truth.radiance)[truth.valid] / truth.radiance.max()
+    print(f"median {np.median(off):.1e}, p90 {np.quantile(off, 0.9):.1e}, max {off.max():.1e}")
+    assert np.median(off) <= 1e-4
+    assert np.quantile(off, 0.9) <= 5e-3
+
+
 def near_camera() -> tl.Camera:
     return tl.Camera.look_at((0, 0.2, 5), (0, 0, 0), fov_y=26)
 
