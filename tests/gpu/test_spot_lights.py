@@ -150,10 +150,11 @@ def test_views_are_made_anew_where_a_spot_turns(renderer: tl.Renderer, follows: 
         return renderer.render(scene, (16, 16), scattering=tl.SingleScattering()).radiance
 
     first = tl.SpotLight((0.1, 0.4, 0.2), (0.3, -1, -0.2), 1.0, 10, 20)
-    turned = replace(first, direction=(-1, 0, 0))
-    alone = seen(turned)
-    assert (seen(first) != alone).any()
-    np.testing.assert_array_equal(seen(turned), alone)
+    alone = seen(first)
+    for other in (replace(first, direction=(-1, 0, 0)), replace(first, outer_cone=11)):
+        seen(replace(other, position=(0.1, 0.4, 0.3)))
+        assert (seen(other) != alone).any()
+        np.testing.assert_array_equal(seen(first), alone)
 
 
 @pytest.mark.parametrize("quadrature", ["midpoint", "equiangular"])
