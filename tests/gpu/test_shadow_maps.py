@@ -28,6 +28,7 @@ LAMPS = {
     "lamp": tl.PointLight((-2, 3, 1), (20, 20, 20)),
     "close": tl.PointLight((0.2, 1.2, 0.1), (3, 3, 3)),
     "inside": tl.PointLight((0.2, 0.3, 0.1), (3, 3, 3)),
+    "spot": tl.SpotLight((-2, 3, 1), (2, -3.2, -1.2), (20, 20, 20), 15, 25),
     "on the surface": tl.PointLight((0, 1, 0), (3, 3, 3)),
     "far": tl.PointLight((2e4, 4e4, 1e4), (1e9, 1e9, 1e9)),
 }
