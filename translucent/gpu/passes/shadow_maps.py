@@ -26,9 +26,10 @@ from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.gpu.placement import AxialRange, PlacedScene
 from translucent.gpu.resources import Resources
 from translucent.gpu.shadow_atlas import ShadowView, ShadowViews
-from translucent.gpu.shadow_cameras import ShadowThrowers
+from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
+from translucent.planning.methods import Method
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.paths import straight_scene
 from translucent.planning.plan import plan
@@ -132,8 +133,14 @@ class ShadowMapsPass:
             job.plan.shadows.size,
             limit,
         )
-        everything = self._planned(scene, opaque=True)
-        bodies = self._planned(scene, opaque=False) if any(found.open_ways for found in (*lights, *sky)) else everything
+        # Where all bodies are drawn as sheets, these throw the shadows, too.
+        method = job.plan.method if job.plan.method.makes_sheets else None
+        everything = self._planned(scene, method, opaque=True)
+        bodies = (
+            self._planned(scene, method, opaque=False)
+            if any(found.open_ways for found in (*lights, *sky))
+            else everything
+        )
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
         atlas.make(views, spectral=everything[1].spectral or not in_place)
@@ -152,15 +159,17 @@ class ShadowMapsPass:
             self._targets.pop(size).release()
         job.uniforms.bind()
 
-    def _planned(self, scene: Scene, *, opaque: bool) -> tuple[Scene, RenderPlan]:
+    def _planned(self, scene: Scene, method: Method | None, *, opaque: bool) -> tuple[Scene, RenderPlan]:
         """The scene without interfaces, with or without opaque objects, and its plan."""
-        objects = [item for item in scene.objects if opaque or item.medium is not None]
+        # Layers throw no shadow; but a plan needs bodies, and alone they are clear sheets.
+        bodies = [item for item in scene.bodies if not item.covers] or scene.bodies
+        objects = [item for item in scene.objects if (opaque and item.medium is None) or item in bodies]
         # Lights move more often than objects change.
-        key = tuple(map(weakref.ref, objects)), scene.overlap
+        key = tuple(map(weakref.ref, objects)), scene.overlap, method
         if self._plans.get(opaque, (None,))[0] != key:
             seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
             storage = self._gl.version_code >= _SHADER_STORAGE
-            self._plans[opaque] = key, seen, plan(seen, None, Capabilities(shader_storage=storage))
+            self._plans[opaque] = key, seen, plan(seen, method, Capabilities(shader_storage=storage))
         return self._plans[opaque][1:]
 
     def _add_up(self, light: MapJob) -> None:
@@ -228,9 +237,11 @@ def _seen(job: FrameJob) -> object:
             item.sheet_thickness,
             item.medium is None and item.surface,
             None if item.density is None else weakref.ref(item.density),
+            item.medium is None and holds_eye(item, scene),
         )
         for item in scene.objects
     )
     lights = tuple(light_key(light) for light in scene.lights)
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
-    return objects, lights, sky, scene.overlap, job.plan.shadows.size
+    sheets = job.plan.method if job.plan.method.makes_sheets else None
+    return objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size
