@@ -59,6 +59,9 @@ class Object(Frozen):
     surface : Surface, optional
         What the interface does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
         opaque object reflects diffusely.
+    shadow_catcher : bool
+        Whether an opaque object stands for a ground of the picture that the frame is put over: rendered with
+        ``transparent``, no more is seen of it than the shadows on it.
     """
 
     mesh: Mesh
@@ -69,6 +72,7 @@ class Object(Frozen):
     color: ColorLike = OPAQUE_COLOR
     density: Density | None = None
     surface: Surface | None = None
+    shadow_catcher: bool = False
 
     def __post_init__(self) -> None:
         _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
