@@ -25,6 +25,9 @@ from translucent.suggestions import close_names, did_you_mean
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
+#: Index of refraction of the default medium where there is something to mirror, and without a stage 1.
+STAGED_IOR = 1.5
+
 #: The default environment: white above and light gray below.
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
 
@@ -52,7 +55,7 @@ def showcase(
     ----------
     mesh : Mesh
     medium : Medium, optional
-        Default: jade green after 15 % of the mesh's diagonal, whatever its size.
+        Default: jade green after 15 % of the mesh's diagonal, whatever its size; on a stage, with the ior of glass.
     size : (width, height)
         Size of the picture in pixels, which the framing and the stage depend on.
     camera : Camera, optional
@@ -71,9 +74,11 @@ def showcase(
     InputError
         If there is no such stage.
     """
-    shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
     own = environment is not None or len(lights) > 0
     chosen = stage_named(stage or (NO_STAGE if own else DEFAULT_STAGE))
+    ior = 1.0 if chosen is None else STAGED_IOR
+    usual = Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0), ior=ior)
+    shown = Object(mesh, medium=medium or usual)
     scene = Scene([shown], camera or framing([shown], size, stage=chosen), lights, environment or LIGHT_TABLE)
     return scene if chosen is None else staged(scene, chosen, size, environment)
 

@@ -16,12 +16,17 @@ from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
 from translucent.scene.stages import KeyLight, Stage
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 #: Air between model and ground, as a share of the model's diagonal: rays tell surfaces apart that are so far apart.
 GAP = 1e-3
 
 #: Of the backdrop, in diagonals of the model: how far behind it, how high at least, and the radius of the curve up.
 BEHIND, HIGH, CURVE = 3.0, 1.5, 1.6
+
+#: Roughness of the backdrop.
+DULL = 0.9
 
 #: Of the floor, in the same: least reach to the sides and towards the camera.
 AROUND = 3.0
@@ -59,9 +64,7 @@ def staged(
         In place of the stage's, whose lights stay out, too.
     """
     axes = view_axes(scene.camera)
-    ground = Object(
-        ground_mesh(scene, size, axes), surface=dataclasses.replace(stage.ground, double_sided=False), shadow_catcher=True
-    )
+    ground = Object(ground_mesh(scene, size, axes), surface=_finish(stage), shadow_catcher=True)
     lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in stage.keys))
     azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
     made = environment or dataclasses.replace(stage.environment(), rotation=-azimuth)
@@ -81,6 +84,18 @@ def view_axes(camera: Camera) -> Array:
         ahead = -np.sign(camera.forward[1]) * camera.up * (1.0, 0.0, 1.0)
     ahead /= np.linalg.norm(ahead)
     return np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
+
+
+def _finish(stage: Stage) -> Surface:
+    """Paint and coat of the ground; the backdrop is dull, as lights behind the model would be mirrored in its curve."""
+    ramp = np.broadcast_to(np.array([[[1.0]], [[stage.gloss]]], dtype=np.float32), (2, 1, 3))
+    return Surface(
+        color=stage.color,
+        emissive=stage.emissive,
+        roughness=DULL,
+        roughness_texture=Texture(ramp, wrap=("clamp", "clamp")),
+        double_sided=False,
+    )
 
 
 def _light(key: KeyLight, axes: Array) -> DirectionalLight:
@@ -107,29 +122,26 @@ def ground_mesh(scene: Scene, size: tuple[int, int], axes: Array) -> Mesh:
     top = max(float(local[:, 1].max()) + HIGH * unit, float(eye[1]) + 1.2 * depth * max(float(steepest), 0.0))
     near = max(AROUND * unit - float(local[:, 2].min()), 0.5 * unit - float(eye[2]))
     wide, top, near = (min(value, FARTHEST * unit) for value in (wide, top, near))
-    profile = _profile(near, behind, top, CURVE * unit)
+    profile, share = _profile(near, behind, top, CURVE * unit)
     across = np.linspace(-wide, wide, PIECES_ACROSS + 1)
-    local = np.stack(
-        [
-            np.repeat(across, len(profile)),
-            np.tile(profile[:, 1], len(across)),
-            np.tile(profile[:, 0], len(across)),
-        ],
-        axis=1,
-    )
-    return Mesh(foot + local @ axes, _strip_faces(len(across), len(profile)), name=GROUND_NAME)
+    way, height = np.tile(profile, (len(across), 1)).T
+    local = np.stack([np.repeat(across, len(profile)), height, way], axis=1)
+    uv = np.stack([np.full(len(local), 0.5), np.tile(share, len(across))], axis=1)
+    return Mesh(foot + local @ axes, _strip_faces(len(across), len(profile)), uv, GROUND_NAME)
 
 
 #: Farthest that a ground reaches, in diagonals of the model, however far away its camera is.
 FARTHEST = 40.0
 
 
-def _profile(near: float, behind: float, top: float, radius: float) -> Array:
-    """(n, 2): way ahead and height along floor, curve and backdrop."""
+def _profile(near: float, behind: float, top: float, radius: float) -> tuple[Array, Array]:
+    """(n, 2): way ahead and height along floor, curve and backdrop; and (n,): from 0 on the floor to 1 on the curve."""
     angles = np.linspace(0.0, 0.5 * np.pi, CURVE_PIECES + 1)
-    curve = np.stack([behind - radius + radius * np.sin(angles), radius - radius * np.cos(angles)], axis=1)
-    floor = np.stack([np.linspace(-near, behind - radius, 5)[:-1], np.zeros(4)], axis=1)
-    return np.concatenate([floor, curve, [[behind, max(top, 1.01 * radius)]]])
+    start = behind - radius
+    curve = np.stack([start + radius * np.sin(angles), radius - radius * np.cos(angles)], axis=1)
+    floor = np.array([(-near, 0.0), (0.3 * start, 0.0)])
+    profile = np.concatenate([floor, curve, [[behind, max(top, 1.01 * radius)]]])
+    return profile, np.repeat([0.0, 1.0], [len(floor), len(profile) - len(floor)])
 
 
 def _strip_faces(rows: int, columns: int) -> npt.NDArray[np.int32]:
