@@ -80,6 +80,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.planning.scattering import Diffusion as Diffusion
     from translucent.planning.scattering import ScatteringLayer as ScatteringLayer
     from translucent.planning.scattering import SingleScattering as SingleScattering
+    from translucent.planning.shadow_maps import ShadowMaps as ShadowMaps
     from translucent.renderer import Renderer as Renderer
     from translucent.scene.backdrop import Backdrop as Backdrop
     from translucent.scene.camera import Camera as Camera
@@ -126,6 +127,7 @@ _NAMES = {
     "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer PathTraced RayMarched SignedDepth ThinLayer",
     "planning.plan": "plan",
     "planning.render_plan": "Capabilities RenderPlan",
+    "planning.shadow_maps": "ShadowMaps",
     "renderer": "Renderer",
     "scene.backdrop": "Backdrop",
     "scene.camera": "Camera",

@@ -26,6 +26,7 @@ from translucent.planning.plan import plan, plan_over_backdrop
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.scattering.choice import check_scattering
+from translucent.planning.shadow_maps import ShadowMaps, check_shadows
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.environment import Environment
@@ -44,8 +45,8 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces and scattering.
-_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None]
+#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces, scattering and shadows.
+_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, ShadowMaps | None]
 
 
 class Renderer:
@@ -73,7 +74,7 @@ class Renderer:
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
         self._plans: WeakKeyDictionary[
-            Scene, dict[tuple[Method | None, bool, Interfaces | None, Scattering | None], RenderPlan]
+            Scene, dict[_Asked, RenderPlan]
         ] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
@@ -123,16 +124,25 @@ class Renderer:
         over_backdrop: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         check_interfaces(interfaces)
         check_scattering(scattering)
+        check_shadows(shadows)
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, interfaces, scattering)) not in plans:
+        if (key := (method, over_backdrop, interfaces, scattering, shadows)) not in plans:
             make = plan_over_backdrop if over_backdrop else plan
-            plans[key] = make(scene, method, self._engine.capabilities, interfaces=interfaces, scattering=scattering)
+            plans[key] = make(
+                scene,
+                method,
+                self._engine.capabilities,
+                interfaces=interfaces,
+                scattering=scattering,
+                shadows=shadows,
+            )
         return plans[key]
 
     def render(
@@ -146,6 +156,7 @@ class Renderer:
         transparent: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        shadows: ShadowMaps | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
@@ -173,6 +184,8 @@ class Renderer:
         scattering : Diffusion, ScatteringLayer or SingleScattering, optional
             How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
             back, or not at all; None lets the planner pick for each body.
+        shadows : ShadowMaps, optional
+            How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional
             Takes the share of random paths that have ended, 0 to 1, some times a second: they may take long.
 
@@ -204,6 +217,7 @@ class Renderer:
                 transparent=transparent,
                 interfaces=interfaces,
                 scattering=scattering,
+                shadows=shadows,
                 progress=progress,
             )
         except BaseException as error:
@@ -224,15 +238,16 @@ class Renderer:
         transparent: bool,
         interfaces: Interfaces | None,
         scattering: Scattering | None,
+        shadows: ShadowMaps | None,
         progress: Callable[[float], None] | None,
     ) -> Frame:
         if transparent or backdrop is None:
-            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering)
+            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
             if transparent:
                 return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
             return self._run(scene, size, chosen, samples, progress)
         _check_backdrop(backdrop, size)
-        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering)
+        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering, shadows=shadows)
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _run(
@@ -284,6 +299,7 @@ class Renderer:
         *,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -299,6 +315,7 @@ class Renderer:
             Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
         interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
         scattering : Diffusion, ScatteringLayer or SingleScattering, optional
+        shadows : ShadowMaps, optional
             As for `render`.
 
         Raises
@@ -311,7 +328,7 @@ class Renderer:
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)
-        chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering)
+        chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
         try:
             self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
         except BaseException as error:

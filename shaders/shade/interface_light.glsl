@@ -6,6 +6,7 @@
 #include "lib/optics.glsl"
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
+#include "shade/shadows.glsl"
 
 uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
 
@@ -83,6 +84,17 @@ vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
         vec3 irradiance;
         vec3 towards = towards_light(light, point, irradiance);
         sum += max(dot(normal, towards), 0.0) * irradiance;
+    }
+    return sum;
+}
+
+// The same on an opaque surface, as far as it reaches it.
+vec3 reaching_irradiance(vec3 point, vec3 normal) {
+    vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
+    for (int light = 0; light < light_count; ++light) {
+        vec3 irradiance;
+        float facing = dot(normal, towards_light(light, point, irradiance));
+        if (facing > 0.0) { sum += facing * irradiance * light_reaching(light, point, normal); }
     }
     return sum;
 }

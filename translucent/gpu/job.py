@@ -107,6 +107,11 @@ class FrameJob(SceneView):
         light = self.diffused_light
         return {} if light is None else light.rows(media_center(self.scene))
 
+    @property
+    def shadow_maps(self) -> bool:
+        """Whether opaque objects look up what reaches them of lights."""
+        return self.features.has_shadow_maps
+
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene

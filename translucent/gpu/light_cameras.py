@@ -7,7 +7,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight, PointLight
-from translucent.scene.scene import Light, Scene
+from translucent.scene.scene import Light, Object, Scene
 
 #: Factor by which the frame of a view is larger than its content: interpolation needs neighbors.
 _MARGIN = 1.02
@@ -29,10 +29,19 @@ def media_sphere(scene: Scene) -> tuple[Array, float]:
     return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
 
 
+def world_vertices(item: Object) -> Array:
+    """(n, 3): vertices of an object in the world."""
+    return item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+
+
 def light_cameras(light: Light, scene: Scene) -> list[Camera]:
     """Cameras of a light: one that sees all media, or six where the light is among them or close by."""
-    center, radius = media_sphere(scene)
-    points = np.concatenate([body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] for body in scene.bodies])
+    points = np.concatenate([world_vertices(body) for body in scene.bodies])
+    return cameras_towards(points, light, *media_sphere(scene))
+
+
+def cameras_towards(points: Array, light: Light, center: Array, radius: float) -> list[Camera]:
+    """Cameras of a light: one that sees all points (n, 3) in a ball, or six where the light is among them or close by."""
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction)
         eye = center - 2.0 * radius * direction

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.scattering.choice import NOTHING_GIVEN_BACK, GivenBack
+from translucent.planning.shadow_maps import ShadowMaps
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ class RenderPlan:
         then: whether bodies are sheets.
     paths : PathTraced, optional
         The random paths that make the radiance, in place of interfaces and of what is given back; None where none do.
+    shadows : ShadowMaps
+        How shadows on opaque objects are found, if the plan has the pass.
     """
 
     method: Method
@@ -67,6 +70,7 @@ class RenderPlan:
     given_back: GivenBack = NOTHING_GIVEN_BACK
     traced: bool = False
     paths: PathTraced | None = None
+    shadows: ShadowMaps = field(default_factory=ShadowMaps)
 
     @property
     def runs(self) -> str:

@@ -14,7 +14,7 @@ from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.planning.passes import PassSpec
 from translucent.scene.surface import Surface
 
-_MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table")
+_MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table", "shadow_atlas")
 _FIRST_TEXTURE = len(_MAPS)
 #: Texture units of ``shaders/shade/opaque_surface.glsl``.
 FINISH_UNITS = {name: unit for unit, name in enumerate(_MAPS)} | texture_units(_FIRST_TEXTURE)
@@ -28,30 +28,37 @@ class OpaquePass:
         self._finished = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", **FINISH_UNITS)
         self._maps = FinishMaps(gl)
 
-    def run(self, view: SceneView, spec: PassSpec) -> None:
-        """Draw the opaque objects with the depth test on."""
+    def run(self, view: SceneView, spec: PassSpec, *, depth_only: bool = False) -> None:
+        """Draw the opaque objects with the depth test on; their light is left out if only their depth is needed."""
         framebuffer = view.targets.opaque()
         framebuffer.use()
         _clear(framebuffer)
+        if depth_only:
+            framebuffer.color_mask = (True,) * 4, (False,) * 4
         view.gl.enable_only(moderngl.DEPTH_TEST)
         # Surfaces at the very end of the range count, too; and of surfaces at one depth, those of the first object.
         view.gl.depth_func = "<="
         environment = view.scene.environment
-        light_map = environment.kind == "image"
+        light_map = environment.kind == "image" and not depth_only
+        shadows = not depth_only and view.shadow_maps
+        if shadows:
+            view.resources.shadows.use(FINISH_UNITS["shadow_atlas"])
+        common = {"LIGHT_MAP": light_map, "DEPTH_ONLY": depth_only, "SHADOW_MAPS": shadows}
         if light_map:
             view.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
         for i in spec.objects[::-1]:
             if (surface := view.scene.objects[i].surface) is None:
                 program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, LIGHT_MAP=light_map, VERTEX_COLORS=0, OCCLUSION=0
+                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **common
                 )
             else:
                 looks = look_switches(view.scene.objects[i])
-                program = self._finished.program(SURFACE=1, LIGHT_MAP=light_map, **looks)
+                program = self._finished.program(SURFACE=1, **common, **looks)
                 self._maps.bind(view)
                 self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
             view.draw(program, (i,))
         view.gl.depth_func = "<"
+        framebuffer.color_mask = (True,) * 4, (True,) * 4
 
 
 class FinishMaps:

@@ -39,6 +39,7 @@ _UNITS = {
             "light_levels",
             "reflectance_table",
             "seen_map",
+            "shadow_atlas",
         )
     )
 }
@@ -255,6 +256,7 @@ class PathTracer:
             ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
             DISPERSION=False,
             OPAQUE=job.features.has_opaque,
+            SHADOW_MAPS=job.features.has_shadow_maps,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
         )
@@ -277,6 +279,7 @@ class PathTracer:
             "light_levels": maps.levels,
             "reflectance_table": self._reflectance,
         }
+        job.resources.shadows.use(_UNITS["shadow_atlas"])
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
         if environment.seen.kind == "image":

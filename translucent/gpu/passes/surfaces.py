@@ -64,6 +64,7 @@ class SurfacesPass:
         program = self._variants.program(
             ONE_INTERFACE=job.features.one_interface,
             OPAQUE=job.features.has_opaque,
+            SHADOW_MAPS=False,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,

@@ -35,6 +35,7 @@ _SAMPLERS = (
     "light_irradiance",
     "seen_map",
     "diffused_light",
+    "shadow_atlas",
 )
 _ENTERED = ("entered", "surface_finish", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
@@ -78,6 +79,7 @@ class TracedInterfacesPass:
         self._bind(job, hierarchies, *tables)
         if diffused is not None:
             diffused.texture.use(_UNITS["diffused_light"])
+        job.resources.shadows.use(_UNITS["shadow_atlas"])
         program = self._program(job)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
@@ -114,6 +116,7 @@ class TracedInterfacesPass:
             MICROFACETS=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
+            SHADOW_MAPS=job.features.has_shadow_maps,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
