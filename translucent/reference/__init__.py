@@ -8,6 +8,7 @@ from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refraction import refracted_light
 from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
+from translucent.reference.surface_light import light_transmittance
 
 __all__ = [
     "SHEET_ON_OPAQUE",
@@ -16,6 +17,7 @@ __all__ = [
     "Rays",
     "camera_hits",
     "hit_counts",
+    "light_transmittance",
     "line_hits",
     "march",
     "opaque_counts",

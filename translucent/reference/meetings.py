@@ -19,7 +19,7 @@ from translucent.formulas.interface import (
 from translucent.reference.interfaces import Inside, Interfaces, Optics, interface_normals
 from translucent.reference.legs import Legs
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
-from translucent.reference.opaque import irradiance_at, seen_from
+from translucent.reference.opaque import Irradiance, seen_from
 from translucent.reference.straight_light import StraightLight
 from translucent.scene.lights import PointLight
 
@@ -52,6 +52,8 @@ class Meetings:
     legs : Legs
         With their origins moved to the interfaces.
     interfaces : Interfaces
+    irradiance : callable
+        On paint: `SurfaceLight.on_interfaces`.
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     lamps : StraightLight, optional
@@ -64,10 +66,12 @@ class Meetings:
         own: Optics,
         legs: Legs,
         interfaces: Interfaces,
+        irradiance: Irradiance,
         rng: np.random.Generator | None,
         lamps: StraightLight | None = None,
     ) -> None:
-        self.own, self.legs, self.interfaces, self.rng, self.lamps = own, legs, interfaces, rng, lamps
+        self.own, self.legs, self.interfaces, self.irradiance = own, legs, interfaces, irradiance
+        self.rng, self.lamps = rng, lamps
         self.normals, self.faces = interface_normals(own, interfaces, legs.rays.directions)
         self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
         self.is_sheet = interfaces.before == interfaces.after
@@ -227,7 +231,7 @@ class Meetings:
             return
         points, normals = self.legs.rays.origins[chosen], self.normals[chosen]
         through = self._table("diffuse_transmission")[chosen, None]
-        front, back = (irradiance_at(self.own.scene, points, side * normals) for side in (1.0, -1.0))
+        front, back = (self.irradiance(points, side * normals) for side in (1.0, -1.0))
         behind = through * self._table("diffuse_transmission_color")[chosen] * back
         with np.errstate(under="ignore"):
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
