@@ -80,7 +80,7 @@ def showcase(
     usual = Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0), ior=ior)
     shown = Object(mesh, medium=medium or usual)
     scene = Scene([shown], camera or framing([shown], size, stage=chosen), lights, environment or LIGHT_TABLE)
-    return scene if chosen is None else staged(scene, chosen, size, environment)
+    return scene if chosen is None else staged(scene, chosen, environment)
 
 
 def named_environment(name: str, rotation: float = 0.0) -> Environment:

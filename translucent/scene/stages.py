@@ -8,6 +8,7 @@ from math import cos, radians, sin
 
 from translucent.errors import InputError
 from translucent.scene.environment import Environment
+from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
 Color = tuple[float, float, float]
@@ -37,25 +38,19 @@ class Stage:
 
     Attributes
     ----------
-    color : (r, g, b)
-        Paint of a floor that curves up into a backdrop, under a coat that mirrors a little.
-    gloss : float
-        Roughness of the floor near the model, as a share of the backdrop's.
+    ground : Surface
+        Finish of the ground, which is level and has no end.
     environment : callable
         Makes what lights the model and is mirrored in it; -Z of it is ahead of the camera.
     keys : tuple of KeyLight
     height : float
         Of the default camera over the model, in degrees.
-    emissive : (r, g, b)
-        Radiance of the floor and the backdrop themselves.
     """
 
-    color: Color
-    gloss: float
+    ground: Surface
     environment: Callable[[], Environment]
     keys: tuple[KeyLight, ...]
     height: float
-    emissive: Color = (0.0, 0.0, 0.0)
 
     @property
     def view(self) -> Color:
@@ -73,30 +68,25 @@ DEFAULT_STAGE, NO_STAGE = "studio", "none"
 #: All stages by name.
 STAGES = {
     "studio": Stage(
-        (0.72, 0.72, 0.73),
-        0.25,
+        Surface(color=(0.72, 0.72, 0.73), roughness=0.25),
         lambda: Environment.studio(exposure=-1.0),
         (KeyLight(-38.0, 48.0, (2.05, 1.98, 1.88)),),
         height=20.0,
     ),
     "light-table": Stage(
-        (0.5, 0.5, 0.5),
-        0.2,
+        Surface(color=(0.5, 0.5, 0.5), roughness=0.25, emissive=(0.55, 0.56, 0.58)),
         lambda: Environment.studio(exposure=-1.5),
         (KeyLight(35.0, 55.0, (0.9, 0.9, 0.9)),),
         height=32.0,
-        emissive=(0.62, 0.63, 0.65),
     ),
     "night": Stage(
-        (0.035, 0.036, 0.04),
-        0.15,
+        Surface(color=(0.035, 0.036, 0.04), roughness=0.2),
         lambda: Environment.studio(exposure=-2.0),
         (KeyLight(-30.0, 40.0, (3.4, 3.3, 3.1)),),
         height=16.0,
     ),
     "daylight": Stage(
-        (0.78, 0.75, 0.70),
-        0.7,
+        Surface(color=(0.78, 0.75, 0.70), roughness=0.7),
         lambda: Environment.gradient((0.30, 0.29, 0.28), (0.42, 0.50, 0.66)),
         (KeyLight(50.0, 42.0, (3.0, 2.75, 2.35)),),
         height=24.0,
