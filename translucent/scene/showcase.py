@@ -76,11 +76,15 @@ def showcase(
     """
     own = environment is not None or len(lights) > 0
     chosen = stage_named(stage or (NO_STAGE if own else DEFAULT_STAGE))
-    ior = 1.0 if chosen is None else STAGED_IOR
-    usual = Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0), ior=ior)
-    shown = Object(mesh, medium=medium or usual)
+    shown = Object(mesh, medium=medium or default_medium(mesh, chosen))
     scene = Scene([shown], camera or framing([shown], size, stage=chosen), lights, environment or LIGHT_TABLE)
     return scene if chosen is None else staged(scene, chosen, environment)
+
+
+def default_medium(mesh: Mesh, stage: Stage | None) -> Medium:
+    """Jade green medium that suits the size of a mesh, with an interface on a stage, where there is much to mirror."""
+    ior = 1.0 if stage is None else STAGED_IOR
+    return Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0), ior=ior)
 
 
 def named_environment(name: str, rotation: float = 0.0) -> Environment:

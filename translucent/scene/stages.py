@@ -65,6 +65,9 @@ AZIMUTH = 24.2
 #: The default stage, and the name for none of them: the model floats before its environment.
 DEFAULT_STAGE, NO_STAGE = "studio", "none"
 
+#: Tone curve of pictures of stages, whose light sources are brighter than white.
+STAGED_TONE = "neutral"
+
 #: All stages by name.
 STAGES = {
     "studio": Stage(

@@ -6,14 +6,15 @@ import dataclasses
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.geometry.grouping import used_vertices
 from translucent.geometry.mesh import Mesh
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
-from translucent.scene.lights import DirectionalLight
-from translucent.scene.scene import Object, Scene
+from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import KeyLight, Stage
 
 #: Air between model and ground, as a share of the model's diagonal: rays tell surfaces apart that are so far apart.
@@ -86,3 +87,52 @@ def ground_mesh(scene: Scene, axes: Array) -> Mesh:
 def world_vertices(item: Object) -> Array:
     """(n, 3): vertices of an object in the world, without those that no face uses."""
     return np.asarray(item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3])
+
+
+def upright(scene: AnyScene, up: npt.ArrayLike) -> AnyScene:
+    """Scene turned, with its camera and lights, the shortest way in which `up` (3,) becomes +Y, as stages need it."""
+    turn = np.eye(4)
+    turn[:3, :3] = upright_turn(up)
+    if (turn == np.eye(4)).all():
+        return scene
+    return dataclasses.replace(
+        scene,
+        objects=[dataclasses.replace(item, transform=turn @ item.matrix) for item in scene.objects],
+        camera=dataclasses.replace(scene.camera, pose=turn @ scene.camera.pose),
+        lights=[moved(light, turn) for light in scene.lights],
+    )
+
+
+def upright_turn(up: npt.ArrayLike) -> Array:
+    """(3, 3): the smallest turn that makes a direction +Y."""
+    axis = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
+    if axis[1] < -1.0 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    # Rodrigues' formula for the turn about their cross product (Möller & Hughes 1999).
+    cross = np.array([[0.0, axis[0], 0.0], [-axis[0], 0.0, -axis[2]], [0.0, axis[2], 0.0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + axis[1]))
+
+
+def moved(light: Light, matrix: Array) -> Light:
+    """Light moved by a rigid matrix (4, 4)."""
+    changes: dict[str, Array] = {}
+    if not isinstance(light, PointLight):
+        changes["direction"] = matrix[:3, :3] @ light.direction
+    if not isinstance(light, DirectionalLight):
+        changes["position"] = matrix[:3, :3] @ light.position + matrix[:3, 3]
+    return dataclasses.replace(light, **changes)
+
+
+def has_ground(scene: Scene) -> bool:
+    """Whether an opaque object is a ground, or a room, for all that light enters: below it, and as wide and deep."""
+    if not scene.bodies or not scene.opaque:
+        return False
+    boxes = np.stack([body.bounds for body in scene.bodies])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    margin = GAP * float(np.linalg.norm(high - low))
+    level = [0, 2]
+    return any(
+        bool((item.bounds[0][level] <= low[level] + margin).all() and (item.bounds[1][level] >= high[level] - margin).all())
+        and bool(item.bounds[0][1] <= low[1] + margin)
+        for item in scene.opaque
+    )
