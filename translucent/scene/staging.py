@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -115,11 +115,11 @@ def upright_turn(up: npt.ArrayLike) -> Array:
 
 def moved(light: Light, matrix: Array) -> Light:
     """Light moved by a rigid matrix (4, 4)."""
-    changes: dict[str, Array] = {}
+    changes: dict[str, Any] = {}
     if not isinstance(light, PointLight):
-        changes["direction"] = matrix[:3, :3] @ light.direction
+        changes["direction"] = matrix[:3, :3] @ np.asarray(light.direction)
     if not isinstance(light, DirectionalLight):
-        changes["position"] = matrix[:3, :3] @ light.position + matrix[:3, 3]
+        changes["position"] = matrix[:3, :3] @ np.asarray(light.position) + matrix[:3, 3]
     return dataclasses.replace(light, **changes)
 
 
