@@ -1,5 +1,5 @@
-// Light that reaches a point of an opaque surface through everything on the straight way: a lookup in maps of transmittance to
-// the first opaque surface of each ray of a light. Interpolated between four texels, each of which counts only if the surface, made
+// Light that reaches a point of an opaque surface through everything on the straight way: a lookup in maps of paths to the
+// first opaque surface on each ray of a light. Transmittance is interpolated between four texels, each of which counts only if the surface, made
 // flat, is not behind what is opaque there (receiver plane, Isidoro 2006): so no surface shadows itself, however it is inclined.
 // Needs <constants>. Points count from the center of the media; normals are unit vectors.
 
@@ -7,7 +7,8 @@
 #include <Shadows>
 #include <SkyShadows>
 
-uniform sampler2D shadow_atlas;  // transmittance; metres ahead of the center where the first opaque surface is
+uniform sampler2D shadow_sums;  // path, or of several media optical depths, for each metre ahead
+uniform sampler2D shadow_ends;  // metres ahead of the center where an opaque surface ends the ray
 
 // A map, and how a point projects into it: from -1 to 1, and metres ahead of the light.
 struct ShadowView {
@@ -17,17 +18,21 @@ struct ShadowView {
     vec2 corner;
     float size;
     bool perspective;
+    bool ends;  // opaque objects are in the way of some rays
 };
 
 ShadowView shadow_view(int number) {
     vec4 place = shadow_views[4 * number + 3];
-    return ShadowView(shadow_views[4 * number], shadow_views[4 * number + 1], shadow_views[4 * number + 2], place.xy, place.z, place.w == 1.0);
+    return ShadowView(shadow_views[4 * number], shadow_views[4 * number + 1], shadow_views[4 * number + 2], place.xy, place.z,
+        mod(place.w, 2.0) == 1.0, place.w >= 2.0);
 }
 
 ShadowView sky_view(int number) {
-    int place = int(sky_views[4 * number + 3].w);
+    float numbered = sky_views[4 * number + 3].w;
+    int place = int(abs(numbered)) - 1;
     vec2 corner = float(sky_size) * vec2(place % sky_columns, place / sky_columns);
-    return ShadowView(sky_views[4 * number], sky_views[4 * number + 1], sky_views[4 * number + 2], corner, float(sky_size), false);
+    return ShadowView(sky_views[4 * number], sky_views[4 * number + 1], sky_views[4 * number + 2], corner, float(sky_size),
+        false, numbered < 0.0);
 }
 
 // Which of the six views of a cube looks at a point, given from the light.
@@ -35,6 +40,16 @@ int shadow_cube_face(vec3 from_light) {
     vec3 size = abs(from_light);
     int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     return 2 * axis + (from_light[axis] < 0.0 ? 1 : 0);
+}
+
+// Transmittance of a texel's ray, which advances so many metres for each metre ahead.
+vec3 texel_transmittance(ivec2 at, float advance) {
+#if SHADOW_SPECTRAL
+    vec3 optical_depth = texelFetch(shadow_sums, at, 0).rgb;
+#else
+    vec3 optical_depth = texelFetch(shadow_sums, at, 0).r * shadow_extinction.rgb;
+#endif
+    return exp(-clamp(optical_depth * advance, 0.0, MAX_OPTICAL_DEPTH));
 }
 
 // Transmittance of the way to a point; 1 beyond the map, where nothing is that throws a shadow.
@@ -48,7 +63,8 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal) {
     vec3 plane = vec3(dot(normal, view.right.xyz) / dot(view.right.xyz, view.right.xyz),
                       dot(normal, view.up.xyz) / dot(view.up.xyz, view.up.xyz), dot(normal, view.ahead.xyz));
     float ahead = dot(view.ahead.xyz, point);
-    float texel_metres = 2.0 * spread * inversesqrt(dot(view.right.xyz, view.right.xyz)) / view.size;
+    vec2 spans = inversesqrt(vec2(dot(view.right.xyz, view.right.xyz), dot(view.up.xyz, view.up.xyz)));
+    float texel_metres = 2.0 * spread * spans.x / view.size;
     float steepest = STEEPEST_SHADOW * texel_metres;
     vec2 position = (0.5 * place + 0.5) * view.size - 0.5;
     vec2 corner = floor(position);
@@ -60,9 +76,10 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal) {
         vec2 there = (texel + 0.5) * (2.0 / view.size) - 1.0;
         float tilt = view.perspective ? dot(plane, vec3(there, 1.0)) : plane.z;
         float rise = spread * dot(plane.xy, place - there) / (abs(tilt) > 1e-6 ? tilt : 1e-6);
-        vec4 map = texelFetch(shadow_atlas, ivec2(view.corner + texel), 0);
+        ivec2 at = ivec2(view.corner + texel);
+        if (view.ends && ahead + clamp(rise, -steepest, steepest) > texelFetch(shadow_ends, at, 0).r + SHADOW_MARGIN * texel_metres) { continue; }
         vec2 weights = mix(1.0 - share, share, aside);
-        if (ahead + clamp(rise, -steepest, steepest) <= map.a + SHADOW_MARGIN * texel_metres) { sum += weights.x * weights.y * map.rgb; }
+        sum += weights.x * weights.y * texel_transmittance(at, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0);
     }
     return sum;
 }

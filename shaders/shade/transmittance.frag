@@ -41,7 +41,8 @@ uniform vec4 map_place;
 #if OPAQUE
 uniform sampler2D opaque_axial_depth;
 #endif
-layout(location = 0) out vec4 out_map;
+layout(location = 0) out vec4 out_sums;
+layout(location = 1) out float out_end;
 #else
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
@@ -125,15 +126,16 @@ void main() {
     path.thickness = max(path.thickness, 0.0);
     path.optical_depth = max(path.optical_depth, vec3(0.0));
 
-    vec3 through = transmittance(path.optical_depth);
 #if MAP
 #if OPAQUE
     float end = texelFetch(opaque_axial_depth, texel, 0).r;
 #else
     const float end = NOTHING;
 #endif
-    out_map = vec4(through, end < NOTHING ? map_place.z + end * map_place.w : NOTHING);
+    out_sums = vec4(path.optical_depth / advance, 0.0);
+    out_end = end < NOTHING ? map_place.z + end * map_place.w : NOTHING;
 #else
+    vec3 through = transmittance(path.optical_depth);
 #if EMISSION
     emitted = emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
 #endif

@@ -25,7 +25,7 @@ MOST_FACES = 64
 class EmbreeLightPaths(LightPaths):
     """Light paths as the reference has them, on surfaces that Embree finds and float64 places.
 
-    Lines on which Embree's faces turn out to be others, or do not close a solid, are traced as the reference does.
+    Lines on which Embree's faces turn out to be others, or do not close a body, are traced as the reference does.
     What it may miss is a pair of faces that are within 2e-6 of the size of their mesh.
 
     Parameters
@@ -65,7 +65,8 @@ class _EmbreeObject(TracedObject):
         hits = self.crossings(lines, [(line, face)])
         tried, met = (np.bincount(pixel, minlength=len(lines)) for pixel in (line, hits.pixel))
         doubtful = (tried != met) | (tried >= MOST_FACES)
-        if self.body.mesh.diagnosis.solid:
+        filled = self.body.medium is not None and self.body.sheet_thickness is None
+        if filled or self.body.mesh.diagnosis.solid:
             doubtful |= sum_signs(hits, len(lines)) != 0
         if doubtful.any():
             rest = np.flatnonzero(doubtful)

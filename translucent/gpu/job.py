@@ -46,6 +46,8 @@ class FrameJob(SceneView):
     gl, scene, plan, targets, resources
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
+    placed : PlacedScene, optional
+        The scene before its camera, where axial depths are to count from elsewhere than from where media begin.
 
     Attributes
     ----------
@@ -71,6 +73,7 @@ class FrameJob(SceneView):
         targets: Targets,
         resources: Resources,
         backdrop: Backdrop | TextureBackdrop | None = None,
+        placed: PlacedScene | None = None,
     ) -> None:
         self.started = time.perf_counter()
         self.plan = plan
@@ -80,7 +83,7 @@ class FrameJob(SceneView):
         self.paths_traced = 0
         self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
-        placed = PlacedScene.of(scene)
+        placed = placed or PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
         if self.features.varies:

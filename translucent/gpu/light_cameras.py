@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.geometry.mesh import Mesh
 from translucent.scene.camera import Camera
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Scene
@@ -29,14 +32,33 @@ def media_sphere(scene: Scene) -> tuple[Array, float]:
     return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
 
 
-def world_vertices(item: Object) -> Array:
-    """(n, 3): vertices of an object in the world."""
-    return item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+#: Vertices from which on it pays to find those of the convex hull.
+_MANY = 1000
+
+_HULLS: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
+
+
+def outermost(item: Object) -> Array:
+    """(n, 3): vertices of an object in the world, but for those inside the convex hull of many."""
+    return _outermost(item.mesh) @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+
+
+def _outermost(mesh: Mesh) -> Array:
+    if len(mesh.vertices) < _MANY:
+        return mesh.vertices
+    if mesh not in _HULLS:
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            _HULLS[mesh] = mesh.vertices[ConvexHull(mesh.vertices).vertices]
+        except QhullError:  # flat
+            _HULLS[mesh] = mesh.vertices
+    return _HULLS[mesh]
 
 
 def light_cameras(light: Light, scene: Scene) -> list[Camera]:
     """Cameras of a light: one that sees all media, or six where the light is among them or close by."""
-    points = np.concatenate([world_vertices(body) for body in scene.bodies])
+    points = np.concatenate([outermost(body) for body in scene.bodies])
     return cameras_towards(points, light, *media_sphere(scene))
 
 

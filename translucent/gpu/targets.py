@@ -37,6 +37,13 @@ class Targets:
         """R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
         return self._get("opaque", (1, 4), with_depth=True)
 
+    def opaque_ends(self) -> moderngl.Framebuffer:
+        """Framebuffer `opaque` without radiance."""
+        if ("opaque", 0) not in self._views:
+            both = self.opaque()
+            self._views["opaque", 0] = self._gl.framebuffer(both.color_attachments[:1], both.depth_attachment)
+        return self._views["opaque", 0]
+
     def entered(self) -> moderngl.Framebuffer:
         """RGBA32F interface where a ray first enters a body: normal, axial depth, finish, color; with depth buffer."""
         return self._get("entered", (4, 4, 4), with_depth=True)

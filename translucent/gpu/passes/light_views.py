@@ -179,9 +179,10 @@ def _seen(job: FrameJob) -> object:
         for body in scene.objects
     )
     # What lists hold depends on whether media vary.
-    return objects, tuple(_light_key(light) for light in scene.lights), scene.overlap, job.features.varies
+    return objects, tuple(light_key(light) for light in scene.lights), scene.overlap, job.features.varies
 
 
-def _light_key(light: Light) -> tuple[object, ...]:
+def light_key(light: Light) -> tuple[object, ...]:
+    """Key of where a light is, and where it shines."""
     where = light.position if isinstance(light, PointLight) else light.direction
     return type(light), np.asarray(where).tobytes()

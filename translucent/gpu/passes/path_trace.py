@@ -39,7 +39,8 @@ _UNITS = {
             "light_levels",
             "reflectance_table",
             "seen_map",
-            "shadow_atlas",
+            "shadow_sums",
+            "shadow_ends",
         )
     )
 }
@@ -256,7 +257,7 @@ class PathTracer:
             ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
             DISPERSION=False,
             OPAQUE=job.features.has_opaque,
-            SHADOW_MAPS=job.features.has_shadow_maps,
+            **shadow_switches(job.features.has_shadow_maps, job.resources),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
         )
@@ -279,7 +280,7 @@ class PathTracer:
             "light_levels": maps.levels,
             "reflectance_table": self._reflectance,
         }
-        job.resources.shadows.use(_UNITS["shadow_atlas"])
+        job.resources.shadows.use(_UNITS)
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
         if environment.seen.kind == "image":
