@@ -123,10 +123,9 @@ class Frame:
     def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
-        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them. One alpha cannot
-        tint what is behind: the file is right before white, where it keeps the colors of glass and of shadows, and
-        before black shows the tint as light; alpha is one minus the least of `passed`. Where the frame shines more than
-        it hides, alpha is raised to what the brightest channel needs.
+        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them, for programs that
+        mix encoded colors, as browsers do. One alpha cannot tint what is behind: before white the picture is right, the
+        colors of glass and of shadows included; before black it is where nothing tints, and a tint shines elsewhere.
 
         Parameters
         ----------
@@ -144,14 +143,14 @@ class Frame:
         linear = np.asarray(self.radiance, dtype=np.float64) * exposure_scale(check_exposure(exposure))
         if self.alpha is None:
             return np.rint(linear_to_srgb(curve(linear)) * 255.0).astype(np.uint8)
-        if self.passed is None:
-            alpha = np.asarray(self.alpha, dtype=np.float64)
-        else:
-            least = self.passed.min(axis=-1).astype(np.float64)
-            alpha, linear = 1.0 - least, linear + (self.passed - least[..., None])
-        alpha = np.maximum(alpha, np.minimum(linear.max(axis=-1), 1.0))[..., None]
-        color = linear_to_srgb(curve(np.divide(linear, alpha, out=np.zeros_like(linear), where=alpha > 0)))
-        return np.rint(np.concatenate([color, alpha], axis=-1) * 255.0).astype(np.uint8)
+        passed = self.alpha[..., None] * -1.0 + 1.0 if self.passed is None else self.passed
+        # The same before a black and a white page (Smith & Blinn 1996); pages are white as they are.
+        own = curve(linear)
+        before_black, before_white = linear_to_srgb(own), linear_to_srgb(np.minimum(own + passed, 1.0))
+        alpha = 1.0 - (before_white - before_black).min(axis=-1, keepdims=True)
+        mixed = before_white - (1.0 - alpha)
+        color = np.divide(mixed, alpha, out=np.zeros_like(mixed), where=alpha > 0)
+        return np.rint(np.concatenate([np.clip(color, 0.0, 1.0), alpha], axis=-1) * 255.0).astype(np.uint8)
 
     def save(self, path: str | Path, exposure: float = 0.0, tone: str = "none") -> None:
         """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).
