@@ -17,7 +17,7 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, Stage, stage_named
-from translucent.scene.staging import staged, world_vertices
+from translucent.scene.staging import shadow_points, staged, world_vertices
 from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
@@ -32,7 +32,7 @@ STAGED_IOR = 1.5
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
 
 #: How much larger than the objects a picture of them on a stage is framed, beside its margin.
-ROOM = 1.2
+ROOM = 1.1
 
 #: Names of environments for `named_environment`, besides colors and pictures.
 ENVIRONMENT_NAMES = ("light-table", "studio", "checkerboard")
@@ -131,6 +131,7 @@ def framing(
     points = np.concatenate([world_vertices(item) for item in objects])
     if stage is None:
         return Camera.framing(points, size, fov_y=fov_y, up=up)
+    points = np.concatenate([points, shadow_points(points, stage)])
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
 

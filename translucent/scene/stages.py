@@ -45,12 +45,15 @@ class Stage:
     keys : tuple of KeyLight
     height : float
         Of the default camera over the model, in degrees.
+    far : float
+        Share of its paint that the ground has far away.
     """
 
     ground: Surface
     environment: Callable[[], Environment]
     keys: tuple[KeyLight, ...]
     height: float
+    far: float = 1.0
 
     @property
     def view(self) -> Color:
@@ -71,28 +74,31 @@ STAGED_TONE = "neutral"
 #: All stages by name.
 STAGES = {
     "studio": Stage(
-        Surface(color=(0.72, 0.72, 0.73), roughness=0.25),
+        Surface(color=(0.74, 0.74, 0.75), roughness=0.25),
         lambda: Environment.studio(exposure=-1.0),
-        (KeyLight(-38.0, 48.0, (2.05, 1.98, 1.88)),),
+        (KeyLight(-42.0, 52.0, (2.15, 2.08, 1.98)),),
         height=20.0,
+        far=0.3,
     ),
     "light-table": Stage(
         Surface(color=(0.5, 0.5, 0.5), roughness=0.25, emissive=(0.55, 0.56, 0.58)),
         lambda: Environment.studio(exposure=-1.5),
-        (KeyLight(35.0, 55.0, (0.9, 0.9, 0.9)),),
-        height=32.0,
+        (KeyLight(35.0, 58.0, (0.9, 0.9, 0.9)),),
+        height=34.0,
     ),
     "night": Stage(
-        Surface(color=(0.035, 0.036, 0.04), roughness=0.2),
+        Surface(color=(0.07, 0.072, 0.08), roughness=0.2),
         lambda: Environment.studio(exposure=-2.0),
-        (KeyLight(-30.0, 40.0, (3.4, 3.3, 3.1)),),
-        height=16.0,
+        (KeyLight(-30.0, 45.0, (4.4, 4.2, 3.9)),),
+        height=20.0,
+        far=0.1,
     ),
     "daylight": Stage(
-        Surface(color=(0.78, 0.75, 0.70), roughness=0.7),
-        lambda: Environment.gradient((0.30, 0.29, 0.28), (0.42, 0.50, 0.66)),
-        (KeyLight(50.0, 42.0, (3.0, 2.75, 2.35)),),
-        height=24.0,
+        Surface(color=(0.78, 0.75, 0.70), roughness=0.6),
+        lambda: Environment.gradient((0.34, 0.33, 0.31), (0.42, 0.48, 0.60)),
+        (KeyLight(48.0, 42.0, (3.0, 2.8, 2.45)),),
+        height=26.0,
+        far=0.6,
     ),
 }
 

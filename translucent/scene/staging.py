@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,6 +17,8 @@ from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import KeyLight, Stage
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 #: Air between model and ground, as a share of the model's diagonal: rays tell surfaces apart that are so far apart.
 GAP = 1e-3
@@ -23,8 +26,14 @@ GAP = 1e-3
 #: How far the ground reaches, in diagonals of the model.
 REACH = 60.0
 
+#: How far from the model the ground gets darker, and how far it goes on to, in the same; texels of that, each way.
+BRIGHT, DARK, FALLOFF_SIZE = 0.8, 9.0, 64
+
 #: Directions of the environment that throw shadows onto the ground.
 ENVIRONMENT_SHADOWS = 32
+
+#: Share of the length of shadows that the default camera makes room for.
+SHADOW_SEEN = 0.7
 
 #: What messages call the ground.
 GROUND_NAME = "ground"
@@ -46,7 +55,7 @@ def staged(scene: AnyScene, stage: Stage, environment: Environment | None = None
         In place of the stage's, whose lights stay out, too.
     """
     axes = view_axes(scene.camera)
-    ground = Object(ground_mesh(scene, axes), surface=dataclasses.replace(stage.ground, double_sided=False), shadow_catcher=True)
+    ground = Object(ground_mesh(scene, axes), surface=_finish(stage), shadow_catcher=True)
     lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in stage.keys))
     azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
     made = environment or dataclasses.replace(stage.environment(), rotation=-azimuth)
@@ -68,6 +77,34 @@ def view_axes(camera: Camera) -> Array:
     return np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
 
 
+def shadow_points(points: Array, stage: Stage) -> Array:
+    """(n, 3): places on the ground below points, most of the way to where a stage's lights throw their shadows."""
+    ahead = np.array(stage.view) * (1.0, 0.0, 1.0)
+    ahead /= np.linalg.norm(ahead)
+    axes = np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
+    height = points[:, 1:2] - points[:, 1].min()
+    feet = points - height * (0.0, 1.0, 0.0)
+    ways = [np.asarray(_light(key, axes).direction) for key in stage.keys]
+    return np.concatenate([feet - SHADOW_SEEN * height * way * (1.0, 0.0, 1.0) / way[1] for way in ways])
+
+
+def _finish(stage: Stage) -> Surface:
+    """Finish of the ground: its paint is darker far away, as if the lights stood near the model."""
+    if stage.far == 1.0:
+        return dataclasses.replace(stage.ground, double_sided=False)
+    return dataclasses.replace(stage.ground, double_sided=False, color_texture=_falloff(stage.far))
+
+
+@lru_cache(maxsize=8)
+def _falloff(far: float) -> Texture:
+    """Share of the paint over the texture coordinates of `ground_mesh`: 1 in the middle, `far` at the edges."""
+    center = (np.arange(FALLOFF_SIZE) + 0.5) / FALLOFF_SIZE * 2.0 - 1.0
+    radius = np.hypot(center[:, None], center[None, :]) * DARK
+    share = np.clip((radius - BRIGHT) / (DARK - BRIGHT), 0.0, 1.0)
+    values = 1.0 + (far - 1.0) * share * share * (3.0 - 2.0 * share)
+    return Texture(np.repeat(values[..., None], 3, axis=-1), wrap=("clamp", "clamp"))
+
+
 def _light(key: KeyLight, axes: Array) -> DirectionalLight:
     azimuth, elevation = np.radians(key.azimuth), np.radians(key.elevation)
     towards = np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)
@@ -81,7 +118,8 @@ def ground_mesh(scene: Scene, axes: Array) -> Mesh:
     unit = float(np.linalg.norm(high - low)) or 1.0
     foot = np.array([0.5 * (low[0] + high[0]), low[1] - GAP * unit, 0.5 * (low[2] + high[2])])
     corners = REACH * unit * np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]) @ axes
-    return Mesh(foot + corners, [[0, 1, 2], [0, 2, 3]], name=GROUND_NAME)
+    uv = 0.5 + 0.5 * REACH / DARK * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    return Mesh(foot + corners, [[0, 1, 2], [0, 2, 3]], uv, GROUND_NAME)
 
 
 def world_vertices(item: Object) -> Array:
