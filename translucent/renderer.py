@@ -73,9 +73,7 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[
-            Scene, dict[_Asked, RenderPlan]
-        ] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[_Asked, RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
         self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
@@ -248,7 +246,9 @@ class Renderer:
                 return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
             return self._run(scene, size, chosen, samples, progress)
         _check_backdrop(backdrop, size)
-        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering, shadows=shadows)
+        chosen = self.plan(
+            scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering, shadows=shadows
+        )
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _run(

@@ -42,9 +42,7 @@ def before_page(scene: AnyScene, radiance: float) -> AnyScene:
 def _painted(scene: Scene, item: Object, radiance: float) -> Object:
     paint = np.clip(radiance * np.pi / _irradiance(scene, item), 0.0, 1.0)
     one_sided = item.surface is not None and not item.surface.double_sided
-    return dataclasses.replace(
-        item, surface=Surface(color=paint, ior=1.0, roughness=1.0, double_sided=not one_sided)
-    )
+    return dataclasses.replace(item, surface=Surface(color=paint, ior=1.0, roughness=1.0, double_sided=not one_sided))
 
 
 def _irradiance(scene: Scene, item: Object) -> Array:

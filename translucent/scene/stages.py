@@ -87,8 +87,8 @@ STAGES = {
         height=34.0,
     ),
     "night": Stage(
-        Surface(color=(0.07, 0.072, 0.08), roughness=0.2),
-        lambda: Environment.studio(exposure=-2.0),
+        Surface(color=(0.03, 0.031, 0.035), roughness=0.2),
+        lambda: Environment.studio(exposure=-1.2),
         (KeyLight(-30.0, 45.0, (4.4, 4.2, 3.9)),),
         height=20.0,
         far=0.1,

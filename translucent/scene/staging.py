@@ -170,7 +170,10 @@ def has_ground(scene: Scene) -> bool:
     margin = GAP * float(np.linalg.norm(high - low))
     level = [0, 2]
     return any(
-        bool((item.bounds[0][level] <= low[level] + margin).all() and (item.bounds[1][level] >= high[level] - margin).all())
+        bool(
+            (item.bounds[0][level] <= low[level] + margin).all()
+            and (item.bounds[1][level] >= high[level] - margin).all()
+        )
         and bool(item.bounds[0][1] <= low[1] + margin)
         for item in scene.opaque
     )
