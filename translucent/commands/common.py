@@ -329,9 +329,9 @@ def stage_option(command: F) -> F:
     return click.option(
         "--stage",
         metavar="S",
-        help=f"What the model stands on, and is lit by: {', '.join(STAGE_NAMES)}, or none, before the environment alone. "
-        f"Default: {STAGE_NAMES[0]}; none with --environment or --background, and for a glTF file with a camera, lights "
-        "or a ground of its own.",
+        help=f"What the model stands on, and is lit by: {', '.join(STAGE_NAMES)}, or none, before the environment "
+        f"alone. Default: {STAGE_NAMES[0]}; none with --environment or --background, and for a glTF file with a "
+        "camera, lights or a ground of its own.",
     )(command)
 
 

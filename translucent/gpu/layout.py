@@ -336,10 +336,7 @@ DENSITY = UniformBlock(
     ),
 )
 
-BLOCKS = {
-    block.name: block
-    for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES, SHADOWS, SKY_SHADOWS)
-}
+BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES, SHADOWS, SKY_SHADOWS)}
 
 #: Surface parameters that do not vary over an object: a record for each object.
 SURFACE_ROW = PackedTable(

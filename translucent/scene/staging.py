@@ -16,7 +16,7 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Scene
-from translucent.scene.stages import KeyLight, Stage
+from translucent.scene.stages import DEFAULT_STAGE, KeyLight, Stage, stage_named
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
 
@@ -41,7 +41,7 @@ GROUND_NAME = "ground"
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
-def staged(scene: AnyScene, stage: Stage, environment: Environment | None = None) -> AnyScene:
+def staged(scene: AnyScene, stage: str | Stage = DEFAULT_STAGE, environment: Environment | None = None) -> AnyScene:
     """Scene on a stage: its objects on a ground, lit as its camera sees them; +Y is up.
 
     The ground comes after the objects. It is a little below their lowest point, and is seen from above only.
@@ -50,15 +50,24 @@ def staged(scene: AnyScene, stage: Stage, environment: Environment | None = None
     ----------
     scene : Scene
         Its lights, if it has any, shine in place of the stage's.
-    stage : Stage
+    stage : str or Stage
+        A stage, or its name; ``none`` gives the scene itself.
     environment : Environment, optional
         In place of the stage's, whose lights stay out, too.
+
+    Raises
+    ------
+    InputError
+        If there is no such stage.
     """
+    chosen = stage_named(stage) if isinstance(stage, str) else stage
+    if chosen is None:
+        return scene
     axes = view_axes(scene.camera)
-    ground = Object(ground_mesh(scene, axes), surface=_finish(stage), shadow_catcher=True)
-    lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in stage.keys))
+    ground = Object(ground_mesh(scene, axes), surface=_finish(chosen), shadow_catcher=True)
+    lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in chosen.keys))
     azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
-    made = environment or dataclasses.replace(stage.environment(), rotation=-azimuth)
+    made = environment or dataclasses.replace(chosen.environment(), rotation=-azimuth)
     return dataclasses.replace(
         scene,
         objects=(*scene.objects, ground),
@@ -119,7 +128,7 @@ def ground_mesh(scene: Scene, axes: Array) -> Mesh:
     foot = np.array([0.5 * (low[0] + high[0]), low[1] - GAP * unit, 0.5 * (low[2] + high[2])])
     corners = REACH * unit * np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]) @ axes
     uv = 0.5 + 0.5 * REACH / DARK * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    return Mesh(foot + corners, [[0, 1, 2], [0, 2, 3]], uv, GROUND_NAME)
+    return Mesh(foot + corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), uv, GROUND_NAME)
 
 
 def world_vertices(item: Object) -> Array:

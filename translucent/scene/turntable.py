@@ -22,7 +22,7 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
     """Scenes of a turntable from `count` sides: the camera orbits the center of the objects once, about +Y.
 
     Seen from above it goes counterclockwise. Environment and background go with it, so that the model seems to turn
-    before them; lights stay with the model. On a stage, with a shadow catcher, ground and lights go with the camera, too.
+    before them; lights stay with the model. On a stage, with a shadow catcher, ground and lights go with the camera.
 
     Raises
     ------

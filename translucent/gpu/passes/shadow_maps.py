@@ -119,9 +119,7 @@ class ShadowMapsPass:
         """Render all maps."""
         scene, atlas = job.scene, job.resources.shadows
         corners = [outermost(item) for item in scene.objects]
-        lights, sky = (
-            [ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene))
-        )
+        lights, sky = ([ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene)))
         limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
         views = ShadowViews.of(
             [(found.cameras(), not found.open_ways) for found in lights],
