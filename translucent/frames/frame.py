@@ -123,9 +123,10 @@ class Frame:
     def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
-        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them, for programs that
-        mix encoded colors, as browsers do. One alpha cannot tint what is behind: before white the picture is right,
-        with the colors of glass and of shadows; before black it is where nothing tints, and a tint shines elsewhere.
+        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them, for programs
+        that mix encoded colors, as browsers do. One alpha cannot tint what is behind: before white the picture is
+        right, with the colors of glass and of shadows; before black it is where nothing tints, and a tint shines
+        elsewhere.
 
         Parameters
         ----------

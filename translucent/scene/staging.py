@@ -156,7 +156,7 @@ def upright_turn(up: npt.ArrayLike) -> Array:
     if axis[1] < -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
     # Rodrigues' formula for the turn about their cross product (Möller & Hughes 1999).
-    cross = np.array([[0.0, axis[0], 0.0], [-axis[0], 0.0, -axis[2]], [0.0, axis[2], 0.0]])
+    cross = np.array([[0.0, -axis[0], 0.0], [axis[0], 0.0, axis[2]], [0.0, -axis[2], 0.0]])
     return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + axis[1]))
 
 
