@@ -3,6 +3,7 @@
 // scattered once is found elsewhere.
 
 #include "lib/interface.glsl"
+#include "lib/lights.glsl"
 #include "lib/optics.glsl"
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
@@ -57,7 +58,9 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
     irradiance = light_power[light].rgb / (position.w == 0.0 ? 1.0 : distance_m * distance_m);
-    return towards / distance_m;
+    towards /= distance_m;
+    irradiance *= cone_attenuation(-towards, light_cone[light]);
+    return towards;
 }
 
 // Microfacets that mirror the lights; nothing shadows them.

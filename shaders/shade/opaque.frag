@@ -7,6 +7,7 @@
 #include <Environment>
 #include <Lights>
 #include "lib/environment.glsl"
+#include "lib/lights.glsl"
 #include "lib/ray.glsl"
 #include "shade/shadows.glsl"
 #if SURFACE
@@ -49,6 +50,7 @@ vec3 irradiance_from(int light, vec3 normal) {
     vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
     float facing = max(dot(towards / distance_m, normal), 0.0);
+    facing *= cone_attenuation(-towards / distance_m, light_cone[light]);
     vec3 power = light_power[light].rgb * (position.w == 0.0 ? facing : facing / distance_m / distance_m);
     return facing > 0.0 ? power * light_reaching(light, from_center, normal) : vec3(0.0);
 }

@@ -3,6 +3,7 @@
 // microfacets is given back by a factor (Turquin 2019). Needs <constants>, <Lights> and a texture `reflectance_table`.
 
 #include "lib/interface.glsl"
+#include "lib/lights.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/highlight.glsl"
 #include "shade/shadows.glsl"
@@ -62,6 +63,7 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
         float distance_m = max(length(way), 1e-18);
         vec3 towards = way / distance_m;
         vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;
+        irradiance *= cone_attenuation(-towards, light_cone[light]);
         float cos_light = dot(normal, towards);
         if (cos_light > 0.0 || finish.passed_share > 0.0) { irradiance *= light_reaching(light, point, normal); }
         if (cos_light <= 0.0) {

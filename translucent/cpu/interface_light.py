@@ -13,7 +13,7 @@ from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import seen_from
 from translucent.reference.rays import Rays
 from translucent.reference.surface_light import SurfaceLight
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 
 
 class InterfaceLight:
@@ -69,7 +69,7 @@ class InterfaceLight:
         cos_view = np.clip(dot(normals, to_eye), 0.0, 1.0)
         for light in self.scene.lights:
             own = seen_from(light, self.scene.camera.eye)
-            if isinstance(own, PointLight):
+            if isinstance(own, PositionalLight):
                 to_light = unit(np.asarray(own.position) - points)
             else:
                 to_light = np.broadcast_to(-np.asarray(own.direction), points.shape)

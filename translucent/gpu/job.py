@@ -60,10 +60,14 @@ class FrameJob(SceneView):
         Random paths of each pixel that have ended so far.
     report : callable
         Takes the share of the frame's paths that have ended, now and then.
+    corner : (int, int)
+        Left and bottom of the picture in its targets.
     covered : Part
         Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
         the bottom, as geometry is drawn.
     """
+
+    corner: tuple[int, int] = (0, 0)
 
     def __init__(
         self,
@@ -119,7 +123,7 @@ class FrameJob(SceneView):
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene
         depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
-        self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths))
+        self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths, self.corner))
         self.covered = part_of(self._extents[self._media], shift, self.targets.size)
         self._cleared.clear()
 

@@ -272,6 +272,7 @@ LIGHTS = UniformBlock(
     (
         ("light_position", "f4", (MAX_LIGHTS, 4)),  # from the eye, w = 1; or direction to the light, w = 0
         ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance
+        ("light_cone", "f4", (MAX_LIGHTS, 4)),  # as cone_attenuation takes it
         ("light_count", "i4", ()),
     ),
 )
@@ -310,6 +311,7 @@ SCATTER = UniformBlock(
         ("scatter_near", "f4", (4,)),  # metres of axial depth 0 ahead of the eye; ahead of the center; 1 in perspective
         ("scatter_light_position", "f4", (MAX_SCATTER_LIGHTS, 4)),  # position, w = 1; or direction to the light, w = 0
         ("scatter_light_power", "f4", (MAX_SCATTER_LIGHTS, 4)),  # intensity or irradiance; w: 1 if inside a body
+        ("scatter_light_cone", "f4", (MAX_SCATTER_LIGHTS, 4)),  # as cone_attenuation takes it
         (
             "scatter_light_views",
             "f4",
@@ -336,7 +338,10 @@ DENSITY = UniformBlock(
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES, SHADOWS, SKY_SHADOWS)}
+BLOCKS = {
+    block.name: block
+    for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES, SHADOWS, SKY_SHADOWS)
+}
 
 #: Surface parameters that do not vary over an object: a record for each object.
 SURFACE_ROW = PackedTable(

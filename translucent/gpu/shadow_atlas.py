@@ -58,7 +58,12 @@ class ShadowView:
         half_width, half_height = camera.half_extent((self.size, self.size))
         axes = np.stack([camera.right / half_width, camera.up / half_height, camera.forward])
         perspective = camera.fov_y is not None
-        return np.concatenate([np.column_stack([axes, axes @ (center - camera.eye)]), [[*self.corner, self.size, perspective + 2 * self.ends]]])
+        return np.concatenate(
+            [
+                np.column_stack([axes, axes @ (center - camera.eye)]),
+                [[*self.corner, self.size, perspective + 2 * self.ends]],
+            ]
+        )
 
 
 #: Cameras of a light, and whether opaque objects are in its way.
@@ -169,7 +174,10 @@ def _placed(
     for cameras, ends in lights:
         places = [divmod(number + i, across) for i in range(len(cameras))]
         groups.append(
-            tuple(ShadowView(camera, (x * side, y * side), side, ends) for camera, (y, x) in zip(cameras, places, strict=True))
+            tuple(
+                ShadowView(camera, (x * side, y * side), side, ends)
+                for camera, (y, x) in zip(cameras, places, strict=True)
+            )
         )
         number += len(cameras)
     first = -(-number // across) * SKY_SHARE * columns
@@ -226,7 +234,7 @@ class ShadowAtlas:
 
     @property
     def ends(self) -> moderngl.Framebuffer:
-        """Framebuffer (R32F) of metres ahead of the center where an opaque surface ends the rays; with a depth buffer."""
+        """Framebuffer (R32F) of metres ahead of the center where opaque surfaces end rays; with a depth buffer."""
         return self._framebuffers[1]
 
     @property

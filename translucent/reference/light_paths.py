@@ -16,7 +16,7 @@ from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
-from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight
+from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene
 
 #: Distance, as a share of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it lies
@@ -147,7 +147,7 @@ class LightPaths:
 
 def _from_eye(light: Light, eye: Array) -> Light:
     """The light with its position, where it has one, relative to the eye."""
-    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light
 
 
 def way_of(light: Light, points: Array) -> tuple[Array, Array]:

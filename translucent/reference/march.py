@@ -29,7 +29,7 @@ from translucent.reference.scattering import light_source, light_variable
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import points_on
 from translucent.scene.camera import check_size
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Scene
 
 Compositing = Literal["front-to-back", "back-to-front"]
@@ -191,8 +191,8 @@ class _March:
         lights = self.paths.lights if self.paths.volume.scatters else ()
         if self.scheme.method.quadrature != "equiangular":
             return [_Terms(True, lights)]
-        point = tuple(light for light in lights if isinstance(light, PointLight))
-        other = tuple(light for light in lights if not isinstance(light, PointLight))
+        point = tuple(light for light in lights if isinstance(light, PositionalLight))
+        other = tuple(light for light in lights if not isinstance(light, PositionalLight))
         return [_Terms(True, other), *(_Terms(False, (light,), light) for light in point)]
 
     def _composited(self, terms: _Terms) -> Layer:

@@ -21,7 +21,7 @@ from translucent.reference.legs import Legs
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
 from translucent.reference.opaque import Irradiance, seen_from
 from translucent.reference.straight_light import StraightLight
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 
 #: Number of passages through a rough sheet after which light counts as lost.
 MOST_PASSAGES = 64
@@ -57,8 +57,8 @@ class Meetings:
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     lamps : StraightLight, optional
-        To add the light of point and directional lights that rough interfaces of solids turn into the legs, on either
-        side, attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
+        To add the light of `Scene.lights` that rough interfaces of solids turn into the legs, on either side,
+        attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
     """
 
     def __init__(
@@ -237,12 +237,12 @@ class Meetings:
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Add highlights of point and directional lights in rough interfaces, by single reflection without shadows."""
+        """Add highlights of `Scene.lights` in rough interfaces, by single reflection without shadows."""
         scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
         to_eye = -self.legs.rays.directions[rough]
         for light in scene.lights if rough.size else ():
             light = seen_from(light, scene.camera.eye)
-            if isinstance(light, PointLight):
+            if isinstance(light, PositionalLight):
                 to_light = np.asarray(light.position) - points
                 to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), np.finfo(np.float64).tiny)
             else:

@@ -10,7 +10,7 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.rays import Rays
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
 #: Irradiance (k, 3) on surfaces at points (k, 3), in metres from the eye, with unit normals (k, 3).
@@ -87,4 +87,4 @@ def _lambert(body: Object, face: Integers, distance: Array, rays: Rays, irradian
 
 def seen_from(light: Light, eye: Array) -> Light:
     """Light with its position, if it has one, relative to the eye."""
-    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light

@@ -151,7 +151,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
     ]
     if not scene.lights or not polished:
         return ()
-    text = "light of point and directional lights that polished interfaces bend on its way: in media, and as caustics"
+    text = "light of lamps and directional lights that polished interfaces bend on its way: in media, and as caustics"
     return (Note(NoteKind.LIGHTS_LEFT_OUT, text),)
 
 

@@ -63,7 +63,7 @@ def showcase(
     environment : Environment, optional
         Default: the stage's; without one, a light table, white above and light gray below. Lights show best before a
         dark one.
-    lights : sequence of PointLight or DirectionalLight
+    lights : sequence of PointLight, SpotLight or DirectionalLight
         What shines, in place of the stage's lights.
     stage : str, optional
         One of `translucent.scene.stages.STAGES`, or ``none``: what the mesh stands on and before. +Y is up. The

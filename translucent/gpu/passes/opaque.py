@@ -58,8 +58,7 @@ class OpaquePass:
         view.gl.depth_func = "<"
 
     def draw_depth(self, view: SceneView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer) -> None:
-        """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer.
-        """
+        """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer."""
         framebuffer.use()
         view.gl.enable_only(moderngl.DEPTH_TEST)
         common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "SHADOW_MAPS": False, "SHADOW_SPECTRAL": False}

@@ -14,6 +14,7 @@ from translucent.errors import RenderError
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.opaque import shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed, record_at_eye
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform

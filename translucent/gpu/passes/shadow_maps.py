@@ -11,11 +11,11 @@ import moderngl
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
 from translucent.gpu.light_cameras import outermost
-from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.light_views import light_key
@@ -66,6 +66,7 @@ class MapJob(FrameJob):
         center: Array,
     ) -> None:
         self._view = view
+        self.corner = view.corner
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
         super().__init__(gl, scene, plan, targets, resources, placed=placed)
@@ -88,8 +89,8 @@ class MapJob(FrameJob):
 class ShadowMapsPass:
     """Transmittance to the first opaque surface on each ray of each light; see ``shaders/shade/shadows.glsl``.
 
-    Each map is a frame of its own, which the light sees: its scene has no interfaces and only absorbs, and the passes of
-    the plan for that scene find the paths through its media.
+    Each map is a frame of its own, which the light sees: its scene has no interfaces and only absorbs, and the passes
+    of the plan for that scene find the paths through its media.
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
@@ -119,7 +120,9 @@ class ShadowMapsPass:
         """Render all maps."""
         scene, atlas = job.scene, job.resources.shadows
         corners = [outermost(item) for item in scene.objects]
-        lights, sky = ([ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene)))
+        lights, sky = (
+            [ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene))
+        )
         limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
         views = ShadowViews.of(
             [(found.cameras(), not found.open_ways) for found in lights],

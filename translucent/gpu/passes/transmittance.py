@@ -67,7 +67,7 @@ class TransmittancePass:
     def run_map(
         self, job: FrameJob, into: moderngl.Framebuffer, corner: tuple[int, int], ahead: tuple[float, float]
     ) -> None:
-        """Write optical depths, and where the first opaque surface is, into the part of a map of shadows with this corner.
+        """Write optical depths, and where the first opaque surface is, into the map of shadows with this corner.
 
         `ahead` is metres ahead of the center of the media at axial depth 0, and from there to axial depth 1.
         """
