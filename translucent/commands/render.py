@@ -74,7 +74,11 @@ from translucent.errors import InputError
     type=click.Choice(["pyrender"]),
     help="Let another renderer draw the opaque objects of a glTF file.",
 )
-@click.option("--transparent", is_flag=True, help="Leave out what is behind: alpha, and of a stage the shadow (a shadow catcher).")
+@click.option(
+    "--transparent",
+    is_flag=True,
+    help="Leave out what is behind: a picture with alpha, and of the stage no more than shadows (a shadow catcher).",
+)
 @picture_options
 @overwrite_option
 @click.option("--backend", metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
@@ -121,8 +125,9 @@ def render(
 ) -> None:
     """Render MODEL, a file or one of the toolkit's own meshes, to a picture with its physical quantities.
 
-    The model stands on a ground with its shadow; see --stage. A .glb or .gltf file is rendered as the scene that it is, with the media of its materials; --color, --preset or
-    --scattering-color replaces them. All other files are one mesh.
+    The model stands on a ground with its shadow; see --stage. A .glb or .gltf file is rendered as the scene that it is,
+    with the media of its materials; --color, --preset or --scattering-color replaces them. All other files are one
+    mesh.
     """
     import translucent as tl
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
