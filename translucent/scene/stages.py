@@ -8,6 +8,7 @@ from math import cos, radians, sin
 
 from translucent.errors import InputError
 from translucent.scene.environment import Environment
+from translucent.scene.studio import dark_studio_map
 from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
@@ -87,11 +88,11 @@ STAGES = {
         height=34.0,
     ),
     "night": Stage(
-        Surface(color=(0.03, 0.031, 0.035), roughness=0.2),
-        lambda: Environment.studio(exposure=-1.2),
-        (KeyLight(-30.0, 45.0, (4.4, 4.2, 3.9)),),
+        Surface(color=(0.05, 0.052, 0.058), roughness=0.15),
+        lambda: Environment.image(dark_studio_map(), exposure=-0.6),
+        (KeyLight(-30.0, 46.0, (4.6, 4.4, 4.1)),),
         height=20.0,
-        far=0.1,
+        far=0.05,
     ),
     "daylight": Stage(
         Surface(color=(0.78, 0.75, 0.70), roughness=0.6),
