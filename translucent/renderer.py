@@ -45,7 +45,7 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces, scattering and shadows.
+#: What a plan is made for beside the scene: method, whether there is a backdrop, interfaces, scattering, shadows.
 _Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, ShadowMaps | None]
 
 

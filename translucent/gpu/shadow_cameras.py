@@ -54,7 +54,10 @@ class ShadowThrowers:
         if not throwing:
             return []
         points = np.concatenate(throwing)
-        low, high = points.min(axis=0), points.max(axis=0)
+        low, high = (
+            np.min([part.T.min(axis=1) for part in throwing], axis=0),
+            np.max([part.T.max(axis=1) for part in throwing], axis=0),
+        )
         radius = 0.5 * float(np.linalg.norm(high - low)) or self._scene.diagonal or 1.0
         return cameras_towards(points, self._light, 0.5 * (low + high), radius)
 

@@ -67,6 +67,7 @@ class MapJob(FrameJob):
     ) -> None:
         self._view = view
         self.corner = view.corner
+        self.path_only = not resources.shadows.spectral
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
         super().__init__(gl, scene, plan, targets, resources, placed=placed)
@@ -99,6 +100,7 @@ class ShadowMapsPass:
         self._resolve = TransmittancePass(gl)
         self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
         self._targets: dict[int, Targets] = {}
+        self._plans: dict[bool, tuple[object, Scene, RenderPlan]] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Render the maps, if objects or lights have changed, and write the uniforms."""
@@ -153,8 +155,13 @@ class ShadowMapsPass:
     def _planned(self, scene: Scene, *, opaque: bool) -> tuple[Scene, RenderPlan]:
         """The scene without interfaces, with or without opaque objects, and its plan."""
         objects = [item for item in scene.objects if opaque or item.medium is not None]
-        seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
-        return seen, plan(seen, None, Capabilities(shader_storage=self._gl.version_code >= _SHADER_STORAGE))
+        # Lights move more often than objects change.
+        key = tuple(map(weakref.ref, objects)), scene.overlap
+        if self._plans.get(opaque, (None,))[0] != key:
+            seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
+            storage = self._gl.version_code >= _SHADER_STORAGE
+            self._plans[opaque] = key, seen, plan(seen, None, Capabilities(shader_storage=storage))
+        return self._plans[opaque][1:]
 
     def _add_up(self, light: MapJob) -> None:
         """Draw one map where it is."""
