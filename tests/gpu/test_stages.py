@@ -93,3 +93,39 @@ def test_an_eye_below_sees_the_model_and_no_ground(renderer: tl.Renderer) -> Non
     frame = renderer.render(scene, SIZE)
     alone = tl.Scene(scene.objects[:1], camera, environment=scene.environment)
     np.testing.assert_allclose(frame.radiance, renderer.render(alone, SIZE).radiance, atol=1e-5)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_the_ground_mirrors_what_a_mirrored_eye_sees(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch, unit: float
+) -> None:
+    """With a polished coat, bodies change Fresnel's share of what an eye sees from as far below the ground."""
+    # Black and polished: what is seen of the ball is mirrored once, and above the horizon without any tracing.
+    ball = tl.Object(tl.Mesh(unit * BALL.vertices, BALL.faces), tl.Medium(absorption=1e4 / unit, ior=1.5))
+    coat = tl.Surface(color=(0.2, 0.2, 0.2), roughness=0.0, double_sided=False)
+    ground = dataclasses.replace(catcher(unit), surface=coat)
+    lift = np.eye(4)
+    lift[1, 3] = 1.2 * unit
+    eye, target = np.array([0.0, 3.0, 7.0]) * unit, np.array([0.0, 0.0, 1.0]) * unit
+    sky = tl.Environment.gradient((0.9, 0.9, 0.9), (0.2, 0.4, 0.8))
+    camera = tl.Camera.look_at(eye, target, fov_y=40)
+    scene = tl.Scene([dataclasses.replace(ball, transform=lift), ground], camera, environment=sky)
+    with_image = renderer.render(scene, SIZE)
+    assert "'mesh' mirrors what stands on it, once" in str(with_image.plan)
+    with monkeypatch.context() as patch:
+        patch.setattr("translucent.gpu.passes.traced_interfaces.mirror_of", lambda scene: None)
+        without = renderer.render(scene, SIZE)
+    changed = (with_image.radiance - without.radiance)[~with_image.coverage]
+    down = np.array([1.0, -1.0, 1.0])
+    below = dataclasses.replace(scene, camera=tl.Camera.look_at(eye * down, target * down, fov_y=40))
+    seen = renderer.render(below, SIZE)
+    _, rays = camera.rays(SIZE)
+    cosine = np.abs(rays[..., 1])
+    fresnel = 0.04 + 0.96 * (1.0 - cosine) ** 5  # Schlick's curve, as coats of opaque objects have it
+    image = fresnel[..., None] * (seen.radiance[::-1] - sky.lighting(rays * down))
+    expected = np.where(seen.coverage[::-1, :, None], image, 0.0)[~with_image.coverage]
+    assert (np.abs(expected).max(axis=1) > 0.02).sum() > 100
+    off = np.abs(changed - expected).max(axis=1)
+    # The table of the split sum has steps of 1/31; at the edge of the ball two pixels may see different things.
+    assert np.mean(off < 5e-3) > 0.97
+    assert np.median(off[np.abs(expected).max(axis=1) > 0.02]) < 1.5e-3

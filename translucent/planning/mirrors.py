@@ -47,7 +47,11 @@ def mirror_of(scene: Scene) -> Mirror | None:
         surface = item.surface
         if not item.shadow_catcher or surface is None or surface.ior == 1.0 or surface.metallic > 0:
             continue
-        if surface.roughness > MOST_ROUGHNESS or surface.roughness_texture is not None or surface.normal_texture is not None:
+        if (
+            surface.roughness > MOST_ROUGHNESS
+            or surface.roughness_texture is not None
+            or surface.normal_texture is not None
+        ):
             continue
         corners = (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3])[item.mesh.faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)

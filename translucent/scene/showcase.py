@@ -17,7 +17,7 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, Stage, stage_named
-from translucent.scene.staging import shadow_points, staged, world_vertices
+from translucent.scene.staging import stage_lights, staged, with_shadows, world_vertices
 from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
@@ -131,7 +131,7 @@ def framing(
     points = np.concatenate([world_vertices(item) for item in objects])
     if stage is None:
         return Camera.framing(points, size, fov_y=fov_y, up=up)
-    points = np.concatenate([points, shadow_points(points, stage)])
+    points = with_shadows(points, stage_lights(stage))
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
+from translucent.errors import InputError
 from translucent.geometry.grouping import used_vertices
 from translucent.geometry.mesh import Mesh
 from translucent.scene.camera import Camera
@@ -34,6 +36,9 @@ ENVIRONMENT_SHADOWS = 32
 
 #: Share of the length of shadows that the default camera makes room for.
 SHADOW_SEEN = 0.7
+
+#: Sine of the elevation of lights below which shadows have no end to make room for.
+LOWEST = 0.3
 
 #: What messages call the ground.
 GROUND_NAME = "ground"
@@ -86,15 +91,21 @@ def view_axes(camera: Camera) -> Array:
     return np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
 
 
-def shadow_points(points: Array, stage: Stage) -> Array:
-    """(n, 3): places on the ground below points, most of the way to where a stage's lights throw their shadows."""
+def stage_lights(stage: Stage) -> list[DirectionalLight]:
+    """Lights of a stage as the default camera sees it."""
     ahead = np.array(stage.view) * (1.0, 0.0, 1.0)
     ahead /= np.linalg.norm(ahead)
     axes = np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
+    return [_light(key, axes) for key in stage.keys]
+
+
+def with_shadows(points: Array, lights: Sequence[Light]) -> Array:
+    """(n, 3): points, and places on the ground below them most of the way to where lights throw their shadows."""
     height = points[:, 1:2] - points[:, 1].min()
     feet = points - height * (0.0, 1.0, 0.0)
-    ways = [np.asarray(_light(key, axes).direction) for key in stage.keys]
-    return np.concatenate([feet - SHADOW_SEEN * height * way * (1.0, 0.0, 1.0) / way[1] for way in ways])
+    ways = [np.asarray(light.direction) for light in lights if isinstance(light, DirectionalLight)]
+    shadows = [feet - SHADOW_SEEN * height * way * (1.0, 0.0, 1.0) / way[1] for way in ways if way[1] < -LOWEST]
+    return np.concatenate([points, *shadows])
 
 
 def _finish(stage: Stage) -> Surface:
@@ -152,7 +163,10 @@ def upright(scene: AnyScene, up: npt.ArrayLike) -> AnyScene:
 
 def upright_turn(up: npt.ArrayLike) -> Array:
     """(3, 3): the smallest turn that makes a direction +Y."""
-    axis = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
+    axis = np.asarray(up, dtype=np.float64)
+    if not (length := float(np.linalg.norm(axis))) > 0:
+        raise InputError(f"up {tuple(axis.tolist())}", "it is no direction", "give for example 0,0,1")
+    axis = axis / length
     if axis[1] < -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
     # Rodrigues' formula for the turn about their cross product (Möller & Hughes 1999).

@@ -12,7 +12,7 @@ from translucent.errors import InputError
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
-from translucent.scene.staging import moved
+from translucent.scene.staging import moved, with_shadows
 
 #: Slices of a model, and points around each, that enclose it as it turns.
 CUTS, POINTS_AROUND = 32, 48
@@ -32,13 +32,12 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
     if not isinstance(count, int) or count < 2:
         raise InputError(f"turntable of {count!r} pictures", "not a whole number above 1", "give for example 36")
     center = scene.shown_bounds.mean(axis=0)
-    on_stage = any(item.shadow_catcher for item in scene.objects)
     for i in range(count):
         angle = 360.0 * i / count
         turn = _about(center, angle)
         camera = dataclasses.replace(scene.camera, pose=turn @ scene.camera.pose)
         view = dataclasses.replace(scene, camera=camera, environment=_turned(scene.environment, angle))
-        yield _with_stage_turned(view, turn) if on_stage else view
+        yield _with_stage_turned(view, turn) if on_stage(scene) else view
 
 
 def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
@@ -50,6 +49,8 @@ def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
     if camera.fov_y is None:
         return scene
     points = swept_points(scene)
+    if on_stage(scene):
+        points = with_shadows(points, scene.lights)
     return dataclasses.replace(
         scene, camera=Camera.framing(points, size, direction=camera.forward, fov_y=camera.fov_y, up=camera.up)
     )
@@ -89,6 +90,11 @@ def _about(center: Array, angle: float) -> Array:
     matrix[:3, :3] = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]]
     matrix[:3, 3] = center - matrix[:3, :3] @ center
     return matrix
+
+
+def on_stage(scene: Scene) -> bool:
+    """Whether a scene has a shadow catcher."""
+    return any(item.shadow_catcher for item in scene.objects)
 
 
 def _with_stage_turned(scene: Scene, turn: Array) -> Scene:
