@@ -223,7 +223,8 @@ class TestRendering:
             output = tmp_path / f"{name}.npz"
             asked = ("--scattering", name) if name else ()
             asked += ("--diffusion-resolution", "16") if name == "diffusion" else ()
-            result = run("render", cube, "-o", output, "--size", "9x5", "--samples", "1", "--stage", "none", *medium, *asked)
+            alone = ("--size", "9x5", "--samples", "1", "--stage", "none")
+            result = run("render", cube, "-o", output, *alone, *medium, *asked)
             assert result.code == 0
             told[name] = result.out
             with np.load(output) as arrays:

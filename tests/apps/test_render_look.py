@@ -130,7 +130,8 @@ class TestRendering:
             assert np.ptp(edge, axis=1).max() < 20
 
     def test_quantities_are_written_as_pictures(self, run: Run, tmp_path: Path) -> None:
-        result = run("render", "bear", "-o", tmp_path / "bear.png", *SMALL, "--stage", "none", "--aov", tmp_path / "aovs")
+        options = (*SMALL, "--stage", "none", "--aov", tmp_path / "aovs")
+        result = run("render", "bear", "-o", tmp_path / "bear.png", *options)
         assert (result.code, result.err) == (0, "")
         names = sorted(file.name for file in (tmp_path / "aovs").iterdir())
         assert names == ["thickness.png", "transmittance.png", "validity.png"]

@@ -42,7 +42,7 @@ class Mirror(NamedTuple):
 
 
 def mirror_of(scene: Scene) -> Mirror | None:
-    """The ground of a scene that mirrors its bodies, if it has one: the first flat shadow catcher with a smooth coat."""
+    """Ground of a scene that mirrors its bodies, if it has one: the first flat shadow catcher with a smooth coat."""
     for item in scene.objects:
         surface = item.surface
         if not item.shadow_catcher or surface is None or surface.ior == 1.0 or surface.metallic > 0:
