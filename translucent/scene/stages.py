@@ -83,7 +83,7 @@ STAGES = {
     ),
     "light-table": Stage(
         Surface(color=(0.5, 0.5, 0.5), roughness=0.25, emissive=(0.55, 0.56, 0.58)),
-        lambda: Environment.studio(exposure=-1.5),
+        lambda: Environment.studio(exposure=-1.5).with_background(Environment.constant((0.9, 0.91, 0.93))),
         (KeyLight(35.0, 58.0, (0.9, 0.9, 0.9)),),
         height=34.0,
     ),
