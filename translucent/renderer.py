@@ -279,13 +279,9 @@ class Renderer:
         before_black, before_white = (
             self._run(before_page(scene, level), size, chosen, samples, progress) for level in (0.0, white)
         )
-        behind = (before_white.radiance.astype(np.float64) - before_black.radiance) / white
-        passed = np.clip(behind, 0.0, 1.0)
-        return dataclasses.replace(
-            before_black,
-            alpha=(1.0 - np.clip(behind.mean(axis=-1), 0.0, 1.0)).astype(np.float32),
-            passed=passed.astype(np.float32),
-        )
+        passed = np.clip((before_white.radiance.astype(np.float64) - before_black.radiance) / white, 0.0, 1.0)
+        alpha = 1.0 - passed.mean(axis=-1)
+        return dataclasses.replace(before_black, alpha=alpha.astype(np.float32), passed=passed.astype(np.float32))
 
     def draw(
         self,
