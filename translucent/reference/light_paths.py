@@ -13,7 +13,7 @@ from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs
 from translucent.reference.rays import Rays
-from translucent.reference.sheets import scene_crossings
+from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PositionalLight
@@ -120,7 +120,9 @@ class LightPaths:
         """
         traced = self.tracer.objects[index]
         open_body = traced.body.medium is not None and not traced.body.mesh.diagnosis.solid
-        end = np.full(len(rays), np.inf) if open_body else length
+        # A sheet that lies where the path ends is on it, whichever comes first by rounding.
+        beyond = 0.0 if self.sheets[index] is None else SHEET_ON_OPAQUE * self.scene.diagonal
+        end = np.full(len(rays), np.inf) if open_body else length + beyond
         return traced.hits(Lines(rays.origins, rays.directions, np.full(len(rays), -np.inf), end))
 
     def _intervals(self, hits: list[Hits], length: Array) -> tuple[Intervals, Mask]:
