@@ -53,6 +53,7 @@ def test_the_ground_is_just_below_everything(name, unit):
     heights = world_vertices(ground)[:, 1]
     # float64 at coordinates of 20: far below the gap.
     np.testing.assert_allclose(points[:, 1].min() - heights, GAP * size, rtol=1e-9)
+    assert 3e-4 <= GAP <= 2e-3  # more than rays step off surfaces, mirrored ones 1e-4, and less than a pixel or two
     assert (ground.bounds[0, [0, 2]] < points.min(axis=0)[[0, 2]] - 10 * size).all()
     assert (ground.bounds[1, [0, 2]] > points.max(axis=0)[[0, 2]] + 10 * size).all()
     corners = world_vertices(ground)[ground.mesh.faces]
