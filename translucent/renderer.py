@@ -6,6 +6,7 @@ import dataclasses
 import sys
 import warnings
 from collections.abc import Callable
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeAlias, get_args
 from weakref import WeakKeyDictionary
@@ -18,6 +19,7 @@ from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
+from translucent.planning.caustics import Caustics, check_caustics
 from translucent.planning.interface_choice import check_interfaces
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
@@ -44,8 +46,8 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces and scattering.
-_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None]
+#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces, scattering, caustics.
+_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, Caustics | None]
 
 
 class Renderer:
@@ -72,9 +74,7 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[
-            Scene, dict[tuple[Method | None, bool, Interfaces | None, Scattering | None], RenderPlan]
-        ] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[_Asked, RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
         self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
@@ -123,15 +123,20 @@ class Renderer:
         over_backdrop: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        caustics: Caustics | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         check_interfaces(interfaces)
         check_scattering(scattering)
+        check_caustics(caustics)
+        if over_backdrop and caustics is not None:
+            found = "what is drawn elsewhere has no mesh that light could land on"
+            raise InputError("caustics before a backdrop", found, "leave out one of the two")
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, interfaces, scattering)) not in plans:
-            make = plan_over_backdrop if over_backdrop else plan
+        if (key := (method, over_backdrop, interfaces, scattering, caustics)) not in plans:
+            make = plan_over_backdrop if over_backdrop else partial(plan, caustics=caustics)
             plans[key] = make(scene, method, self._engine.capabilities, interfaces=interfaces, scattering=scattering)
         return plans[key]
 
@@ -146,6 +151,7 @@ class Renderer:
         transparent: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        caustics: Caustics | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
@@ -173,6 +179,9 @@ class Renderer:
         scattering : Diffusion, ScatteringLayer or SingleScattering, optional
             How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
             back, or not at all; None lets the planner pick for each body.
+        caustics : Caustics, optional
+            Photons that carry the light of lamps through interfaces, and by their mirrors, onto opaque objects. None,
+            the default: no caustics.
         progress : callable, optional
             Takes the share of random paths that have ended, 0 to 1, some times a second: they may take long.
 
@@ -186,7 +195,8 @@ class Renderer:
         ------
         InputError
             If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
-            scene has opaque objects besides it; if interfaces or scattering cannot be had as asked for.
+            scene has opaque objects besides it; if interfaces, scattering or caustics cannot be had
+            as asked for.
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
@@ -204,6 +214,7 @@ class Renderer:
                 transparent=transparent,
                 interfaces=interfaces,
                 scattering=scattering,
+                caustics=caustics,
                 progress=progress,
             )
         except BaseException as error:
@@ -224,15 +235,18 @@ class Renderer:
         transparent: bool,
         interfaces: Interfaces | None,
         scattering: Scattering | None,
+        caustics: Caustics | None,
         progress: Callable[[float], None] | None,
     ) -> Frame:
         if transparent or backdrop is None:
-            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering)
+            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=caustics)
             if transparent:
                 return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
             return self._run(scene, size, chosen, samples, progress)
         _check_backdrop(backdrop, size)
-        chosen = self.plan(scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering)
+        chosen = self.plan(
+            scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering, caustics=caustics
+        )
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _run(

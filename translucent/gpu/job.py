@@ -56,6 +56,8 @@ class FrameJob(SceneView):
         Number of the sample that is drawn, from 0, and how many are summed up; 0 of 1 at the pixel centers.
     paths_traced : int
         Random paths of each pixel that have ended so far.
+    photons_followed : int
+        In the samples of the frame so far.
     report : callable
         Takes the share of the frame's paths that have ended, now and then.
     covered : Part
@@ -78,6 +80,7 @@ class FrameJob(SceneView):
         self.averaging = False
         self.sample, self.samples = 0, 1
         self.paths_traced = 0
+        self.photons_followed = 0
         self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
         placed = PlacedScene.of(scene)
@@ -188,6 +191,6 @@ def _contents(
         LIGHTS: light_uniforms(scene, shine),
         ENVIRONMENT: environment_uniforms(scene.environment),
     }
-    if features.has_surfaces or features.path_traced:
+    if features.has_surfaces or features.path_traced or features.has_caustics:
         contents[SURFACES] = surface_uniforms(placed, size)
     return contents

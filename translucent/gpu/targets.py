@@ -37,6 +37,14 @@ class Targets:
         """R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
         return self._get("opaque", (1, 4), with_depth=True)
 
+    def paint(self) -> moderngl.Framebuffer:
+        """RGBA32F share of light that the nearest opaque surface reflects diffusely, with a depth buffer."""
+        return self._get("paint", (4,), with_depth=True)
+
+    def photons(self) -> moderngl.Framebuffer:
+        """RGBA32F irradiance of photons on the nearest opaque surface."""
+        return self._get("photons", (4,))
+
     def entered(self) -> moderngl.Framebuffer:
         """RGBA32F interface where a ray first enters a body: normal, axial depth, finish, color; with depth buffer."""
         return self._get("entered", (4, 4, 4), with_depth=True)

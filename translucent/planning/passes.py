@@ -12,6 +12,7 @@ class PassName(StrEnum):
 
     OPAQUE = "opaque"
     BACKDROP = "backdrop"
+    CAUSTICS = "caustics"
     SIGNED_DEPTH = "signed_depth"
     SIGNED_DEPTH_FALLBACK = "signed_depth_fallback"
     THIN_LAYER = "thin_layer"

@@ -8,6 +8,8 @@ from translucent.errors import InputError
 from translucent.media.given_back import DiffusedVolume
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
+from translucent.planning.caustic_plan import with_caustics
+from translucent.planning.caustics import Caustics, check_caustics
 from translucent.planning.effects import unmodelled_effects, with_ambient_told, with_given_back_told
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
@@ -39,6 +41,7 @@ def plan(
     *,
     interfaces: Interfaces | None = None,
     scattering: Scattering | None = None,
+    caustics: Caustics | None = None,
 ) -> RenderPlan:
     """Choose the passes for a scene.
 
@@ -53,17 +56,23 @@ def plan(
         How to find the interfaces at which light refracts and reflects; None lets the planner pick.
     scattering : Diffusion, ScatteringLayer or SingleScattering, optional
         How to show light that media scatter more than once; None lets the planner pick.
+    caustics : Caustics, optional
+        Photons from the lights through interfaces onto opaque objects; None for none.
 
     Raises
     ------
     InputError
-        If no available method can render the scene, or not with interfaces or scattering as asked for.
+        If no available method can render the scene, or not with interfaces, scattering or caustics as asked for.
     """
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     check_interfaces(interfaces)
     check_scattering(scattering)
+    check_caustics(caustics)
     capabilities = capabilities or Capabilities()
+    if caustics is not None:
+        without = plan(scene, method, capabilities, interfaces=interfaces, scattering=scattering)
+        return with_caustics(without, scene, caustics, method, capabilities)
     if isinstance(method, PathTraced):
         check_paths(scene, method, capabilities, interfaces, scattering)
         return with_paths(scene, method, plan(straight_scene(scene), None, capabilities))
