@@ -1,7 +1,6 @@
 // Photons of a light, one for each texel, followed from the light to the first opaque surface (Jensen 1996, "Global
 // illumination using photon maps"). Interfaces reflect or refract them by chance as paths of light; what media absorb on the
-// way is exact. Only those land that an interface has bent or mirrored: all others are straight light. Where bodies are
-// aimed at one by one, a photon counts for the first that it meets, so that none counts twice.
+// way is exact. Only those land that an interface has bent or mirrored: all others are straight light.
 
 #include <constants>
 #include <View>
@@ -15,16 +14,15 @@
 #include "transport/place.glsl"
 #include "transport/microfacets.glsl"
 
-uniform uint first_photon;   // number of that in the first texel, among all that aim at the body
+uniform uint first_photon;   // number of that in the first texel, among all of the aim
 uniform uint last_photon;    // before which they end
-uniform uint aim;            // number of the pair of a light and a body
+uniform uint aim;            // its number: a light, and a rectangle
 uniform vec2 aim_shift;      // where the sequence of starts begins
 uniform vec4 light_from;     // position from the center of the media, w = 1; or direction of travel, w = 0
 uniform vec3 aim_middle;     // of the rectangle across the way that is aimed at
 uniform vec3 aim_right;      // half its sides; 0: all directions from the light
 uniform vec3 aim_up;
 uniform vec3 photon_power;   // of a photon; times cosine over squared distance where a point light aims at a rectangle
-uniform int aimed_object;
 uniform uvec4 light_record;  // the bodies that the light is in
 uniform bool all_closed;
 
@@ -155,7 +153,6 @@ void main() {
     const int channel = 1;
 #endif
     Draws draws = Draws(number, aim, 0u);
-    bool met_aim = false;
     int surface = 0;
     for (; surface < MOST_MET; ++surface) {
         Hit hit = nearest_hit(photon.origin, photon.direction, 0.0, NOTHING, uvec4(0u));
@@ -181,8 +178,6 @@ void main() {
             photon.record = place.record;
             continue;
         }
-        if (!met_aim && place.object != aimed_object) { return; }
-        met_aim = true;
         meet(photon, place, body, before, after, channel, draws);
         if (photon.ends) { return; }
     }

@@ -121,7 +121,6 @@ class CausticsPass:
             "aim_right": tuple(aim.right),
             "aim_up": tuple(aim.up),
             "photon_power": tuple(aim.flux * (job.samples / aim.photons)),
-            "aimed_object": aim.object,
             "light_record": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
         }
         for name, value in values.items():
