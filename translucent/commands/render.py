@@ -28,7 +28,13 @@ from translucent.commands.common import (
 )
 from translucent.commands.console import echo
 from translucent.commands.darkness import warn_if_black
-from translucent.commands.method_options import method_option, paths_option, read_method
+from translucent.commands.method_options import (
+    caustics_option,
+    method_option,
+    paths_option,
+    read_caustics,
+    read_method,
+)
 from translucent.commands.model import (
     DEFAULT_FOV,
     DEFAULT_UP,
@@ -65,6 +71,7 @@ from translucent.errors import InputError
 @paths_option
 @interface_options
 @scattering_options
+@caustics_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -106,6 +113,7 @@ def render(
     interface_forks: int | None,
     scattering_name: str | None,
     diffusion_resolution: int | None,
+    caustics: int | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -132,6 +140,9 @@ def render(
         found = "--opaque-with, whose interfaces are those of the screen"
         raise InputError(f"--interfaces {interfaces.name}", found, "leave out one of the two")
     scattering = read_scattering(scattering_name, diffusion_resolution)
+    photons = read_caustics(caustics)
+    if photons is not None and opaque_with is not None:
+        raise InputError("--caustics", "--opaque-with, which draws what light lands on", "leave out one of the two")
     pictures = Pictures(output, exposure, tone, turntable, fps, aov)
     pictures.check()
     refuse_overwriting(output, model, environment, background)
@@ -154,6 +165,7 @@ def render(
             transparent=transparent,
             interfaces=interfaces,
             scattering=scattering,
+            caustics=photons,
             progress=Progress(f"path tracing on {renderer.provenance.get('renderer', 'the CPU')}"),
         )
         if opaque_with is not None:
