@@ -92,7 +92,10 @@ def test_a_picture_holds_the_power_that_it_shows() -> None:
     """From above through the ball, in a parallel and in a perspective view: pixels times their area on the ground."""
     one = scene(Medium(ior=1.5))
     landed = trace_photons(one, 2000)
-    for camera in (Camera.orthographic((0, 9, 0), (0, 0, 0), (0, 0, 1), height=2.0), Camera.look_at((0, 9, 0), (0, 0, 0), (0, 0, 1), fov_y=12.0)):
+    for camera in (
+        Camera.orthographic((0, 9, 0), (0, 0, 0), (0, 0, 1), height=2.0),
+        Camera.look_at((0, 9, 0), (0, 0, 0), (0, 0, 1), fov_y=12.0),
+    ):
         moved = Scene(one.objects, camera, one.lights)
         shifted = type(landed)(landed.points + CAMERA.eye - camera.eye, landed.normals, landed.power, landed.objects)
         picture = photon_irradiance(moved, (40, 20), shifted)
@@ -103,7 +106,11 @@ def test_a_picture_holds_the_power_that_it_shows() -> None:
         area = 4.0 * half_width * half_height / 800
         assert picture.sum() * area == pytest.approx(landed.power[inside].sum(), rel=1e-9)
     beneath = Scene(one.objects, Camera.look_at((0, -9, 0), (0, 0, 0), (0, 0, 1)), one.lights)
-    assert not photon_irradiance(beneath, (8, 8), type(landed)(landed.points + CAMERA.eye + (0, 9, 0), landed.normals, landed.power, landed.objects)).any()
+    assert not photon_irradiance(
+        beneath,
+        (8, 8),
+        type(landed)(landed.points + CAMERA.eye + (0, 9, 0), landed.normals, landed.power, landed.objects),
+    ).any()
 
 
 def test_what_no_photon_can_follow_is_refused() -> None:

@@ -16,11 +16,7 @@ from translucent.scene.scene import Object, Scene, object_names
 
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
     """Numbers of the objects that stop the straight light of lamps where photons carry it: solids that bend it."""
-    return frozenset(
-        i
-        for i, body in enumerate(scene.objects)
-        if _turns_light(body) and body.sheet_thickness is None
-    )
+    return frozenset(i for i, body in enumerate(scene.objects) if _turns_light(body) and body.sheet_thickness is None)
 
 
 def with_caustics(

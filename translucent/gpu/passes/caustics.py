@@ -158,9 +158,7 @@ class CausticsPass:
         self._gl.depth_func = "<="
         for i in objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
-                program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0
-                )
+                program = self._plain.program(WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0)
             else:
                 program = self._finished.program(SURFACE=1, **look_switches(job.scene.objects[i]))
                 self._maps.bind(job)

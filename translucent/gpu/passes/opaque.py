@@ -77,7 +77,8 @@ class FinishMaps:
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         finish = surface.metallic, surface.roughness, surface.ior, hole_below
         set_uniform(program, "opaque_finish", finish)
-        set_uniform(program, "opaque_emissive", tuple(np.asarray(surface.emissive)))
+        if "opaque_emissive" in program:  # not where what it reflects is asked for alone
+            set_uniform(program, "opaque_emissive", tuple(np.asarray(surface.emissive)))
         if "opaque_passed_share" in program:  # not where an object only glows
             set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
             set_uniform(program, "opaque_passed_share", surface.diffuse_transmission)

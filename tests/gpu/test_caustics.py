@@ -1,0 +1,261 @@
+"""Caustics on the GPU: the closed form of a ball, the float64 reference, conservation of energy, and what shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import translucent as tl
+from tests.ball_light import ball_light, flux_within, fresnel
+from translucent.formulas.interface import slab_reflectance, slab_transmittance
+from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.passes.caustics import CausticsPass
+from translucent.planning.passes import PassName
+from translucent.reference import photon_irradiance, trace_photons
+
+Array = npt.NDArray[np.float64]
+
+SEGMENTS = 64
+BALL, CORE = Sphere().tessellate(SEGMENTS), Sphere(radius=0.5).tessellate(SEGMENTS)
+QUAD = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], dtype=np.float64)
+GROUND = tl.Object(tl.Mesh(60 * QUAD, [(0, 2, 1), (0, 3, 2)], name="ground"))
+CAMERA = tl.Camera.look_at((0, 5, 9), (0, 0, 0))
+SUN = tl.DirectionalLight((0, -1, 0), 1.0)
+CLEAR = tl.Medium(ior=1.5)
+NIGHT = tl.Environment.constant((0.0, 0.0, 0.0))
+RADII = (0.3, 0.6, 1.2, 3.0)
+
+
+def at(x: float, y: float, z: float) -> Array:
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def ball(medium: tl.Medium = CLEAR, height: float = 2.0, mesh: tl.Mesh = BALL, **options: object) -> tl.Object:
+    return tl.Object(mesh, medium, at(0, height, 0), **options)  # type: ignore[arg-type]
+
+
+def scene(*objects: tl.Object, light: tl.PointLight | tl.DirectionalLight = SUN, **options: object) -> tl.Scene:
+    given = {"camera": CAMERA, "environment": NIGHT, **options}
+    return tl.Scene(objects or (ball(), GROUND), lights=[light], **given)  # type: ignore[arg-type]
+
+
+class Landed:
+    """Photons of the frames that are rendered meanwhile: points in the world, power, and how many were given up."""
+
+    def __init__(self) -> None:
+        self.parts: list[npt.NDArray[np.float32]] = []
+
+    def keep(self, framebuffer: moderngl.Framebuffer, count: int) -> None:
+        parts = [
+            np.frombuffer(framebuffer.read(components=4, attachment=i, dtype="f4"), np.float32).reshape(-1, 4)[:count]
+            for i in range(2)
+        ]
+        self.parts.append(np.concatenate(parts, axis=1))
+
+    @property
+    def all(self) -> Array:
+        return np.concatenate(self.parts).astype(np.float64)
+
+    def points(self, one: tl.Scene) -> Array:
+        boxes = np.stack([body.bounds for body in one.bodies])
+        center = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
+        return np.asarray(self.all[self.all[:, 3] == 1, :3] + center)
+
+    @property
+    def power(self) -> Array:
+        return np.asarray(self.all[self.all[:, 3] == 1, 4:7])
+
+
+@pytest.fixture
+def landed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Landed]:
+    kept, add = Landed(), CausticsPass._add
+
+    def spy(self: CausticsPass, job: object, framebuffer: moderngl.Framebuffer, count: int) -> None:
+        kept.keep(framebuffer, count)
+        add(self, job, framebuffer, count)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(CausticsPass, "_add", spy)
+    yield kept
+
+
+@pytest.mark.parametrize(("light", "lamp", "absorption"), [(SUN, None, 0.0), (tl.PointLight((0, 5, 0), 1.0), 3.0, 0.4)])
+def test_a_ball_throws_what_its_rays_carry(
+    light: tl.PointLight, lamp: float | None, absorption: float, renderer: tl.Renderer, landed: Landed
+) -> None:
+    """In all, and within circles around the focus."""
+    one = scene(ball(tl.Medium(absorption, ior=1.5)), GROUND, light=light)
+    renderer.render(one, (8, 8), caustics=tl.Caustics(60_000))
+    points = landed.points(one)
+    found = flux_within(landed.power[:, 0], np.hypot(points[:, 0], points[:, 2]), RADII)
+    flux, distance = ball_light(2.0, 1.5, lamp=lamp, absorption=absorption)
+    # What the facets of the ball cut off its disc, and chance at its interfaces: a twelfth of the light is mirrored.
+    error = np.abs(found - flux_within(flux, distance, RADII)) / flux.sum()
+    assert (error < (np.pi / SEGMENTS) ** 2 + 4.0 * np.sqrt(0.1 / 60_000)).all()
+    assert np.abs(points[:, 1]).max() < 1e-5
+    assert (landed.all[:, 3] >= 0).all()
+
+
+@pytest.mark.parametrize("where", [(3.0, 1.0, 0.0), (0.0, 0.7, 0.0), (0.1, 0.2, 0.0)])
+def test_no_light_is_lost(where: tuple[float, float, float], renderer: tl.Renderer, landed: Landed) -> None:
+    """A lossless rough ball with another one in it, in a closed box, and a lamp beside them, in one, in both: all that
+    meets the interfaces lands.
+    """
+    box = tl.Object(Box((-4.0, -4.0, -4.0), (4.0, 4.0, 4.0)).tessellate())
+    lamp, frosted = tl.PointLight(where, (1.0, 2.0, 3.0)), tl.Surface(roughness=0.3)
+    objects = [ball(height=0.0, surface=frosted), tl.Object(CORE, tl.Medium(ior=1.2), priority=1), box]
+    renderer.render(scene(*objects, light=lamp, overlap="priority"), (8, 8), caustics=tl.Caustics(10_000))
+    distance = float(np.linalg.norm(where))
+    truth = 4.0 * np.pi if distance < 1 else 2.0 * np.pi * (1.0 - np.sqrt(1.0 - distance**-2))
+    # What the facets of the ball cut off its disc; beside it a photon in a thousand is lost after many events.
+    np.testing.assert_allclose(landed.power[:, 0].sum() / truth, 1.0, atol=2.0 * (np.pi / SEGMENTS) ** 2 + 1e-3)
+    np.testing.assert_allclose(landed.power / landed.power[:, :1], [(1.0, 2.0, 3.0)] * len(landed.power), rtol=1e-5)
+
+
+def blurred(picture: Array) -> Array:
+    """Over a pixel: a tent of two."""
+    for axis in (0, 1):
+        moved = [np.roll(picture, by, axis) for by in (-1, 1)]
+        picture = 0.5 * picture + 0.25 * (moved[0] + moved[1])
+    return picture
+
+
+LAMP = tl.PointLight((1.5, 6.0, 1.0), (10.0, 20.0, 30.0))
+TINTED = tl.Medium((0.2, 0.1, 0.05), ior=1.5)
+COARSE = Sphere().tessellate(24)
+COARSE_CORE = Sphere(radius=0.5).tessellate(16)
+PLATE = tl.Object(Box((-2.5, 0.0, -2.5), (0.9, 0.05, 0.6)).tessellate(), color=(0.6, 0.6, 0.6))
+#: Balls over a ground, and how far off the energy may be: with a plate in the light, pixels at its edges show one side.
+PAIRS = {
+    "ball and core": (
+        scene(
+            ball(TINTED, mesh=COARSE),
+            tl.Object(COARSE_CORE, tl.Medium((1.0, 0.5, 0.1), ior=1.2), at(0.2, 2, 0), priority=1),
+            GROUND,
+            PLATE,
+            light=LAMP,
+            overlap="priority",
+        ),
+        0.05,
+    ),
+    "rough": (scene(ball(TINTED, mesh=COARSE, surface=tl.Surface(roughness=0.4)), GROUND, light=LAMP), 0.01),
+    "dispersive": (scene(ball(CLEAR, mesh=COARSE, surface=tl.Surface(dispersion=2.0)), GROUND, light=SUN), 0.01),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_irradiance_is_that_of_the_reference(name: str, renderer: tl.Renderer) -> None:
+    """In a picture from beneath the ball: energy, and pixels."""
+    one, tolerance = PAIRS[name]
+    camera, size = tl.Camera.look_at((0.5, 1.2, 3.5), (-0.4, 0, 0), fov_y=40), (48, 32)
+    one = tl.Scene(one.objects, camera, one.lights, NIGHT, one.overlap)
+    found = photons_in(renderer, one, size, tl.Caustics(30_000))
+    halves = [trace_photons(one, 4000, seed) for seed in range(2)]
+    a, b = (photon_irradiance(one, size, landed) for landed in halves)
+    # Photons that land differ in power little; four standard errors.
+    noise = 4.0 / np.sqrt(2.0 * min(np.count_nonzero(landed.power[:, c]) for landed in halves for c in range(3)))
+    share = found.sum(axis=(0, 1)) / (0.5 * (a + b)).sum(axis=(0, 1))
+    np.testing.assert_allclose(share, 1.0, atol=tolerance + noise)
+    a, b, found = blurred(a), blurred(b), blurred(found)
+    assert np.sqrt(max(((found - a) * (found - b)).mean(), 0.0)) / (0.5 * (a + b).mean()) < 0.2
+
+
+def photons_in(renderer: tl.Renderer, one: tl.Scene, size: tuple[int, int], caustics: tl.Caustics) -> Array:
+    """(h, w, 3): irradiance of photons on the opaque objects that a picture shows."""
+    gpu, plan = renderer.gpu, renderer.plan(one, caustics=caustics)
+    with gpu.context.current():
+        job = gpu.prepare(one, size, plan)
+        gpu.run(job)
+        data = job.targets.photons().read(components=4, dtype="f4")
+        job.release()
+    return np.frombuffer(data, np.float32).reshape(*size[::-1], 4)[::-1, :, :3].astype(np.float64)
+
+
+def top(height: float = 4.0) -> tl.Camera:
+    return tl.Camera.orthographic((0, 9, 0), (0, 0, 0), (0, 0, 1), height=height)
+
+
+def test_the_ground_shows_what_lands_on_it(renderer: tl.Renderer, landed: Landed) -> None:
+    """Diffuse reflection of its power, in one sample and in several; less the share that its coat and metal mirror."""
+    gray, camera = (0.5, 0.25, 1.0), tl.Camera.look_at((0, 0.9, 2.5), (0, 0, 0), fov_y=30)
+    half = tl.Surface(color=gray, metallic=0.5, roughness=1.0, ior=1.0)
+    for ground, kept in ((tl.Object(GROUND.mesh, color=gray), 1.0), (tl.Object(GROUND.mesh, surface=half), 0.5)):
+        one = scene(ball(), ground, camera=camera)
+        without = renderer.render(one, (32, 24)).radiance.astype(np.float64)
+        for samples in (1, 4):
+            landed.parts.clear()
+            frame = renderer.render(one, (32, 24), samples=samples, caustics=tl.Caustics(20_000))
+            added = frame.radiance - without
+            shown = photons_in(renderer, one, (32, 24), tl.Caustics(20_000)) * kept * np.array(gray) / np.pi
+            np.testing.assert_allclose(
+                added.sum(axis=(0, 1)), shown.sum(axis=(0, 1)), rtol=2e-2 if samples > 1 else 1e-4
+            )
+            if samples == 1:
+                np.testing.assert_allclose(added, shown, rtol=1e-4, atol=1e-5 * shown.max())
+            assert sum(len(part) for part in landed.parts) == 40_000  # of both frames, and each photon once
+    assert frame.plan.caustics == tl.Caustics(20_000)
+    assert frame.plan.opaque_to_shadows == {0}
+    assert frame.seconds["caustics"] > 0.0
+
+
+def test_interfaces_show_caustics_behind_them(renderer: tl.Renderer) -> None:
+    """Through a pane before the eye: what the pane lets through of them."""
+    pane = tl.Object(
+        tl.Mesh(QUAD @ [(1, 0, 0), (0, 0, 1), (0, 1, 0)] + (0, 0, 2), [(0, 1, 2), (0, 2, 3)]),
+        tl.Medium(ior=1.5),
+        sheet_thickness=1e-3,
+    )
+    camera = tl.Camera.look_at((0, 0.5, 4), (0, 0, 0), fov_y=12)
+    one = scene(ball(), pane, GROUND, camera=camera)
+    caustics = tl.Caustics(20_000)
+    added = renderer.render(one, (16, 12), caustics=caustics).radiance - renderer.render(one, (16, 12)).radiance
+    shown = photons_in(renderer, one, (16, 12), caustics) * 0.6 / np.pi
+    lit = shown[..., 0] > 0.02 * shown.max()
+    share = slab_transmittance(fresnel(np.array(np.cos(np.arctan(0.125))), 1.5), 0.0)
+    np.testing.assert_allclose((added[lit] / shown[lit]).mean(), share, rtol=0.01)
+
+
+def test_nothing_is_seen_of_the_other_side_of_a_ground(renderer: tl.Renderer) -> None:
+    one = scene(camera=tl.Camera.look_at((0, -9, 1), (0, 0, 0)))
+    assert not photons_in(renderer, one, (16, 12), tl.Caustics(2000)).any()
+
+
+def test_a_mirror_of_glass_turns_a_beam_aside(renderer: tl.Renderer, landed: Landed) -> None:
+    """What passes a sheet goes straight, and is left to straight light."""
+    half = np.sqrt(0.5)
+    corners = [(-half, half, -1), (half, -half, -1), (half, -half, 1), (-half, half, 1)]
+    pane = tl.Object(
+        tl.Mesh(np.array(corners), [(0, 1, 2), (0, 2, 3)]), tl.Medium(100.0, ior=1.5), at(0, 3, 0), sheet_thickness=1e-3
+    )
+    one = scene(pane, GROUND, light=tl.DirectionalLight((1, -1e-6, 0), 2.0))
+    renderer.render(one, (8, 8), caustics=tl.Caustics(20_000))
+    share = slab_reflectance(fresnel(np.sqrt(0.5), 1.5), 0.1 / np.sqrt(1.0 - 0.5 / 1.5**2))
+    assert landed.power[:, 0].sum() == pytest.approx(
+        2.0 * np.sqrt(2.0) * 2.0 * share, rel=4.0 / np.sqrt(len(landed.power))
+    )
+    assert renderer.plan(one, caustics=tl.Caustics(1)).opaque_to_shadows == frozenset()
+
+
+def test_photons_are_the_same_however_many_follow(renderer: tl.Renderer, landed: Landed) -> None:
+    """The first ones of many are those of few; another seed has others."""
+    one = scene()
+    for caustics in (tl.Caustics(600), tl.Caustics(600), tl.Caustics(1500), tl.Caustics(600, seed=1)):
+        renderer.render(one, (8, 8), caustics=caustics)
+    few, again, many, other = (part[:600, :4] for part in landed.parts)
+    np.testing.assert_array_equal(few, again)
+    np.testing.assert_array_equal(few, many)
+    assert (few != other).any()
+
+
+def test_a_frame_without_caustics_has_no_pass_of_them(renderer: tl.Renderer) -> None:
+    frame = renderer.render(scene(), (8, 8))
+    assert not frame.plan.has(PassName.CAUSTICS)
+    assert "caustics" not in frame.seconds
+    with pytest.raises(tl.InputError, match="caustics before a backdrop; what is drawn elsewhere has no mesh"):
+        backdrop = tl.Backdrop(np.zeros((8, 8, 3)), np.full((8, 8), np.inf))
+        renderer.render(scene(ball()), (8, 8), backdrop=backdrop, caustics=tl.Caustics(100))
