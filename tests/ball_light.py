@@ -1,4 +1,4 @@
-"""Light that a ball of glass throws on the ground beneath it, in closed form: an integral over where rays meet the ball."""
+"""Light that a ball of glass throws on the ground beneath it: an integral over where rays meet the ball."""
 
 from __future__ import annotations
 

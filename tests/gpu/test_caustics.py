@@ -1,8 +1,6 @@
-"""Caustics on the GPU: the closed form of a ball, the float64 reference, conservation of energy, and what shows them."""
+"""Caustics on the GPU: the closed form of a ball, the float64 reference, conservation of energy, what shows them."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import moderngl
 import numpy as np
@@ -73,7 +71,7 @@ class Landed:
 
 
 @pytest.fixture
-def landed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Landed]:
+def landed(monkeypatch: pytest.MonkeyPatch) -> Landed:
     kept, add = Landed(), CausticsPass._add
 
     def spy(self: CausticsPass, job: object, framebuffer: moderngl.Framebuffer, count: int) -> None:
@@ -81,7 +79,7 @@ def landed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Landed]:
         add(self, job, framebuffer, count)  # type: ignore[arg-type]
 
     monkeypatch.setattr(CausticsPass, "_add", spy)
-    yield kept
+    return kept
 
 
 @pytest.mark.parametrize(("light", "lamp", "absorption"), [(SUN, None, 0.0), (tl.PointLight((0, 5, 0), 1.0), 3.0, 0.4)])
@@ -256,6 +254,6 @@ def test_a_frame_without_caustics_has_no_pass_of_them(renderer: tl.Renderer) -> 
     frame = renderer.render(scene(), (8, 8))
     assert not frame.plan.has(PassName.CAUSTICS)
     assert "caustics" not in frame.seconds
+    backdrop = tl.Backdrop(np.zeros((8, 8, 3)), np.full((8, 8), np.inf))
     with pytest.raises(tl.InputError, match="caustics before a backdrop; what is drawn elsewhere has no mesh"):
-        backdrop = tl.Backdrop(np.zeros((8, 8, 3)), np.full((8, 8), np.inf))
         renderer.render(scene(ball()), (8, 8), backdrop=backdrop, caustics=tl.Caustics(100))

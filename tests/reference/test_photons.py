@@ -64,7 +64,7 @@ def test_a_ball_throws_what_its_rays_carry(light: Light, lamp: float | None, abs
 
 
 def test_a_mirror_of_glass_turns_a_beam_aside() -> None:
-    """The share that Fresnel and both sides of a sheet mirror; what passes goes straight, and is none of the photons'."""
+    """The share that Fresnel and both sides of a sheet mirror; what passes goes straight, and is left out."""
     sheet = Object(_quad(), Medium(100.0, ior=1.5), above(3.0), sheet_thickness=1e-3)
     landed = trace_photons(Scene([sheet, GROUND], CAMERA, [DirectionalLight((1, 0, 0), 2.0)]), PHOTONS)
     share = slab_reflectance(fresnel(np.sqrt(0.5), 1.5), 0.1 / np.sqrt(1.0 - 0.5 / 1.5**2))
@@ -116,9 +116,10 @@ def test_a_picture_holds_the_power_that_it_shows() -> None:
 def test_what_no_photon_can_follow_is_refused() -> None:
     with pytest.raises(InputError, match=r"0 photons; no light without any; use for example 100_000"):
         trace_photons(scene(Medium(ior=1.5)), 0)
+    ball = Mesh(BALL.vertices, BALL.faces[1:], name="sphere")
+    open_scene = Scene([Object(ball, Medium(ior=1.5)), GROUND], CAMERA, [SUN])
     with pytest.raises(InputError, match=r"photons through 'sphere'; not closed; close it"):
-        ball = Mesh(BALL.vertices, BALL.faces[1:], name="sphere")
-        trace_photons(Scene([Object(ball, Medium(ior=1.5)), GROUND], CAMERA, [SUN]))
+        trace_photons(open_scene)
 
 
 def _quad() -> Mesh:

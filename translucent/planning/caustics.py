@@ -18,9 +18,9 @@ class Caustics:
 
     Photons (Jensen 1996) leave the lights towards the bodies, and are refracted or reflected there by chance, as
     Fresnel says; media absorb on the way. Those that have been bent or mirrored land on the first opaque surface, and
-    are drawn as points into the picture of the opaque objects (McGuire & Luebke 2009), each divided by the area that its
-    pixel covers there. Surfaces reflect them diffusely. The energy is right whatever their number; the noise of a
-    pixel falls with its square root. The photons of several samples of a pixel add up, each sample takes its part.
+    are drawn as points into the picture of the opaque objects (McGuire & Luebke 2009), each divided by the area that
+    its pixel covers there. Surfaces reflect them diffusely. The energy is right whatever their number; the noise of a
+    pixel falls with its square root. Of several samples of a pixel each follows its part of the photons.
 
     Interfaces show caustics behind them wherever the picture shows the receiver without them.
 

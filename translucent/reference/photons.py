@@ -1,7 +1,7 @@
 """Photons from the lights of a scene through its interfaces onto opaque objects, in float64: the truth of caustics.
 
-They go the ways of `translucent.reference.interface_paths`, from the other end: of light and of its reverse, interfaces turn
-the same shares.
+They go the ways of `translucent.reference.interface_paths` from the other end: interfaces turn the same shares of light
+either way.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.reference.boxes import Lines
 from translucent.reference.hits import world_normals
-from translucent.reference.interface_paths import InterfacePaths
+from translucent.reference.interface_paths import InterfacePaths, _Flight
 from translucent.reference.interfaces import Optics
 from translucent.reference.legs import Legs
 from translucent.reference.light_paths import LightPaths
-from translucent.reference.opaque import OpaqueHits
 from translucent.reference.path_trace import BENT_BATCH, _alike
 from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
@@ -86,7 +85,7 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
     # Nothing but the photons themselves carries light of lamps.
     light = LightPaths(replace(scene, lights=()), sheets)
     optics = [Optics(scene, sheets, channel) for channel in range(3)]
-    parts = [_landed(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))]
+    parts = []
     for channels in _alike(np.concatenate([light.volume.scattering, np.stack([own.iors for own in optics], axis=1)])):
         paths = PhotonPaths(light, RayEnds(scene, 1.0), optics[channels[0]], channels, 0, rng)
         for lamp in scene.lights:
@@ -94,10 +93,15 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
                 some = np.arange(first, min(first + BENT_BATCH, photons))
                 rays, power = _emitted(scene, lamp, some, photons, rng)
                 parts.append(paths.land(rays, power))
-    return _landed(*(np.concatenate([getattr(part, name) for part in parts]) for name in LandedPhotons.__match_args__))
+    return _joined(parts)
 
 
-_landed = LandedPhotons
+def _joined(parts: list[LandedPhotons]) -> LandedPhotons:
+    none = np.zeros((0, 3))
+    parts = [LandedPhotons(none, none, none, np.zeros(0, np.int64)), *parts]
+    return LandedPhotons(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in LandedPhotons.__match_args__)
+    )
 
 
 class PhotonPaths(InterfacePaths):
@@ -107,24 +111,21 @@ class PhotonPaths(InterfacePaths):
         """Photons along rays that have landed, of those with this power (n, 3)."""
         self.turned = np.zeros(len(rays), dtype=bool)
         self.power = power
-        self.parts = [_landed(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))]
+        self.parts: list[LandedPhotons] = []
         self.radiance(rays)
-        return _landed(
-            *(np.concatenate([getattr(part, name) for part in self.parts]) for name in LandedPhotons.__match_args__)
-        )
+        return _joined(self.parts)
 
-    def _meet(self, legs: Legs, flight: object, met: Integers) -> Legs:
-        interfaces = flight.interfaces.where(met)  # type: ignore[attr-defined]
+    def _meet(self, legs: Legs, flight: _Flight, met: Integers) -> Legs:
+        interfaces = flight.interfaces.where(met)
         solid = interfaces.before != interfaces.after
         stepped = np.zeros(len(self.turned), dtype=bool)
         stepped[legs.owner[met]] = solid & (self.own.iors[interfaces.before] != self.own.iors[interfaces.after])
-        found = super()._meet(legs, flight, met)  # type: ignore[arg-type]
+        found = super()._meet(legs, flight, met)
         self.turned[found.owner] |= stepped[found.owner] | found.reflected
         return found
 
-    def _add_ends(self, legs: Legs, flight: object, chosen: Integers) -> None:
-        wall: OpaqueHits = flight.wall.where(chosen)  # type: ignore[attr-defined]
-        legs = legs.where(chosen)
+    def _add_ends(self, legs: Legs, flight: _Flight, chosen: Integers) -> None:
+        legs, wall = legs.where(chosen), flight.wall.where(chosen)
         kept = np.flatnonzero(np.isfinite(wall.distance) & self.turned[legs.owner])
         legs, wall = legs.where(kept), wall.where(kept)
         normals = np.zeros((len(legs), 3))
@@ -135,7 +136,7 @@ class PhotonPaths(InterfacePaths):
         with np.errstate(under="ignore"):
             points = legs.rays.origins + wall.distance[:, None] * legs.rays.directions
             power = self.power[legs.owner] * legs.throughput
-        self.parts.append(_landed(points, normals, power, wall.item))
+        self.parts.append(LandedPhotons(points, normals, power, wall.item))
 
 
 def _emitted(scene: Scene, light: Light, some: Integers, photons: int, rng: np.random.Generator) -> tuple[Rays, Array]:
