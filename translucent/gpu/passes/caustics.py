@@ -48,7 +48,7 @@ class CausticsPass:
         assert job.plan.caustics is not None
         with ExitStack() as stack:
             landed = self._landed(stack)
-            program = self._tracer(stack, job)
+            program, textures = self._tracer(stack, job)
             irradiance = job.targets.photons()
             irradiance.clear()
             aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
@@ -58,6 +58,8 @@ class CausticsPass:
                 job.photons_followed += end - begin
                 for first in range(begin, end, BATCH):
                     count = min(BATCH, end - first)
+                    for unit, texture in enumerate(textures):
+                        texture.use(unit)
                     self._follow(program, landed, first, count)
                     self._add(job, landed, count)
         self._paint(job, spec.objects)
@@ -76,8 +78,8 @@ class CausticsPass:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
         return framebuffer
 
-    def _tracer(self, stack: ExitStack, job: FrameJob) -> moderngl.Program:
-        """Program that follows photons through the scene of a job, with its textures and uniforms."""
+    def _tracer(self, stack: ExitStack, job: FrameJob) -> tuple[moderngl.Program, tuple[moderngl.Texture, ...]]:
+        """Program that follows photons through the scene of a job, with its uniforms, and its textures."""
         scene = job.scene
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         program = self._photons.program(
@@ -94,8 +96,6 @@ class CausticsPass:
         rows, frame = hierarchies.place(scene, media_center(scene), job.features.sheets)
         bodies = self._gl.texture(rows.shape[1::-1], 4, rows, dtype="f4")
         stack.callback(bodies.release)
-        for unit, texture in enumerate((bodies, hierarchies.nodes, hierarchies.triangles)):
-            texture.use(unit)
         assert job.plan.caustics is not None
         values = {
             "seed": job.plan.caustics.seed,
@@ -106,8 +106,7 @@ class CausticsPass:
         for name, value in values.items():
             if name in program:
                 set_uniform(program, name, value)
-        self._textures = bodies, hierarchies.nodes, hierarchies.triangles
-        return program
+        return program, (bodies, hierarchies.nodes, hierarchies.triangles)
 
     def _aim(self, program: moderngl.Program, aim: PhotonAim, number: int, job: FrameJob) -> None:
         assert job.plan.caustics is not None
@@ -127,8 +126,6 @@ class CausticsPass:
             set_uniform(program, name, value)
 
     def _follow(self, program: moderngl.Program, landed: moderngl.Framebuffer, first: int, count: int) -> None:
-        for unit, texture in enumerate(self._textures):
-            texture.use(unit)
         set_uniform(program, "first_photon", first)
         set_uniform(program, "last_photon", first + count)
         landed.scissor = 0, 0, PHOTON_WIDTH, -(-count // PHOTON_WIDTH)
