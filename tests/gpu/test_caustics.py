@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 SEGMENTS = 64
 BALL, CORE = Sphere().tessellate(SEGMENTS), Sphere(radius=0.5).tessellate(SEGMENTS)
 QUAD = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], dtype=np.float64)
+TILTED = np.array([(np.sqrt(0.5), -np.sqrt(0.5), 0), (np.sqrt(0.5), np.sqrt(0.5), 0), (0, 0, 1)])  # by 45 degrees
 GROUND = tl.Object(tl.Mesh(60 * QUAD, [(0, 2, 1), (0, 3, 2)], name="ground"))
 CAMERA = tl.Camera.look_at((0, 5, 9), (0, 0, 0))
 SUN = tl.DirectionalLight((0, -1, 0), 1.0)
@@ -237,6 +238,28 @@ def test_a_mirror_of_glass_turns_a_beam_aside(renderer: tl.Renderer, landed: Lan
         2.0 * np.sqrt(2.0) * 2.0 * share, rel=4.0 / np.sqrt(len(landed.power))
     )
     assert renderer.plan(one, caustics=tl.Caustics(1)).opaque_to_shadows == frozenset()
+
+
+def test_light_that_passes_a_sheet_is_no_caustic(renderer: tl.Renderer, landed: Landed) -> None:
+    """It falls on the ground beneath; what is mirrored leaves to the side, along the ground."""
+    pane = tl.Object(tl.Mesh(QUAD @ TILTED, [(0, 2, 1), (0, 3, 2)]), CLEAR, at(0, 3, 0), sheet_thickness=1e-3)
+    renderer.render(scene(pane, GROUND), (8, 8), caustics=tl.Caustics(2000))
+    assert len(landed.all) == 2000
+    assert len(landed.power) == 0
+
+
+def test_a_fence_before_the_eye_hides_what_is_behind_it(renderer: tl.Renderer) -> None:
+    """Photons go to the next pixel from beyond the edges of their own surface alone: pixels that show the fence have
+    none. Those that show the ground beside it lose what they do not show of it: a third of an edge.
+    """
+    posts = [tl.Object(Box((x, 0.5, 2.0), (x + 0.05, 1.2, 2.02)).tessellate()) for x in np.linspace(-0.3, 0.25, 6)]
+    camera = tl.Camera.look_at((0, 0.9, 2.5), (0, 0, 0), fov_y=30)
+    one = scene(ball(), GROUND, *posts, camera=camera)
+    found = photons_in(renderer, one, (64, 48), tl.Caustics(20_000)).sum()
+    truth = photon_irradiance(one, (64, 48), trace_photons(one, 4000)).sum()
+    free = scene(ball(), GROUND, camera=camera)
+    assert truth < 0.8 * photons_in(renderer, free, (64, 48), tl.Caustics(20_000)).sum()
+    assert 0.85 < found / truth < 1.05
 
 
 def test_photons_are_the_same_however_many_follow(renderer: tl.Renderer, landed: Landed) -> None:
