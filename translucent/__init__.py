@@ -81,12 +81,14 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.planning.scattering import Diffusion as Diffusion
     from translucent.planning.scattering import ScatteringLayer as ScatteringLayer
     from translucent.planning.scattering import SingleScattering as SingleScattering
+    from translucent.planning.shadow_maps import ShadowMaps as ShadowMaps
     from translucent.renderer import Renderer as Renderer
     from translucent.scene.backdrop import Backdrop as Backdrop
     from translucent.scene.camera import Camera as Camera
     from translucent.scene.environment import Environment as Environment
     from translucent.scene.lights import DirectionalLight as DirectionalLight
     from translucent.scene.lights import PointLight as PointLight
+    from translucent.scene.lights import SpotLight as SpotLight
     from translucent.scene.scene import Object as Object
     from translucent.scene.scene import Scene as Scene
     from translucent.scene.showcase import showcase as showcase
@@ -128,11 +130,12 @@ _NAMES = {
     "planning.methods": "BackFaceDepth DepthPeeling FragmentLists KBuffer PathTraced RayMarched SignedDepth ThinLayer",
     "planning.plan": "plan",
     "planning.render_plan": "Capabilities RenderPlan",
+    "planning.shadow_maps": "ShadowMaps",
     "renderer": "Renderer",
     "scene.backdrop": "Backdrop",
     "scene.camera": "Camera",
     "scene.environment": "Environment",
-    "scene.lights": "DirectionalLight PointLight",
+    "scene.lights": "DirectionalLight PointLight SpotLight",
     "scene.scene": "Object Scene",
     "scene.showcase": "showcase",
     "scene.surface": "Surface",

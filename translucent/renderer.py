@@ -28,6 +28,7 @@ from translucent.planning.plan import plan, plan_over_backdrop
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.scattering.choice import check_scattering
+from translucent.planning.shadow_maps import ShadowMaps, check_shadows
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
 from translucent.scene.environment import Environment
@@ -46,8 +47,9 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces, scattering, caustics.
-_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, Caustics | None]
+#: What a plan is made for, beside the scene: the method, whether there is a backdrop, interfaces, scattering, caustics
+#: and shadows.
+_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, Caustics | None, ShadowMaps | None]
 
 
 class Renderer:
@@ -124,6 +126,7 @@ class Renderer:
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
         caustics: Caustics | None = None,
+        shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
         if method is not None and not isinstance(method, Method):
@@ -131,13 +134,21 @@ class Renderer:
         check_interfaces(interfaces)
         check_scattering(scattering)
         check_caustics(caustics)
+        check_shadows(shadows)
         if over_backdrop and caustics is not None:
             found = "what is drawn elsewhere has no mesh that light could land on"
             raise InputError("caustics before a backdrop", found, "leave out one of the two")
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, interfaces, scattering, caustics)) not in plans:
+        if (key := (method, over_backdrop, interfaces, scattering, caustics, shadows)) not in plans:
             make = plan_over_backdrop if over_backdrop else partial(plan, caustics=caustics)
-            plans[key] = make(scene, method, self._engine.capabilities, interfaces=interfaces, scattering=scattering)
+            plans[key] = make(
+                scene,
+                method,
+                self._engine.capabilities,
+                interfaces=interfaces,
+                scattering=scattering,
+                shadows=shadows,
+            )
         return plans[key]
 
     def render(
@@ -152,6 +163,7 @@ class Renderer:
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
         caustics: Caustics | None = None,
+        shadows: ShadowMaps | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
@@ -182,6 +194,8 @@ class Renderer:
         caustics : Caustics, optional
             Photons that carry the light of lamps through interfaces, and by their mirrors, onto opaque objects. None,
             the default: no caustics.
+        shadows : ShadowMaps, optional
+            How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional
             Takes the share of random paths that have ended, 0 to 1, some times a second: they may take long.
 
@@ -215,6 +229,7 @@ class Renderer:
                 interfaces=interfaces,
                 scattering=scattering,
                 caustics=caustics,
+                shadows=shadows,
                 progress=progress,
             )
         except BaseException as error:
@@ -236,16 +251,25 @@ class Renderer:
         interfaces: Interfaces | None,
         scattering: Scattering | None,
         caustics: Caustics | None,
+        shadows: ShadowMaps | None,
         progress: Callable[[float], None] | None,
     ) -> Frame:
         if transparent or backdrop is None:
-            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=caustics)
+            chosen = self.plan(
+                scene, method, interfaces=interfaces, scattering=scattering, caustics=caustics, shadows=shadows
+            )
             if transparent:
                 return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
             return self._run(scene, size, chosen, samples, progress)
         _check_backdrop(backdrop, size)
         chosen = self.plan(
-            scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering, caustics=caustics
+            scene,
+            method,
+            over_backdrop=True,
+            interfaces=interfaces,
+            scattering=scattering,
+            caustics=caustics,
+            shadows=shadows,
         )
         return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
@@ -298,6 +322,7 @@ class Renderer:
         *,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Render a scene into a framebuffer of this renderer's context, sRGB-encoded, without reading anything back.
 
@@ -313,6 +338,7 @@ class Renderer:
             Tone curve: clamped to 0..1, Khronos PBR Neutral, or AgX.
         interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
         scattering : Diffusion, ScatteringLayer or SingleScattering, optional
+        shadows : ShadowMaps, optional
             As for `render`.
 
         Raises
@@ -325,7 +351,7 @@ class Renderer:
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)
-        chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering)
+        chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
         try:
             self.gpu.draw(scene, framebuffer, chosen, exposure, tone)
         except BaseException as error:

@@ -8,7 +8,8 @@ in vec3 normal;
 out vec3 world_normal;
 #endif
 #if WITH_POSITION
-out vec3 from_eye;  // world axes
+out vec3 from_eye;     // world axes
+out vec3 from_center;  // of the media
 #endif
 
 // Metres along the camera's forward axis, from the body's anchor. All points of one pixel lie on one ray, so the ray's
@@ -26,5 +27,6 @@ void main() {
 #endif
 #if WITH_POSITION
     from_eye = (eye_from_offset * vec4(offset, 1.0)).xyz;
+    from_center = mat3(eye_from_offset) * offset + anchor_from_center.xyz;
 #endif
 }

@@ -3,9 +3,11 @@
 // scattered once is found elsewhere.
 
 #include "lib/interface.glsl"
+#include "lib/lights.glsl"
 #include "lib/optics.glsl"
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
+#include "shade/shadows.glsl"
 
 uniform sampler2D reflectance_table; // scale and bias of the reflectance at normal incidence
 
@@ -56,7 +58,9 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
     irradiance = light_power[light].rgb / (position.w == 0.0 ? 1.0 : distance_m * distance_m);
-    return towards / distance_m;
+    towards /= distance_m;
+    irradiance *= cone_attenuation(-towards, light_cone[light]);
+    return towards;
 }
 
 // Microfacets that mirror the lights; nothing shadows them.
@@ -83,6 +87,17 @@ vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
         vec3 irradiance;
         vec3 towards = towards_light(light, point, irradiance);
         sum += max(dot(normal, towards), 0.0) * irradiance;
+    }
+    return sum;
+}
+
+// The same on an opaque surface, as far as it reaches it.
+vec3 reaching_irradiance(vec3 point, vec3 normal) {
+    vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
+    for (int light = 0; light < light_count; ++light) {
+        vec3 irradiance;
+        float facing = dot(normal, towards_light(light, point, irradiance));
+        if (facing > 0.0) { sum += facing * irradiance * light_reaching(light, point, normal); }
     }
     return sum;
 }

@@ -24,6 +24,7 @@ uniform float layer_opacity;
 in float axial;
 in vec3 world_normal;
 in vec3 from_eye;
+in vec3 from_center;
 in vec2 surface_uv;
 #if VERTEX_COLORS
 in vec4 vertex_color;
@@ -57,7 +58,7 @@ void main() {
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
     float share = layer_opacity * finish.opacity;
-    vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_eye), vec3(NOTHING)), share);
+    vec4 shown = vec4(share * min(opaque_radiance_of(finish, normal, ray, from_eye, from_center), vec3(NOTHING)), share);
 #if BODIES
     if (axial_depth > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
         behind = shown;

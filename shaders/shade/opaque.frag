@@ -1,4 +1,4 @@
-// Opaque objects: where they are, and what light they reflect. Nothing shadows them.
+// Opaque objects: where they are, and what light they reflect. DEPTH_ONLY: no more than where they are.
 // Plain ones reflect diffusely (Lambert 1760); SURFACE: as their surface says, lit by filtered maps of the environment.
 
 #include <constants>
@@ -7,7 +7,9 @@
 #include <Environment>
 #include <Lights>
 #include "lib/environment.glsl"
+#include "lib/lights.glsl"
 #include "lib/ray.glsl"
+#include "shade/shadows.glsl"
 #if SURFACE
 #include "shade/opaque_surface.glsl"
 #elif LIGHT_MAP
@@ -17,6 +19,7 @@ uniform sampler2D light_irradiance;
 in float axial;
 in vec3 world_normal;
 in vec3 from_eye;
+in vec3 from_center;
 #if SURFACE
 in vec2 surface_uv;
 #if VERTEX_COLORS
@@ -27,9 +30,11 @@ const vec4 vertex_color = vec4(1.0);
 #endif
 
 layout(location = 0) out float opaque_axial_depth;
+#if !DEPTH_ONLY
 layout(location = 1) out vec4 radiance;
+#endif
 
-#if !SURFACE
+#if !SURFACE && !DEPTH_ONLY
 vec3 environment_irradiance(vec3 normal) {
 #if LIGHT_MAP
     return light_scale * textureLod(light_irradiance, equirectangular_uv(normal, light_turn), 0.0).rgb;
@@ -45,11 +50,13 @@ vec3 irradiance_from(int light, vec3 normal) {
     vec3 towards = position.xyz - position.w * from_eye;
     float distance_m = max(length(towards), 1e-18);
     float facing = max(dot(towards / distance_m, normal), 0.0);
-    return light_power[light].rgb * (position.w == 0.0 ? facing : facing / distance_m / distance_m);
+    facing *= cone_attenuation(-towards / distance_m, light_cone[light]);
+    vec3 power = light_power[light].rgb * (position.w == 0.0 ? facing : facing / distance_m / distance_m);
+    return facing > 0.0 ? power * light_reaching(light, from_center, normal) : vec3(0.0);
 }
 
 vec3 diffuse_radiance(vec3 normal) {
-    vec3 irradiance = environment_irradiance(normal);
+    vec3 irradiance = environment_irradiance(normal) * environment_reaching(from_center, normal);
     for (int light = 0; light < light_count; ++light) {
         irradiance += irradiance_from(light, normal);
     }
@@ -65,6 +72,7 @@ void main() {
     if (axial < axial_start) { discard; }  // behind an orthographic picture
     opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;
     gl_FragDepth = clamp((opaque_axial_depth - opaque_range.x) * opaque_range.y, 0.0, 1.0);
+#if !DEPTH_ONLY
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
 #if SURFACE
@@ -73,10 +81,11 @@ void main() {
     vec3 normal = gl_FrontFacing ? finish.normal : -finish.normal;
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
-    vec3 light = opaque_radiance_of(finish, normal, ray, from_eye);
+    vec3 light = opaque_radiance_of(finish, normal, ray, from_eye, from_center);
 #else
     vec3 normal = normalize(world_normal);
     vec3 light = diffuse_radiance(dot(normal, ray) > 0.0 ? -normal : normal);
 #endif
     radiance = vec4(min(light, vec3(NOTHING)), 1.0);
+#endif
 }

@@ -1,10 +1,12 @@
 // What an opaque surface sends to the eye: a metal, or a coat over paint, or between the two (glTF 2.0, Appendix B), lit by the
-// environment (split sum, Karis 2013) and by lights that nothing shadows. Energy that a rough surface loses between its
+// environment (split sum, Karis 2013) and by lights, as far as they reach it. Energy that a rough surface loses between its
 // microfacets is given back by a factor (Turquin 2019). Needs <constants>, <Lights> and a texture `reflectance_table`.
 
 #include "lib/interface.glsl"
+#include "lib/lights.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/highlight.glsl"
+#include "shade/shadows.glsl"
 
 struct OpaqueFinish {
     vec3 base;          // albedo of paint, and reflectance of metal
@@ -40,8 +42,8 @@ vec3 fresnel_of(Layer layer, float away) {
     return (layer.facing + (layer.grazing - layer.facing) * away) * layer.regained;
 }
 
-// ray: unit, from the eye; normal: to the eye's side; position: from the eye.
-vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 position) {
+// ray: unit, from the eye; normal: to the eye's side; position: from the eye; point: from the center of the media.
+vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 position, vec3 point) {
     float ior = finish.ior;
     float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
     vec2 table = textureLod(reflectance_table, reflectance_coordinate(cos_view, finish.roughness), 0.0).rg;
@@ -52,7 +54,8 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
 
     vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)
             * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + painted * (paint * environment_irradiance(normal) + finish.passed * environment_irradiance(-normal)) / PI);
+        + painted * (paint * environment_irradiance(normal) * environment_reaching(point, normal)
+            + finish.passed * environment_irradiance(-normal) * environment_reaching(point, -normal)) / PI);
     float alpha = highlight_alpha(finish.roughness, finish.variance);
     for (int light = 0; light < light_count; ++light) {
         vec4 at = light_position[light];
@@ -60,7 +63,9 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
         float distance_m = max(length(way), 1e-18);
         vec3 towards = way / distance_m;
         vec3 irradiance = at.w == 0.0 ? light_power[light].rgb : light_power[light].rgb / distance_m / distance_m;
+        irradiance *= cone_attenuation(-towards, light_cone[light]);
         float cos_light = dot(normal, towards);
+        if (cos_light > 0.0 || finish.passed_share > 0.0) { irradiance *= light_reaching(light, point, normal); }
         if (cos_light <= 0.0) {
             sum -= painted * finish.passed / PI * cos_light * irradiance;
             continue;

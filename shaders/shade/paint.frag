@@ -7,6 +7,7 @@
 #include <Lights>
 #include "lib/ray.glsl"
 #if SURFACE
+#include "shade/shadows.glsl"
 #include "shade/opaque_surface.glsl"
 #endif
 

@@ -7,7 +7,7 @@
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "thickness/snapping.glsl"
-#if !SURFACES
+#if !SURFACES && !MAP
 #include "shade/background.glsl"
 #endif
 
@@ -35,12 +35,22 @@ uniform sampler2D unlit_path;
 #endif
 #endif
 
+#if MAP
+// For a map of shadows: its corner, and metres ahead of the center at axial depth 0, and from there to 1.
+uniform vec4 map_place;
+#if OPAQUE
+uniform sampler2D opaque_axial_depth;
+#endif
+layout(location = 0) out vec4 out_sums;
+layout(location = 1) out float out_end;
+#else
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
 #if !AVERAGE
 layout(location = 2) out vec4 out_optical_depth;
 layout(location = 3) out float out_thickness;
 layout(location = 4) out float out_flags;
+#endif
 #endif
 
 struct Path {
@@ -63,8 +73,14 @@ Path read_path(sampler2D sums, ivec2 texel, float advance) {
 #endif
 
 void main() {
+#if MAP
+    vec2 place = gl_FragCoord.xy - map_place.xy;
+    vec2 pixel = vec2(place.x, frame_size.y - place.y);
+    ivec2 texel = ivec2(place);
+#else
     vec2 pixel = gl_FragCoord.xy + frame_size.zw;
     ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
+#endif
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);
     float advance = length(ray);
 
@@ -110,6 +126,15 @@ void main() {
     path.thickness = max(path.thickness, 0.0);
     path.optical_depth = max(path.optical_depth, vec3(0.0));
 
+#if MAP
+#if OPAQUE
+    float end = texelFetch(opaque_axial_depth, texel, 0).r;
+#else
+    const float end = NOTHING;
+#endif
+    out_sums = vec4(path.optical_depth / advance, 0.0);
+    out_end = end < NOTHING ? map_place.z + end * map_place.w : NOTHING;
+#else
     vec3 through = transmittance(path.optical_depth);
 #if EMISSION
     emitted = emitted_radiance(emission.rgb, extinction.rgb, path.thickness);
@@ -134,5 +159,6 @@ void main() {
     valid = valid && in_the_dark <= coverage_floor;
 #endif
     out_flags = ((covered ? FLAG_COVERED : 0.0) + (valid ? FLAG_VALID : 0.0)) / 255.0;
+#endif
 #endif
 }

@@ -1,5 +1,7 @@
-// Light of point and directional lights that comes straight to a place: through media, and interfaces that bend nothing.
+// Light of point, spot and directional lights that comes straight to a place: through media, and interfaces that bend nothing.
 // No path finds what polished interfaces bend of it. Needs <Lights>, <Surfaces>, <View>, place.glsl and what that needs.
+
+#include "lib/lights.glsl"
 
 struct Lamp {
     vec3 towards;     // unit
@@ -12,9 +14,11 @@ Lamp lamp_at(int number, vec3 point) {
     vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
     vec3 way = at.xyz - at.w * from_eye;
     float distance_m = max(length(way), 1e-18);
+    vec3 towards = way / distance_m;
     vec3 irradiance = light_power[number].rgb;
-    if (at.w == 0.0) { return Lamp(way / distance_m, NOTHING, irradiance); }
-    return Lamp(way / distance_m, distance_m, irradiance / distance_m / distance_m);
+    if (at.w == 0.0) { return Lamp(towards, NOTHING, irradiance); }
+    irradiance *= cone_attenuation(-towards, light_cone[number]);
+    return Lamp(towards, distance_m, irradiance / distance_m / distance_m);
 }
 
 // Share of a lamp's light that arrives straight. skipped: metres between the place and the origin, which lies beside a

@@ -68,7 +68,7 @@ vec3 environment_seen(Path path, vec2 pixel) {
 #endif
 }
 
-// Irradiance that nothing shadows, as opaque surfaces and paint have it.
+// Irradiance that nothing shadows, as paint has it.
 vec3 open_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal);
 #if LAMPS
@@ -80,12 +80,25 @@ vec3 open_irradiance(vec3 point, vec3 normal) {
     return sum;
 }
 
+// Irradiance on an opaque surface, as far as light reaches it.
+vec3 reaching_irradiance(vec3 point, vec3 normal) {
+    vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
+#if LAMPS
+    for (int light = 0; light < light_count; ++light) {
+        Lamp lamp = lamp_at(light, point);
+        float facing = dot(normal, lamp.towards);
+        if (facing > 0.0) { sum += facing * lamp.irradiance * light_reaching(light, point, normal); }
+    }
+#endif
+    return sum;
+}
+
 // An opaque object, lit as where it is seen directly, but without its textures.
 vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
-    if (body.plain == 1.0) { return body.color * open_irradiance(point, normal) / PI; }
+    if (body.plain == 1.0) { return body.color * reaching_irradiance(point, normal) / PI; }
     OpaqueFinish finish = OpaqueFinish(body.color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
         body.emissive, normal, 0.0, 1.0, 1.0, false);
-    return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz);
+    return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
 
 // Share of the light of each channel that the media of a place turn by an angle, in 1/sr.

@@ -7,6 +7,7 @@
 #include <Surfaces>
 #include <TracedBody>
 #include "lib/interface.glsl"
+#include "lib/lights.glsl"
 #include "lib/optics.glsl"
 #include "transport/random.glsl"
 #include "transport/hierarchy.glsl"
@@ -19,6 +20,7 @@ uniform uint last_photon;    // before which they end
 uniform uint aim;            // its number: a light, and a rectangle
 uniform vec2 aim_shift;      // where the sequence of starts begins
 uniform vec4 light_from;     // position from the center of the media, w = 1; or direction of travel, w = 0
+uniform vec4 cone;           // in which a lamp shines
 uniform vec3 aim_middle;     // of the rectangle across the way that is aimed at
 uniform vec3 aim_right;      // half its sides; 0: all directions from the light
 uniform vec3 aim_up;
@@ -59,6 +61,7 @@ Photon begun(uint number, out vec3 power) {
         float up = 2.0 * share.x - 1.0;
         float across = sqrt(max((1.0 - up) * (1.0 + up), 0.0));
         photon.direction = vec3(across * cos(2.0 * PI * share.y), across * sin(2.0 * PI * share.y), up);
+        power *= cone_attenuation(photon.direction, cone);
         return photon;
     }
     vec3 target = aim_middle + (2.0 * share.x - 1.0) * aim_right + (2.0 * share.y - 1.0) * aim_up;
@@ -68,6 +71,7 @@ Photon begun(uint number, out vec3 power) {
         float distance_m = length(way);
         photon.direction = way / distance_m;
         power *= abs(dot(photon.direction, normalize(cross(aim_right, aim_up)))) / distance_m / distance_m;
+        power *= cone_attenuation(photon.direction, cone);
         back = min(back, distance_m);
     }
     photon.origin = target - back * photon.direction;
@@ -146,6 +150,7 @@ void main() {
     if (number >= last_photon) { return; }
     vec3 power;
     Photon photon = begun(number, power);
+    if (power == vec3(0.0)) { return; }
 #if DISPERSION
     int channel = int(number % 3u);
     power *= 3.0 * vec3(channel == 0, channel == 1, channel == 2);

@@ -7,6 +7,7 @@
 // cancels its 1 / r^2; where it is inside a medium, so that the exponent has a kink next to it, the angle alone. Needs <View>.
 
 #include "intervals/slots.glsl"
+#include "lib/lights.glsl"
 #include "volume/light_views.glsl"
 
 struct ViewRay {
@@ -43,14 +44,57 @@ vec3 scattering_phase(float turns[SLOTS], float cos_scatter) {
 // One light's radiance at distance s along the segment, per metre, without the transmittances; w: its visibility.
 vec4 scattered_here(float turns[SLOTS], int light, ViewRay ray, float s, out vec3 tau) {
     vec3 point = ray.start + s * ray.direction;
-    vec4 depth = light_depth(light, point);
-    tau = depth.rgb;
     vec4 position = scatter_light_position[light];
     vec3 towards = position.w == 0.0 ? position.xyz : position.xyz - point;
     float r2 = max(dot(towards, towards), 1e-30);
-    float cos_scatter = dot(towards * inversesqrt(r2), ray.direction);
-    vec3 power = scatter_light_power[light].rgb * (position.w == 0.0 ? 1.0 : 1.0 / r2);
-    return vec4(power * scattering_phase(turns, cos_scatter), depth.a);
+    towards *= inversesqrt(r2);
+    float share = cone_attenuation(-towards, scatter_light_cone[light]);
+    tau = vec3(0.0);
+    if (share == 0.0) { return vec4(0.0); }  // a spot's view ends with its cone
+    vec4 depth = light_depth(light, point);
+    tau = depth.rgb;
+    vec3 power = scatter_light_power[light].rgb * (position.w == 0.0 ? share : share / r2);
+    return vec4(power * scattering_phase(turns, dot(towards, ray.direction)), depth.a);
+}
+
+// Between which distances, within metres, a ray is in a cone, of which rest is 1 - cos of the half angle: cones are convex, and
+// their edges are where (sin * along the axis)^2 = (cos * across)^2.
+vec2 cone_part(vec3 from_light, vec3 direction, vec3 axis, float rest, float metres) {
+    vec2 along = vec2(dot(direction, axis), dot(from_light, axis));
+    vec3 turning = direction - along.x * axis;
+    vec3 across = from_light - along.y * axis;
+    float sin2 = rest * (2.0 - rest);
+    float cos2 = (1.0 - rest) * (1.0 - rest);
+    float a = sin2 * along.x * along.x - cos2 * dot(turning, turning);
+    float b = sin2 * along.x * along.y - cos2 * dot(turning, across);
+    float c = sin2 * along.y * along.y - cos2 * dot(across, across);
+    float square = b * b - a * c;
+    if (square < 0.0 && a < 0.0) { return vec2(0.0); }
+    float q = -(b + (b < 0.0 ? -1.0 : 1.0) * sqrt(max(square, 0.0)));
+    if (abs(q) < 1e-30) { return vec2(0.0, metres); }
+    vec2 ends = vec2(q / (abs(a) < 1e-30 ? 1e-30 : a), c / q);
+    ends = vec2(min(ends.x, ends.y), max(ends.x, ends.y));
+    // Steeper than the cone a ray crosses its mirror image, too; else it is between the edges of one of the two.
+    if (a >= 0.0) {
+        ends = along.x > 0.0 ? vec2(ends.y, metres) : vec2(0.0, ends.x);
+    } else if (along.y + 0.5 * (ends.x + ends.y) * along.x < 0.0) {
+        return vec2(0.0);
+    }
+    return clamp(ends, 0.0, metres);
+}
+
+// Ends of the three parts of a segment, of which some are empty, in which a light shines smoothly: a spot between its outer
+// and inner cone, in the inner one, and behind.
+vec4 lit_parts(int light, ViewRay ray, float metres) {
+    vec4 cone = scatter_light_cone[light];
+    float size2 = dot(cone.xyz, cone.xyz);
+    if (size2 == 0.0) { return vec4(0.0, vec3(metres)); }
+    vec3 from_light = ray.start - scatter_light_position[light].xyz;
+    vec3 axis = cone.xyz * inversesqrt(size2);
+    vec2 outer = cone_part(from_light, ray.direction, axis, 0.5 * cone.w / size2, metres);
+    if (cone.w < 1.0 + 1e-5) { return outer.xyyy; }
+    vec2 inner = cone_part(from_light, ray.direction, axis, 0.5 * (cone.w - 1.0) / size2, metres);
+    return inner.x < inner.y ? vec4(outer.x, inner, outer.y) : outer.xyyy;
 }
 
 // Where v in 0..1 a share u of the integral of e^(-x v) is reached, and dv / du there. A rising exponential is a falling
@@ -68,23 +112,25 @@ vec2 secant_point(float u, float x) {
     return x < 0.0 ? vec2(1.0 - found.x, found.y) : found;
 }
 
-vec3 scatter_from_light(float turns[SLOTS], int light, ViewRay ray, float metres, vec3 sigma) {
-    vec3 tau_start, tau_end, tau;
-    scattered_here(turns, light, ray, 0.0, tau_start);
-    scattered_here(turns, light, ray, metres, tau_end);
+// From a part of a segment.
+vec3 scatter_from_part(float turns[SLOTS], int light, ViewRay ray, vec2 lit, vec3 sigma) {
+    float metres = lit.y - lit.x;
+    vec3 tau;
+    vec3 tau_start = light_depth(light, ray.start + lit.x * ray.direction).rgb;
+    vec3 tau_end = light_depth(light, ray.start + lit.y * ray.direction).rgb;
     vec3 rise = sigma * metres + tau_end - tau_start;
 
     // Where the light is nearest: at distance closest along the ray, height metres off it.
     vec4 position = scatter_light_position[light];
     float closest = dot(position.xyz - ray.start, ray.direction);
     float height = max(length(position.xyz - ray.start - closest * ray.direction), 1e-4 * metres);
-    bool angular = position.w == 1.0 && height < NEAR_LIGHT * metres && closest > -metres && closest < 2.0 * metres;
+    bool angular = position.w == 1.0 && height < NEAR_LIGHT * metres && closest > lit.x - metres && closest < lit.y + metres;
     if (scatter_light_power[light].a == 1.0) {
         angular = true;
         rise = vec3(0.0);
     }
-    float first = atan(-closest, height);
-    float angle = atan(metres - closest, height) - first;
+    float first = atan(lit.x - closest, height);
+    float angle = atan(lit.y - closest, height) - first;
 
     vec3 sum = vec3(0.0);
     for (int i = 0; i < gauss_count; ++i) {
@@ -97,10 +143,10 @@ vec3 scatter_from_light(float turns[SLOTS], int light, ViewRay ray, float metres
         for (int channel = 0; channel < channels; ++channel) {
             vec2 warped = secant_point(u, rise[channel]);
             float weight = gauss[i].y * warped.y;
-            float s = metres * warped.x;
+            float s = lit.x + metres * warped.x;
             if (angular) {
                 float tangent = tan(first + angle * warped.x);
-                s = clamp(closest + height * tangent, 0.0, metres);
+                s = clamp(closest + height * tangent, lit.x, lit.y);
                 weight *= angle * height * (1.0 + tangent * tangent);
             } else {
                 weight *= metres;
@@ -120,7 +166,10 @@ vec3 scatter_from_light(float turns[SLOTS], int light, ViewRay ray, float metres
 vec3 in_scattered(float turns[SLOTS], ViewRay ray, float metres, vec3 sigma) {
     vec3 sum = vec3(0.0);
     for (int light = 0; light < scatter_light_count; ++light) {
-        sum += scatter_from_light(turns, light, ray, metres, sigma);
+        vec4 ends = lit_parts(light, ray, metres);
+        for (int i = 0; i < 3; ++i) {
+            if (ends[i] < ends[i + 1]) { sum += scatter_from_part(turns, light, ray, vec2(ends[i], ends[i + 1]), sigma); }
+        }
     }
     return sum;
 }

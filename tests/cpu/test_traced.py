@@ -22,8 +22,10 @@ from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.notes import NoteKind
 from translucent.reference import pixel_rays
+from translucent.reference.light_paths import LightPaths
 from translucent.reference.render import scene_hits
 from translucent.reference.sheets import sheet_thicknesses
+from translucent.reference.surface_light import SurfaceLight
 
 SIZE = (20, 20)
 BALL = Sphere().tessellate(24)
@@ -46,7 +48,8 @@ def moved(x: float, scale: float = 1.0) -> Array:
 
 def tree_of(scene: tl.Scene, size: tuple[int, int], depth: int, forks: int) -> RayTree:
     caster = Caster(scene.objects, scene.bounds)
-    return RayTree(scene, sheet_thicknesses(scene), caster, size[0] / size[1], depth, forks, DiffusedLight({}))
+    light = SurfaceLight(LightPaths(scene, sheet_thicknesses(scene)))
+    return RayTree(light, caster, size[0] / size[1], depth, forks, DiffusedLight({}))
 
 
 def traced_light(

@@ -10,7 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import shader_library
-from translucent.formulas import color, diffusion, interface, optics, spherical_harmonics, tone, two_stream
+from translucent.formulas import color, diffusion, interface, lights, optics, spherical_harmonics, tone, two_stream
 from translucent.gpu.probe import run_function, signatures
 from translucent.media import density
 from translucent.scene import camera, environment
@@ -18,6 +18,7 @@ from translucent.scene import camera, environment
 MODULES: dict[str, ModuleType] = {
     "optics": optics,
     "interface": interface,
+    "lights": lights,
     "two_stream": two_stream,
     "diffusion": diffusion,
     "spherical_harmonics": spherical_harmonics,
@@ -31,6 +32,7 @@ MODULES: dict[str, ModuleType] = {
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
     "color": {"to_hex"},
+    "lights": {"light_cone"},
     "camera": {"check_size"},
     "tone": {"tone_curve"},
     "environment": {"parse_radiance"},
@@ -153,6 +155,19 @@ def _turned_arguments() -> list[np.ndarray]:
     return [np.repeat(directions, len(turns), axis=0), np.tile(turns, len(directions))]
 
 
+def _cone_arguments() -> list[np.ndarray]:
+    """Cones of all widths, and of no edge, about directions from next to their middle to the other side."""
+    travel, cones = [], []
+    for i, (inner, outer) in enumerate(((0.0, 0.8), (0.3, 0.31), (0.0, 0.001), (1.0, np.pi / 2), (0.0, 0.0))):
+        axis = _unit_vectors()[i].astype(np.float64)
+        aside = np.cross(axis, _unit_vectors()[i + 9])
+        aside /= np.linalg.norm(aside)
+        for angle in np.concatenate([np.linspace(0, 1.5, 40) * (outer or 1.0), np.linspace(0, np.pi, 9)]):
+            travel.append(np.cos(angle) * axis + np.sin(angle) * aside)
+            cones.append(lights.light_cone(axis, inner, outer) if outer else lights.ALL_AROUND)
+    return [np.float32(travel), np.float32(cones)]
+
+
 #: Radiance from below 0 to far above white, where curves bend, and in all mixtures of channels.
 RADIANCE = np.concatenate([[-1.0, 0.0], np.geomspace(1e-6, 1e6, 90), np.linspace(0.01, 1.5, 60)])
 
@@ -168,6 +183,7 @@ def _cell_arguments() -> list[np.ndarray]:
 ALONG = np.concatenate([np.linspace(0, 1, 13), [-1e-6, 1 + 1e-6, 1e-30, 1 - 1e-7]])
 
 ARGUMENTS = {
+    "cone_attenuation": _cone_arguments(),
     "linear_density": _mixed(ALONG, np.array([0.0, 1.0, 1e-6, 1e12]), np.array([0.0, 1.0, 3.0])),
     "exponential_density": _mixed(ALONG, np.array([1e-6, 1.0, 1e12]), np.array([0.0, -1e-7, 1e-3, -0.5, 3.0, -60.0])),
     "exponential_density_mean": _mixed(
@@ -310,6 +326,13 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
     if name == "scattered_radiance":
         # Of both signs, too.
         allowed = allowed + 8 * eps * np.abs(arguments[0] * arguments[1]).sum(axis=1)
+    if name == "cone_attenuation":
+        # Each component of the chord is a difference of numbers as large as the length of the cone's vector; the offset
+        # is as large as the squared chord at the edge.
+        travel, cone = (argument.astype(np.float64) for argument in arguments)
+        size = np.linalg.norm(cone[:, :3], axis=1)
+        chord = np.linalg.norm(size[:, None] * travel - cone[:, :3], axis=1)
+        allowed = allowed + 2 * np.sqrt(exact) * eps * (8 * chord * size + 4 * cone[:, 3]) + (8 * eps * size) ** 2
     if name == "emitted_radiance":
         allowed = allowed + 1e-37
     if name.startswith("exponential_density"):

@@ -25,6 +25,8 @@ GROUND = tl.Object(tl.Mesh(60 * QUAD, [(0, 2, 1), (0, 3, 2)], name="ground"))
 CAMERA = tl.Camera.look_at((0, 5, 9), (0, 0, 0))
 SUN = tl.DirectionalLight((0, -1, 0), 1.0)
 CLEAR = tl.Medium(ior=1.5)
+#: As dark as what photons go through is to straight light.
+DARK = tl.Medium(1e4 / np.sqrt(12.0), ior=1.5)
 NIGHT = tl.Environment.constant((0.0, 0.0, 0.0))
 RADII = (0.3, 0.6, 1.2, 3.0)
 
@@ -185,9 +187,10 @@ def test_the_ground_shows_what_lands_on_it(renderer: tl.Renderer, landed: Landed
     half = tl.Surface(color=gray, metallic=0.5, roughness=1.0, ior=1.0)
     for ground, kept in ((tl.Object(GROUND.mesh, color=gray), 1.0), (tl.Object(GROUND.mesh, surface=half), 0.5)):
         one = scene(ball(), ground, camera=camera)
-        without = renderer.render(one, (32, 24)).radiance.astype(np.float64)
+        shadowed = scene(ball(DARK), ground, camera=camera)
         for samples in (1, 4):
             landed.parts.clear()
+            without = renderer.render(shadowed, (32, 24), samples=samples).radiance.astype(np.float64)
             frame = renderer.render(one, (32, 24), samples=samples, caustics=tl.Caustics(20_000))
             added = frame.radiance - without
             shown = photons_in(renderer, one, (32, 24), tl.Caustics(20_000)) * kept * np.array(gray) / np.pi
@@ -212,7 +215,8 @@ def test_interfaces_show_caustics_behind_them(renderer: tl.Renderer) -> None:
     camera = tl.Camera.look_at((0, 0.5, 4), (0, 0, 0), fov_y=12)
     one = scene(ball(), pane, GROUND, camera=camera)
     caustics = tl.Caustics(20_000)
-    added = renderer.render(one, (16, 12), caustics=caustics).radiance - renderer.render(one, (16, 12)).radiance
+    without = renderer.render(scene(ball(DARK), pane, GROUND, camera=camera), (16, 12)).radiance
+    added = renderer.render(one, (16, 12), caustics=caustics).radiance - without
     shown = photons_in(renderer, one, (16, 12), caustics) * 0.6 / np.pi
     lit = shown[..., 0] > 0.02 * shown.max()
     share = slab_transmittance(fresnel(np.array(np.cos(np.arctan(0.125))), 1.5), 0.0)
@@ -260,6 +264,29 @@ def test_a_fence_before_the_eye_hides_what_is_behind_it(renderer: tl.Renderer) -
     free = scene(ball(), GROUND, camera=camera)
     assert truth < 0.8 * photons_in(renderer, free, (64, 48), tl.Caustics(20_000)).sum()
     assert 0.85 < found / truth < 1.05
+
+
+def test_a_spot_lights_what_is_in_its_cone(renderer: tl.Renderer, landed: Landed) -> None:
+    """A narrow one through the middle of the ball, from above and from inside; one that looks away lights nothing."""
+    for height, direction in ((5.0, (0, -1, 0)), (2.0, (0, -1, 0)), (5.0, (0, 1, 0))):
+        spot = tl.SpotLight((0, height, 0), direction, 1.0, inner_cone=2.0, outer_cone=4.0)
+        landed.parts.clear()
+        renderer.render(scene(light=spot), (8, 8), caustics=tl.Caustics(100_000))
+        # The mean over all directions times 4 pi; of what comes from outside, two faces of glass mirror the rest up.
+        faces = 2 if height > 3 else 1
+        power = 4.0 * np.pi * spot.mean_share * 0.96**faces * (direction[1] < 0)
+        assert landed.power[:, 0].sum() == pytest.approx(power, rel=0.1)
+
+
+def test_sky_shadows_are_those_of_straight_light(renderer: tl.Renderer) -> None:
+    """Photons carry the light of lamps alone: what throws clear shadows from the sky throws them with photons, too."""
+    camera, sky = tl.Camera.look_at((0, 0.9, 2.5), (0, 0, 0), fov_y=30), tl.Environment.constant((1.0, 1.0, 1.0))
+    dim = tl.DirectionalLight((0, -1, 0), 1e-6)
+    one = scene(light=dim, camera=camera, environment=sky, environment_shadows=16)
+    straight = renderer.render(one, (16, 12)).radiance
+    np.testing.assert_allclose(renderer.render(one, (16, 12), caustics=tl.Caustics(100)).radiance, straight, atol=1e-3)
+    dark = scene(ball(DARK), GROUND, light=dim, camera=camera, environment=sky, environment_shadows=16)
+    assert renderer.render(dark, (16, 12)).radiance.min() < 0.8 * straight.min()
 
 
 def test_photons_are_the_same_however_many_follow(renderer: tl.Renderer, landed: Landed) -> None:

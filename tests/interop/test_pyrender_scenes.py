@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import translucent as tl
 from translucent.geometry.solids import Sphere
@@ -109,7 +111,7 @@ def _radiance(f0: float, color: float, irradiance: float) -> float:
     return irradiance * ((1.0 - f0) * (1.0 - f0) * color / np.pi + f0 / np.pi / 4.001)
 
 
-@pytest.mark.parametrize("kind", ["point", "directional", "ambient"])
+@pytest.mark.parametrize("kind", ["point", "spot", "directional", "ambient"])
 def test_units_of_light_are_those_that_pyrender_draws_with(pyrender: ModuleType, studio: Any, kind: str) -> None:
     """A wall at right angles to the view, lit from the camera."""
     scene = pyrender.Scene(ambient_light=[0.4 * (kind == "ambient")] * 3)
@@ -119,6 +121,11 @@ def test_units_of_light_are_those_that_pyrender_draws_with(pyrender: ModuleType,
     scene.add(pyrender.PerspectiveCamera(0.1))
     if kind == "point":
         scene.add(pyrender.PointLight(color=np.ones(3), intensity=13.5))
+    if kind == "spot":
+        # At an angle from its middle at which half of the cosines' difference, squared, is a quarter.
+        middle = math.acos(0.5 + 0.5 * math.cos(math.radians(50)))
+        lamp = pyrender.SpotLight(color=np.ones(3), intensity=54.0, outerConeAngle=math.radians(50))
+        scene.add(lamp, pose=trimesh.transformations.rotation_matrix(middle, (0.6, 0.8, 0)))
     if kind == "directional":
         scene.add(pyrender.DirectionalLight(color=np.ones(3), intensity=1.5))
     seen = backdrop_from_pyrender(scene, ["ball"], (3, 3)).radiance[1, 1]
@@ -129,15 +136,22 @@ def test_units_of_light_are_those_that_pyrender_draws_with(pyrender: ModuleType,
     ours = scene_from_pyrender(scene, {"ball": GREEN}, (3, 3)).lights
     if ours:
         irradiance = ours[0].irradiance_on((0.0, 0.0, -3.0), (0.0, 0.0, 1.0))
-        np.testing.assert_allclose(irradiance, 1.5, rtol=EPS)
+        np.testing.assert_allclose(irradiance, 1.5, rtol=8 * EPS)
 
 
-def test_spot_lights_are_told(pyrender: ModuleType, studio: Any) -> None:
+def test_spot_lights_keep_their_cones(pyrender: ModuleType, studio: Any) -> None:
     scene = studio.scene()
-    for _ in range(2):
-        scene.add(pyrender.SpotLight(color=np.ones(3), intensity=1.0))
-    with pytest.warns(tl.TranslucentWarning, match="left out: 2 spot lights, which light only what is opaque"):
-        assert len(scene_from_pyrender(scene, {"ball": GREEN}, SIZE).lights) == 2
+    scene.add(pyrender.SpotLight(np.ones(3), 2.0, None, 0.25, 0.5), pose=_moved((1.0, 2.0, 3.0)))
+    scene.add(pyrender.SpotLight(np.ones(3), 1.0, None, 0.5, 0.5))
+    spots = [
+        light for light in scene_from_pyrender(scene, {"ball": GREEN}, SIZE).lights if isinstance(light, tl.SpotLight)
+    ]
+    found, edged = sorted(spots, key=lambda light: light.inner_cone)
+    np.testing.assert_array_equal(found.position, (1.0, 2.0, 3.0))
+    np.testing.assert_array_equal(found.direction, (0.0, 0.0, -1.0))
+    np.testing.assert_array_equal(found.intensity, 2.0)
+    assert (found.inner_cone, found.outer_cone) == (pytest.approx(math.degrees(0.25)), pytest.approx(math.degrees(0.5)))
+    assert edged.inner_cone == pytest.approx(edged.outer_cone, rel=EPS)
 
 
 def test_unknown_names_are_told_with_those_there_are(studio: Any) -> None:
@@ -213,7 +227,11 @@ def test_what_is_no_scene_or_no_picture_is_refused(pyrender: ModuleType, studio:
 
 
 def test_opaque_objects_and_lights_become_a_scene_of_pyrender(studio: Any) -> None:
-    lights = [tl.PointLight((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), tl.DirectionalLight((0.0, -3.0, -4.0), 2.0)]
+    lights = [
+        tl.PointLight((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)),
+        tl.SpotLight((1.0, 2.0, 3.0), (-0.5, -2.5, -2.0), (4.0, 5.0, 6.0), 10.0, 30.0),
+        tl.DirectionalLight((0.0, -3.0, -4.0), 2.0),
+    ]
     camera = tl.Camera(studio.pose, fov_y=35.0)
     objects = [tl.Object(studio.floor, color=(0.1, 0.2, 0.3)), tl.Object(studio.ball, medium=GREEN)]
     scene = tl.Scene(objects, camera, lights, tl.Environment.gradient(0.2, 0.6))
@@ -234,7 +252,7 @@ def test_opaque_objects_and_lights_become_a_scene_of_pyrender(studio: Any) -> No
         for normal in np.eye(3):
             shifted = np.subtract(point, camera.eye)
             expected = light.irradiance_on(point, normal)
-            np.testing.assert_allclose(found.irradiance_on(shifted, normal), expected, rtol=8 * EPS)
+            np.testing.assert_allclose(found.irradiance_on(shifted, normal), expected, rtol=32 * EPS)
 
 
 def test_scenes_that_pyrender_cannot_draw_are_refused(pyrender: ModuleType, studio: Any) -> None:

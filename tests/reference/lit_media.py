@@ -17,7 +17,7 @@ from translucent.media.medium import Medium
 from translucent.reference import render
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Overlap, Scene
 
 Array = npt.NDArray[np.float64]
@@ -61,11 +61,14 @@ def single_scatter(
         width = (end - start) / 8192
         t = (start + width * (np.arange(8192)[:, None] + 0.5 + 0.5 * points)).ravel()
         point = origin + t[:, None] * direction
-        source = np.asarray(light.position) if isinstance(light, PointLight) else point - 1e3 * light.direction
+        source = np.asarray(light.position) if isinstance(light, PositionalLight) else point - 1e3 * light.direction
         way = point - source
         distance = np.linalg.norm(way, axis=1)
         travel = way / distance[:, None]
-        strength = light.intensity / distance[:, None] ** 2 if isinstance(light, PointLight) else light.irradiance
+        if isinstance(light, PositionalLight):
+            strength = light.intensity_along(travel) / distance[:, None] ** 2
+        else:
+            strength = np.asarray(light.irradiance)
         chord = solid.chord(source, travel) - solid.chord(point, travel)
         chord = chord + solid.chord(origin, direction) - solid.chord(point, direction)
         phase = optics.henyey_greenstein(-travel @ direction, medium.anisotropy)

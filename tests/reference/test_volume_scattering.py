@@ -29,7 +29,7 @@ from translucent.media.medium import Medium
 from translucent.reference import render
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PointLight, SpotLight
 from translucent.scene.scene import Light, Object, Scene
 
 # One slab
@@ -65,6 +65,22 @@ def test_a_slab_by_a_lamp(position: tuple[float, ...], g: float) -> None:
     expected = single_scatter(SLAB, medium, light, origin, direction, (3 / -direction[2], 4 / -direction[2]))
     # The chord of the solid rounds at coordinates of 50 m, over a path of 1 m: some 1e-14, times 5 /m.
     np.testing.assert_allclose(middle(slab(light, medium)), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cones", "rtol"), [((0, 40), 1e-6), ((10, 20), 1e-6), ((5, 5.001), 1e-3), ((0, 0.1), 1e-4), ((40, 90), 1e-6)]
+)
+@pytest.mark.parametrize(
+    "position", [(0.2, 0.1, 0.5), (0.2, 0.1, -0.4), (-1, 0.1, -0.5)], ids=["from above", "inside", "from the side"]
+)
+def test_a_slab_by_a_spot(position: tuple[float, ...], cones: tuple[float, float], rtol: float) -> None:
+    """The rules of quadrature end where the ray enters the cones and leaves them, however thin the beam is."""
+    light = SpotLight(position, np.subtract((0.1, 0.0, -0.5), position), 2.0, *cones)
+    origin, direction = middle_ray()
+    expected = single_scatter(SLAB, MEDIUM, light, origin, direction, (3 / -direction[2], 4 / -direction[2]))
+    # The sum to compare with has an error of its own at edges within its panels.
+    np.testing.assert_allclose(middle(slab(light, MEDIUM)), expected, rtol=rtol)
+    assert expected.min() > 1e-7
 
 
 def test_the_error_that_is_told() -> None:

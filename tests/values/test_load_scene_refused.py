@@ -124,6 +124,13 @@ def test_a_bad_camera_is_refused_in_words(tmp_path: Path, camera: Json, message:
     [
         ({"type": "area"}, "type 'area' is neither point, directional nor spot"),
         ({"type": "point", "intensity": -1}, "below 0"),
+        (
+            {"type": "spot", "spot": {"innerConeAngle": 0.8}},
+            "innerConeAngle 0.8, outerConeAngle 0.785398: not 0 <= inn",
+        ),
+        ({"type": "spot", "spot": {"outerConeAngle": 1.6}}, "innerConeAngle 0, outerConeAngle 1.6: not 0 <= inner < "),
+        ({"type": "spot", "spot": {"innerConeAngle": -0.1}}, "innerConeAngle -0.1, outerConeAngle 0.785398: not"),
+        ({"type": "spot", "spot": []}, r"spot is \[\], not an object"),
         ({"type": "point", "intensity": "bright"}, "intensity is 'bright', not a number"),
         ({"type": "point", "color": [1, 1]}, r"color is \[1, 1\], not 3 numbers"),
     ],

@@ -97,10 +97,25 @@ def test_lights_have_position_direction_and_power(tmp_path: Path) -> None:
     assert np.asarray(sun_light.irradiance).tolist() == [3.0, 1.5, 0.75]
 
 
-def test_spots_and_ranges_are_told(tmp_path: Path) -> None:
-    with pytest.warns(tl.TranslucentWarning, match=r"spot lights \('Lamp 0'\); ranges of lights \('Lamp 1'\)"):
-        scene = lit_scene(tmp_path, {"type": "spot", "spot": {}}, {"type": "point", "range": 4.0})
-    assert len(scene.lights) == 1
+def test_spots_have_cones(tmp_path: Path) -> None:
+    angles = {"innerConeAngle": 0.25, "outerConeAngle": float(np.float32(np.pi / 2))}
+    lamp = {"type": "spot", "intensity": 2.0, "color": [1.0, 0.5, 0.25], "spot": angles}
+    scene = lit_scene(
+        tmp_path, lamp, {"type": "spot", "spot": {}}, rotation=TURN, translation=[1, 2, 3], scale=[2, 3, 4]
+    )
+    wide, plain = scene.lights
+    assert isinstance(wide, tl.SpotLight)
+    assert np.asarray(wide.position).tolist() == [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(wide.direction, [-1.0, 0.0, 0.0], atol=1e-15)
+    assert np.asarray(wide.intensity).tolist() == [2.0, 1.0, 0.5]
+    assert (wide.inner_cone, wide.outer_cone) == (pytest.approx(math.degrees(0.25)), 90.0)
+    assert (plain.inner_cone, plain.outer_cone) == (0.0, pytest.approx(45.0))
+
+
+def test_ranges_are_told(tmp_path: Path) -> None:
+    with pytest.warns(tl.TranslucentWarning, match=r"ranges of lights \('Lamp 0', 'Lamp 1'\)"):
+        scene = lit_scene(tmp_path, {"type": "spot", "range": 3.0}, {"type": "point", "range": 4.0})
+    assert len(scene.lights) == 2
 
 
 # Singular transforms

@@ -268,7 +268,8 @@ def test_a_plan_prints_a_line_for_each_thing_to_know() -> None:
         *["limit"] * len(found.limits),
         *["not modelled"] * len(found.unmodelled),
     ]
-    assert lines[-1] == "  not modelled: shadows: light reaches opaque objects through everything"
+    text = "shadows of the environment: its light reaches opaque objects through everything"
+    assert lines[-1] == f"  not modelled: {text}"
     assert str(plan(scene(body()))).startswith("SignedDepth(anchored=True): exact, at about the cost of ")
 
 

@@ -30,8 +30,8 @@ def scene(*objects: tl.Object, lights: Any = (SUN,), **options: Any) -> tl.Scene
 
 def test_photons_land_on_the_picture_of_what_is_opaque() -> None:
     found = plan(scene(), caustics=FEW)
-    assert [step.name for step in found.passes][:2] == [PassName.OPAQUE, PassName.CAUSTICS]
-    assert "1,000 photons from 1 light through 'box'" in found.passes[1].reason
+    assert [step.name for step in found.passes][:3] == [PassName.SHADOW_MAPS, PassName.OPAQUE, PassName.CAUSTICS]
+    assert "1,000 photons from 1 light through 'box'" in found.passes[2].reason
     assert found.cost - plan(scene()).cost == pytest.approx(FEW.cost_of_a_million * 1e-3)
     assert (found.caustics, found.summary()["caustics"]) == (FEW, "Caustics(photons=1000, seed=0)")
     notes = [str(note) for note in found.unmodelled if note.kind is NoteKind.CAUSTICS]

@@ -28,7 +28,7 @@ BENT = "refracted and reflected light"
         ([body()], []),
         ([body(MILK)], ["in-scattered light: scattering only removes light"]),
         ([body(DIAMOND)], [BENT]),
-        ([body(), body(None)], ["shadows: light reaches opaque objects through everything"]),
+        ([body(), body(None)], ["shadows of the environment: its light reaches opaque objects through everything"]),
         ([body(MILK), body(DIAMOND, x=9), body(None)], ["in-scattered light", BENT, "shadows"]),
     ],
 )

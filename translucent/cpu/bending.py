@@ -43,7 +43,7 @@ class BentLight:
         `tree`: depth and forks, as of `TracedInterfaces`.
         """
         scene = shader.scene
-        rays = RayTree(scene, shader.sheets, caster, size[0] / size[1], *tree, diffused)
+        rays = RayTree(shader.light, caster, size[0] / size[1], *tree, diffused)
         return cls(rays, tuple(i for i, body in enumerate(scene.objects) if body.has_interface))
 
     def put_into(self, shaded: Arrays, rays: Rays, hits: Sequence[Hits], band: Band, spread: Spread | None) -> None:

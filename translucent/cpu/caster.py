@@ -16,7 +16,7 @@ from translucent.arrays import Array, Integers
 from translucent.cpu.vectors import dot
 from translucent.geometry.embree import STEP, embree_scene
 from translucent.geometry.normals import drawn_normals
-from translucent.reference.boxes import BoxTree, Lines
+from translucent.reference.boxes import Lines
 from translucent.reference.tracer import TracedObject, center_from
 from translucent.scene.scene import Object
 
@@ -209,7 +209,7 @@ class Caster:
     @cached_property
     def _exact(self) -> list[TracedObject]:
         corners = [self._corners(i) for i in range(len(self.objects))]
-        return [TracedObject(body, own, BoxTree.of(own)) for body, own in zip(self.objects, corners, strict=True)]
+        return [TracedObject(body, own) for body, own in zip(self.objects, corners, strict=True)]
 
     def _corners(self, i: int) -> Array:
         """(m, 3, 3): corners of the faces of an object, in radii from the center."""

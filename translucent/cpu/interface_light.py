@@ -10,9 +10,10 @@ from translucent.cpu.vectors import dot, unit
 from translucent.formulas import optics
 from translucent.formulas.interface import ggx_distribution, ggx_visibility, slab_reflectance
 from translucent.reference.interfaces import Optics
-from translucent.reference.opaque import irradiance_at, seen_from
+from translucent.reference.opaque import seen_from
 from translucent.reference.rays import Rays
-from translucent.scene.lights import PointLight
+from translucent.reference.surface_light import SurfaceLight
+from translucent.scene.lights import PositionalLight
 
 
 class InterfaceLight:
@@ -21,10 +22,12 @@ class InterfaceLight:
     Parameters
     ----------
     own : Optics
+    light : SurfaceLight
+        On paint.
     """
 
-    def __init__(self, own: Optics) -> None:
-        self.scene = own.scene
+    def __init__(self, own: Optics, light: SurfaceLight) -> None:
+        self.scene, self.light = own.scene, light
         surfaces = own.surfaces
         self._paint = np.array([1.0 - surface.transmission for surface in surfaces])
         self._color = np.array([surface.color for surface in surfaces], dtype=np.float64)
@@ -55,7 +58,7 @@ class InterfaceLight:
         painted = np.flatnonzero((share > 0.0).any(axis=1))
         item, points, normals = met.item[painted], rays.origins[painted], met.normals[painted]
         through = self._through[item, None]
-        front, back = (irradiance_at(self.scene, points, side * normals) for side in (1.0, -1.0))
+        front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         with np.errstate(under="ignore"):
             light = self._color[item] * (1.0 - through) * front + through * self._through_color[item] * back
             found[painted] += share[painted] / np.pi * light
@@ -66,7 +69,7 @@ class InterfaceLight:
         cos_view = np.clip(dot(normals, to_eye), 0.0, 1.0)
         for light in self.scene.lights:
             own = seen_from(light, self.scene.camera.eye)
-            if isinstance(own, PointLight):
+            if isinstance(own, PositionalLight):
                 to_light = unit(np.asarray(own.position) - points)
             else:
                 to_light = np.broadcast_to(-np.asarray(own.direction), points.shape)

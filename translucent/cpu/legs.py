@@ -16,6 +16,7 @@ from translucent.reference.interfaces import Optics
 from translucent.reference.intervals import Intervals
 from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
+from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.scene import Scene
 
@@ -28,10 +29,12 @@ class LegMedia:
     scene : Scene
     own : Optics
     media : RecordedMedia
+    light : SurfaceLight
+        On layers.
     """
 
-    def __init__(self, scene: Scene, own: Optics, media: RecordedMedia) -> None:
-        self.scene, self.media, self.volume = scene, media, Volume(scene)
+    def __init__(self, scene: Scene, own: Optics, media: RecordedMedia, light: SurfaceLight) -> None:
+        self.scene, self.media, self.light, self.volume = scene, media, light, Volume(scene)
         #: Sheets without an interface.
         self.films = tuple(None if i in own.walls else metres for i, metres in enumerate(own.sheets))
 
@@ -66,7 +69,8 @@ class LegMedia:
     def _composited(
         self, rays: Rays, intervals: Intervals, hits: Sequence[Hits], sheets: Sequence[float | None]
     ) -> tuple[Array, Array]:
-        crossings = scene_crossings(self.scene, rays, hits, sheets, np.full(len(rays), np.inf))
+        end = np.full(len(rays), np.inf)
+        crossings = scene_crossings(self.scene, rays, hits, sheets, end, self.light.on_interfaces)
         segments, filling = volume_segments(self.scene, self.volume, rays, intervals, crossings)
         emitted, depth = composite(emission_of_mixtures(self.volume, rays, segments, filling), len(rays))
         return emitted, optics.transmittance(depth)

@@ -23,7 +23,7 @@ from translucent.diffusion.cache import FieldCache
 from translucent.errors import RenderError
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
-from translucent.geometry.embree import embree_versions
+from translucent.geometry.embree import EmbreeMesh, embree_versions
 from translucent.geometry.mesh import Mesh
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering.choice import shown
@@ -106,7 +106,7 @@ class CpuRenderer:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
         started = time.perf_counter()
         scene = shown(scene, plan.given_back)
-        shader = Shader.of(scene, plan)
+        shader = Shader.of(scene, plan, self._embree_meshes(scene))
         picture = Picture.of(scene.camera, size)
         arrays = _empty(picture.size)
         bent = self._bent_light(shader, picture, plan)
@@ -128,6 +128,13 @@ class CpuRenderer:
         self._meshes.clear()
         self._fields.clear()
         self._caster = None
+
+    def _embree_meshes(self, scene: Scene) -> dict[Mesh, EmbreeMesh]:
+        """All meshes of a scene, ready for rays; they are kept as long as the meshes are."""
+        for body in scene.objects:
+            if body.mesh not in self._meshes:
+                self._meshes[body.mesh] = TracedMesh.of(body.mesh)
+        return {body.mesh: self._meshes[body.mesh].embree for body in scene.objects}
 
     def _bent_light(self, shader: Shader, picture: Picture, plan: RenderPlan) -> BentLight | None:
         """Rays that bend in a scene, if its bodies have interfaces; the last scene's shapes are kept."""
@@ -151,9 +158,6 @@ class CpuRenderer:
         """Shade a picture, and pass each band of it to `keep`; returns the seconds of each part."""
         started = time.perf_counter()
         objects = shader.scene.objects
-        for body in objects:
-            if body.mesh not in self._meshes:
-                self._meshes[body.mesh] = TracedMesh.of(body.mesh)
         tracers = in_threads(lambda body: Tracer(self._meshes[body.mesh], body, picture), objects, self._threads)
         prepared = time.perf_counter()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,11 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers
+from translucent.cpu.light_paths import EmbreeLightPaths
 from translucent.cpu.projection import slices
+from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.mesh import Mesh
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.reference import Hits, Rays, shade_hits, sheet_thicknesses
+from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.scene import Scene
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -38,15 +42,18 @@ class Shader:
         Thickness in metres of the sheet that each object is; None for a solid.
     fallback : tuple of float or None, or None
         The same where a pixel is not valid, for scenes with bodies that are not closed.
+    light : SurfaceLight
+        On the surfaces of the scene.
     """
 
     scene: Scene
     sheets: Sheets
     fallback: Sheets | None
+    light: SurfaceLight
 
     @classmethod
-    def of(cls, scene: Scene, plan: RenderPlan) -> Shader:
-        """Shader for a plan of the scene."""
+    def of(cls, scene: Scene, plan: RenderPlan, meshes: Mapping[Mesh, EmbreeMesh]) -> Shader:
+        """Shader for a plan of the scene; `meshes` are all of it, ready for rays."""
         sheets = sheet_thicknesses(scene, plan.method)
         drawn = {i for step in plan.passes if step.name is PassName.THIN_LAYER_FALLBACK for i in step.objects}
         diagonals = [float(np.linalg.norm(body.bounds[1] - body.bounds[0])) for body in scene.objects]
@@ -54,7 +61,7 @@ class Shader:
             FALLBACK_SHEET * diagonals[i] if i in drawn and metres is None else metres
             for i, metres in enumerate(sheets)
         )
-        return cls(scene, sheets, fallback if drawn else None)
+        return cls(scene, sheets, fallback if drawn else None, SurfaceLight(EmbreeLightPaths(scene, sheets, meshes)))
 
     def shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
         """Shade some rays into the arrays of a frame, (n,) or (n, 3), float64 and bool.
@@ -73,11 +80,11 @@ class Shader:
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
-        shaded = shade_hits(self.scene, rays, hits, self.sheets)
+        shaded = shade_hits(self.scene, rays, hits, self.sheets, self.light)
         invalid = np.flatnonzero(~shaded["valid"])
         if self.fallback is not None and invalid.size:
             lines = [on_rays(line, invalid, len(rays)) for line in hits]
-            again = shade_hits(self.scene, rays.where(invalid), lines, self.fallback)
+            again = shade_hits(self.scene, rays.where(invalid), lines, self.fallback, self.light)
             for name in SHOWN:
                 shaded[name][invalid] = again[name]
         return shaded

@@ -30,7 +30,7 @@ from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
 from translucent.reference.rays import Rays
-from translucent.scene.scene import Scene
+from translucent.reference.surface_light import SurfaceLight
 
 #: Share of each color below which a branch is not followed: it sees the environment at once.
 FAINTEST = 1.0 / 1024.0
@@ -62,9 +62,8 @@ class RayTree:
 
     Parameters
     ----------
-    scene : Scene
-    sheets : sequence of float or None
-        As `sheet_thicknesses` gives them.
+    light : SurfaceLight
+        On the surfaces of the scene.
     caster : Caster
         Of the objects of the scene.
     aspect : float
@@ -79,19 +78,21 @@ class RayTree:
 
     def __init__(
         self,
-        scene: Scene,
-        sheets: Sequence[float | None],
+        light: SurfaceLight,
         caster: Caster,
         aspect: float,
         depth: int,
         forks: int,
         diffused: DiffusedLight,
     ) -> None:
-        self.scene, self.caster, self.depth, self.forks = scene, caster, depth, forks
+        scene = light.scene
+        self.light, self.scene, self.caster, self.depth, self.forks = light, scene, caster, depth, forks
         self.diffused = diffused
         self.surroundings = Surroundings(scene, aspect)
         dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
-        self._channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
+        self._channels = [
+            Optics(scene, light.paths.sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))
+        ]
 
     def see(self, rays: Rays, hits: Sequence[Hits], pixel: Integers, spread: Spread | None) -> TracedLight:
         """Trace rays of the camera.
@@ -123,8 +124,8 @@ class _Growth:
         self.backdrop, self.pixel, self.spread = backdrop, pixel, spread
         self.scene, self.caster = tree.scene, tree.caster
         self.media = RecordedMedia(tree.scene, own)
-        self.legs = LegMedia(tree.scene, own, self.media)
-        self.interfaces, self.light = Interfaces(tree.caster, own), InterfaceLight(own)
+        self.legs = LegMedia(tree.scene, own, self.media, tree.light)
+        self.interfaces, self.light = Interfaces(tree.caster, own), InterfaceLight(own, tree.light)
         self.shift = tree.scene.camera.eye - tree.caster.center
         # One entry more, at index -1, for nothing.
         kinds = np.zeros((3, len(tree.scene.objects) + 1), dtype=bool)
@@ -346,7 +347,7 @@ class _Growth:
         ray = np.arange(len(beams))
         number = self.caster.faces.number[beams.last[ray, column]]
         wall = OpaqueHits(np.zeros(len(beams)), item[ray, column], number)
-        self._add(beams, reflected_radiance(self.scene, self._rays(beams), wall))
+        self._add(beams, reflected_radiance(self.scene, self._rays(beams), wall, self.tree.light.on_opaque))
 
     def _look_up(self, beams: Beams) -> None:
         if len(beams):

@@ -19,8 +19,8 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.triangles import Triangles, joined
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import row_solid_angles, texel_directions
-from translucent.scene.lights import DirectionalLight, PointLight
-from translucent.scene.scene import Object
+from translucent.scene.lights import PositionalLight
+from translucent.scene.scene import Light, Object
 
 #: Directions in which each sample looks for the environment and for other parts of the body.
 DIRECTIONS = 128
@@ -171,11 +171,9 @@ def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_arra
     return sparse.csr_array((values, (sample, other)), (len(shares), len(shares)))
 
 
-def from_light(
-    grid: BodyGrid, casters: Casters, light: PointLight | DirectionalLight, ior: float, interface: DiffuseInterface
-) -> Array:
+def from_light(grid: BodyGrid, casters: Casters, light: Light, ior: float, interface: DiffuseInterface) -> Array:
     """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way."""
-    if isinstance(light, PointLight):
+    if isinstance(light, PositionalLight):
         towards = np.asarray(light.position) - grid.points
         distance = np.linalg.norm(towards, axis=1)
         direction = towards / np.maximum(distance, 1e-18)[:, None]

@@ -26,7 +26,7 @@ from translucent.formulas.diffuse_interface import diffuse_interface, emergent_f
 from translucent.formulas.diffusion import emergent_radiance
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.medium import Medium
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
 
 #: Cells by which values at the surface are spread beyond the cells that it crosses.
@@ -191,8 +191,8 @@ class DiffusingBody:
         entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
         inside = np.zeros((grid.count, 3))
         for light in scene.lights:
-            if isinstance(light, PointLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
-                inside[cell] += 4.0 * np.pi * np.asarray(light.intensity)
+            if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
+                inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
                 entering = entering + from_light(grid, self._lit.casters, light, self._medium.ior, self._interface)
         found = self._system.solved(entering, self._entrance.itself, inside)

@@ -20,8 +20,9 @@ from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.sweeps import swept
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
+from translucent.formulas.lights import cone_attenuation
 from translucent.media.medium import Medium
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Object, Scene
 
 #: Directions of the rounds: what has been scattered depends on directions little.
@@ -41,6 +42,9 @@ _STILL = 1e-9
 
 #: Points in each cell, along each axis, at which its density is looked at.
 _PLACES = (0.25, 0.75)
+
+#: Places in each cell, along each axis, at which it is looked for the light of a spot.
+_BEAM_PLACES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,11 +210,13 @@ def _from_lights(grid: BodyGrid, density: Array, scene: Scene, medium: Medium) -
     cells, inside = grid.cells, grid.number >= 0
     points = cells.low + cells.step * cells.center[inside]
     for light in scene.lights:
-        if isinstance(light, PointLight):
+        if isinstance(light, PositionalLight):
             place = np.broadcast_to(np.asarray(light.position), points.shape)
             # In a lamp's own cell the mean of 1 / r^2 is that of a ball as large, 3 / R^2.
             nearest = (3.0 / (4.0 * np.pi)) ** (1.0 / 3.0) * cells.step / np.sqrt(3.0)
             power = np.asarray(light.intensity) / np.maximum(((place - points) ** 2).sum(axis=1), nearest**2)[:, None]
+            if isinstance(light, SpotLight):
+                power = power * _mean_shares(light, points, cells.step)[:, None]
         else:
             place = points - np.asarray(light.direction) * cells.step * sum(density.shape)
             power = np.broadcast_to(np.asarray(light.irradiance), points.shape)
@@ -225,6 +231,16 @@ def _from_lights(grid: BodyGrid, density: Array, scene: Scene, medium: Medium) -
         unturned[inside] += turned
         ahead[inside] += turned - all_turned
     return unturned, ahead
+
+
+def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:
+    """(k,): mean share of a spot's intensity in cells about points; beams may be thinner than these."""
+    places = (np.arange(_BEAM_PLACES) + 0.5) / _BEAM_PLACES - 0.5
+    total = np.zeros(len(points))
+    for offset in np.stack(np.meshgrid(places, places, places), axis=-1).reshape(-1, 3) * step:
+        way = points + offset - np.asarray(light.position)
+        total += cone_attenuation(way / np.maximum(np.linalg.norm(way, axis=1), _STILL * step)[:, None], light.cone)
+    return np.asarray(total / _BEAM_PLACES**3)
 
 
 def _column(grid: BodyGrid, density: Array, points: Array, places: Array) -> Array:

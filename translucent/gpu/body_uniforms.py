@@ -55,7 +55,9 @@ def body_roles(features: FrameFeatures, counts: Sequence[FaceCount]) -> tuple[Bo
     )
 
 
-def body_uniforms(placement: Placement, view: SampleView, role: BodyRole, media: AxialRange, diagonal: float) -> bytes:
+def body_uniforms(
+    placement: Placement, view: SampleView, role: BodyRole, media: AxialRange, diagonal: float, center: Array
+) -> bytes:
     """Contents of the Body block.
 
     Parameters
@@ -65,6 +67,8 @@ def body_uniforms(placement: Placement, view: SampleView, role: BodyRole, media:
         Of all media of the scene.
     diagonal : float
         Of the scene, in metres.
+    center : (3,) float64
+        Of the media.
     """
     body, camera = placement.body, view.camera
     seen = placement.camera_from_offset(camera)
@@ -94,6 +98,7 @@ def body_uniforms(placement: Placement, view: SampleView, role: BodyRole, media:
         slot=role.slot,
         starts_unknown=placement.on_surface,
         object=role.number,
+        anchor_from_center=[*(placement.anchor + camera.eye - center), 0.0],
     )
 
 

@@ -64,6 +64,8 @@ CONSTANTS: dict[str, str] = {
     "PEEL_BATCH": str(PEEL_BATCH),
     "PEEL_TILE": str(PEEL_TILE),
     "STEEP_IN_LIGHT_VIEW": "5e-3",  # axial depth per texel, from which on a face may well curve within a texel
+    "SHADOW_MARGIN": "1.0",  # texels that a surface may be behind what is opaque in a map of shadows, and still is lit
+    "STEEPEST_SHADOW": "64.0",  # texels along a light's rays that a surface may rise from one texel to the next
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
     "HAZE_ROUGHNESS": repr(HAZE_ROUGHNESS),

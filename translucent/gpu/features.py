@@ -34,6 +34,11 @@ class FrameFeatures:
         return self.plan.has(PassName.OPAQUE, PassName.BACKDROP)
 
     @property
+    def has_shadow_maps(self) -> bool:
+        """Whether opaque objects look up what reaches them of lights."""
+        return self.plan.has(PassName.SHADOW_MAPS)
+
+    @property
     def has_surfaces(self) -> bool:
         """Whether any body has an interface that changes light."""
         return self.plan.has(PassName.SURFACES, PassName.TRACED)

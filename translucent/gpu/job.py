@@ -46,6 +46,8 @@ class FrameJob(SceneView):
     gl, scene, plan, targets, resources
     backdrop : Backdrop or TextureBackdrop, optional
         What a plan with the pass of that name needs.
+    placed : PlacedScene, optional
+        The scene before its camera, where axial depths are to count from elsewhere than from where media begin.
 
     Attributes
     ----------
@@ -60,10 +62,14 @@ class FrameJob(SceneView):
         In the samples of the frame so far.
     report : callable
         Takes the share of the frame's paths that have ended, now and then.
+    corner : (int, int)
+        Left and bottom of the picture in its targets.
     covered : Part
         Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
         the bottom, as geometry is drawn.
     """
+
+    corner: tuple[int, int] = (0, 0)
 
     def __init__(
         self,
@@ -73,6 +79,7 @@ class FrameJob(SceneView):
         targets: Targets,
         resources: Resources,
         backdrop: Backdrop | TextureBackdrop | None = None,
+        placed: PlacedScene | None = None,
     ) -> None:
         self.started = time.perf_counter()
         self.plan = plan
@@ -83,7 +90,7 @@ class FrameJob(SceneView):
         self.photons_followed = 0
         self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
-        placed = PlacedScene.of(scene)
+        placed = placed or PlacedScene.of(scene)
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
         if self.features.varies:
@@ -110,11 +117,16 @@ class FrameJob(SceneView):
         light = self.diffused_light
         return {} if light is None else light.rows(media_center(self.scene))
 
+    @property
+    def shadow_maps(self) -> bool:
+        """Whether opaque objects look up what reaches them of lights."""
+        return self.features.has_shadow_maps
+
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene
         depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
-        self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths))
+        self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths, self.corner))
         self.covered = part_of(self._extents[self._media], shift, self.targets.size)
         self._cleared.clear()
 

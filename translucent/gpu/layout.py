@@ -30,6 +30,9 @@ MAX_LIGHTS = 32
 #: Largest number of views from lights that media scatter: one each, or the six of a cube.
 MAX_LIGHT_VIEWS = 6 * MAX_SCATTER_LIGHTS
 
+#: Views from lights, and from directions of the environment, that shadows on opaque objects are looked up in.
+MAX_SHADOW_VIEWS, MAX_SKY_VIEWS = 6 * MAX_LIGHTS, 256
+
 
 _Fields: TypeAlias = tuple[tuple[str, str, tuple[int, ...]], ...]
 
@@ -196,6 +199,7 @@ BODY = UniformBlock(
         ("slot", "i4", ()),
         ("starts_unknown", "i4", ()),  # whether the eye is on the surface, so that rays start on either side of it
         ("object", "i4", ()),  # its number in the scene
+        ("anchor_from_center", "f4", (4,)),  # position of the center of its mesh, from the center of the media
     ),
 )
 
@@ -268,8 +272,32 @@ LIGHTS = UniformBlock(
     (
         ("light_position", "f4", (MAX_LIGHTS, 4)),  # from the eye, w = 1; or direction to the light, w = 0
         ("light_power", "f4", (MAX_LIGHTS, 4)),  # intensity or irradiance
+        ("light_cone", "f4", (MAX_LIGHTS, 4)),  # as cone_attenuation takes it
         ("light_count", "i4", ()),
     ),
+)
+
+#: Per frame: maps of shadows, see ``shaders/shade/shadows.glsl``. Positions count from the center of the media.
+SHADOWS = UniformBlock(
+    "Shadows",
+    9,
+    (
+        ("shadow_lights", "f4", (MAX_LIGHTS, 4)),  # of each light: number of its first view, and how many it has
+        ("shadow_views", "f4", (4 * MAX_SHADOW_VIEWS, 4)),  # rows of right, up and ahead; corner, size, perspective
+        ("shadow_extinction", "f4", (4,)),  # of the one medium, where maps hold paths
+        ("sky_count", "i4", ()),  # directions of the environment,
+        ("sky_first", "i4", ()),  # and those of them that this sample looks at: the first,
+        ("sky_step", "i4", ()),  # and every so-many-th after it
+        ("sky_size", "i4", ()),  # texels along a side of their maps
+        ("sky_columns", "i4", ()),  # maps in a row of the atlas
+    ),
+)
+
+#: Per frame: directions of the environment that throw shadows.
+SKY_SHADOWS = UniformBlock(
+    "SkyShadows",
+    10,
+    (("sky_views", "f4", (4 * MAX_SKY_VIEWS, 4)),),  # rows of right, up and ahead; light, and number of the map
 )
 
 #: Per frame: light that is scattered into the view rays. Positions count from the center of the media.
@@ -283,6 +311,7 @@ SCATTER = UniformBlock(
         ("scatter_near", "f4", (4,)),  # metres of axial depth 0 ahead of the eye; ahead of the center; 1 in perspective
         ("scatter_light_position", "f4", (MAX_SCATTER_LIGHTS, 4)),  # position, w = 1; or direction to the light, w = 0
         ("scatter_light_power", "f4", (MAX_SCATTER_LIGHTS, 4)),  # intensity or irradiance; w: 1 if inside a body
+        ("scatter_light_cone", "f4", (MAX_SCATTER_LIGHTS, 4)),  # as cone_attenuation takes it
         (
             "scatter_light_views",
             "f4",
@@ -309,7 +338,10 @@ DENSITY = UniformBlock(
     ),
 )
 
-BLOCKS = {block.name: block for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES)}
+BLOCKS = {
+    block.name: block
+    for block in (VIEW, BODY, SHADE, MEDIA, LIGHTS, ENVIRONMENT, SCATTER, DENSITY, SURFACES, SHADOWS, SKY_SHADOWS)
+}
 
 #: Surface parameters that do not vary over an object: a record for each object.
 SURFACE_ROW = PackedTable(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.geometry.mesh import Mesh
 from translucent.scene.camera import Camera
-from translucent.scene.lights import DirectionalLight, PointLight
-from translucent.scene.scene import Light, Scene
+from translucent.scene.lights import DirectionalLight, SpotLight
+from translucent.scene.scene import Light, Object, Scene
 
 #: Factor by which the frame of a view is larger than its content: interpolation needs neighbors.
 _MARGIN = 1.02
@@ -29,10 +32,41 @@ def media_sphere(scene: Scene) -> tuple[Array, float]:
     return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
 
 
+#: Vertices from which on it pays to find those of the convex hull.
+_MANY = 1000
+
+_HULLS: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
+
+
+def outermost(item: Object) -> Array:
+    """(n, 3): vertices of an object in the world, but for those inside the convex hull of many."""
+    return _outermost(item.mesh) @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+
+
+def _outermost(mesh: Mesh) -> Array:
+    if len(mesh.vertices) < _MANY:
+        return mesh.vertices
+    if mesh not in _HULLS:
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            _HULLS[mesh] = mesh.vertices[ConvexHull(mesh.vertices).vertices]
+        except QhullError:  # flat
+            _HULLS[mesh] = mesh.vertices
+    return _HULLS[mesh]
+
+
 def light_cameras(light: Light, scene: Scene) -> list[Camera]:
     """Cameras of a light: one that sees all media, or six where the light is among them or close by."""
-    center, radius = media_sphere(scene)
-    points = np.concatenate([body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] for body in scene.bodies])
+    points = np.concatenate([outermost(body) for body in scene.bodies])
+    return cameras_towards(points, light, *media_sphere(scene))
+
+
+def cameras_towards(points: Array, light: Light, center: Array, radius: float) -> list[Camera]:
+    """Cameras of a light: one that sees points (n, 3) in a ball, or six where the light is among or near them.
+
+    One of a spot may see the cone alone, where that is narrower.
+    """
     if isinstance(light, DirectionalLight):
         direction = np.asarray(light.direction)
         eye = center - 2.0 * radius * direction
@@ -42,21 +76,34 @@ def light_cameras(light: Light, scene: Scene) -> list[Camera]:
         extent = float(np.ptp(across, axis=0).max()) or radius
         eye = eye + pose[:3, :2] @ middle
         return [Camera.orthographic(eye, eye + direction, up=_any_up(direction), height=extent * _MARGIN)]
-    assert isinstance(light, PointLight)
     position = np.asarray(light.position)
     towards = center - position
+    found = _cone_camera(light, max(float(np.linalg.norm(towards)), radius)) if isinstance(light, SpotLight) else None
+    widest = _WIDEST if found is None or found.fov_y is None else found.fov_y
     if (distance := float(np.linalg.norm(towards))) > 0:
         pose = Camera.look_at(position, center, up=_any_up(towards)).pose
         seen = (points - position) @ pose[:3, :3]  # right, up, backward
         if (seen[:, 2] < 0).all():
             tangent = float((np.abs(seen[:, :2]) / -seen[:, 2:]).max()) * _MARGIN
-            if (angle := 2.0 * float(np.degrees(np.arctan(tangent)))) < _WIDEST:
+            if (angle := 2.0 * float(np.degrees(np.arctan(tangent)))) < widest:
                 return [Camera.look_at(position, center, up=_any_up(towards), fov_y=max(angle, _NARROWEST))]
+    if found is not None:
+        return [found]
     reach = max(distance, radius)
     return [
         Camera.look_at(position, position + reach * np.array(axis), up=_any_up(np.array(axis)), fov_y=91.0)
         for axis in _CUBE
     ]
+
+
+def _cone_camera(light: SpotLight, reach: float) -> Camera | None:
+    """Camera that sees the cone of a spot; None if that is too wide for one."""
+    angle = 2.0 * float(np.degrees(np.arctan(_MARGIN * np.tan(np.radians(light.outer_cone)))))
+    if angle >= _WIDEST:
+        return None
+    direction = np.asarray(light.direction)
+    position = np.asarray(light.position)
+    return Camera.look_at(position, position + reach * direction, up=_any_up(direction), fov_y=angle)
 
 
 def _any_up(direction: Array) -> Array:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.formulas.lights import ALL_AROUND
 from translucent.planning.bodies import indices
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 
 #: Factor by which a rectangle is larger than what it holds: of rounding.
@@ -30,10 +31,12 @@ class PhotonAim:
     middle, right, up : (3,) float64
         Of the rectangle, and half its sides; these are 0 where photons leave in all directions.
     flux : (3,) float64
-        Of a directional light through the rectangle, or of a point light in all directions, in W; of a point light
+        Of a directional light through the rectangle, or of a lamp as bright in all directions, in W; of a lamp
         that aims at a rectangle, to be multiplied by the cosine over the squared distance.
     weight : float
         Share of the photons, up to a factor.
+    cone : (4,) float64
+        In which the light shines, as `translucent.formulas.lights.cone_attenuation` takes it.
     inside : tuple of int
         Numbers of the bodies that the light is in.
     photons : int
@@ -46,6 +49,7 @@ class PhotonAim:
     up: Array
     flux: Array
     weight: float
+    cone: Array = field(default_factory=lambda: np.array(ALL_AROUND))
     inside: tuple[int, ...] = ()
     photons: int = 0
 
@@ -91,11 +95,11 @@ def _aims(scene: Scene, light: Light, clouds: list[Array], center: Array) -> lis
             flux = np.asarray(light.irradiance) * area
             aims.append(PhotonAim(from_light, at, right, up, flux, float(flux.mean())))
         return aims
-    assert isinstance(light, PointLight)
+    assert isinstance(light, PositionalLight)
     return _point_aims(scene, light, clouds, middle, np.asarray(light.position) - center)
 
 
-def _point_aims(scene: Scene, light: PointLight, clouds: list[Array], middle: Array, at: Array) -> list[PhotonAim]:
+def _point_aims(scene: Scene, light: PositionalLight, clouds: list[Array], middle: Array, at: Array) -> list[PhotonAim]:
     inside = tuple(
         i
         for i, item in enumerate(scene.objects)
@@ -106,13 +110,14 @@ def _point_aims(scene: Scene, light: PointLight, clouds: list[Array], middle: Ar
     seen = None if inside or away == 0.0 else _seen(clouds, middle, at, away)
     if seen is None:
         flux, none = 4.0 * np.pi * intensity, np.zeros(3)
-        return [PhotonAim(position, middle, none, none, flux, float(flux.mean()), inside)]
+        weight = float(flux.mean()) * light.mean_share
+        return [PhotonAim(position, middle, none, none, flux, weight, light.cone, inside)]
     aims, across = [], _across((middle - at) / away)
     for low, high in _apart(seen):
         aimed, right, up, area = _rectangle(low, high, middle, across)
         flux = intensity * area
         weight = float(flux.mean()) * away / float(np.linalg.norm(aimed - at)) ** 3
-        aims.append(PhotonAim(position, aimed, right, up, flux, weight, inside))
+        aims.append(PhotonAim(position, aimed, right, up, flux, weight, light.cone, inside))
     return aims
 
 

@@ -128,12 +128,15 @@ class SampleView:
         Of the sample points from the pixel centers, right and down, in pixels.
     depth_range : (float, float), optional
         Write depth between these metres; else all depths are alike, so that nothing is clipped but what is behind.
+    corner : (int, int)
+        Left and bottom of the picture in its target, in pixels.
     """
 
     camera: Camera
     size: tuple[int, int]
     shift: tuple[float, float] = (0.0, 0.0)
     depth_range: tuple[float, float] | None = None
+    corner: tuple[int, int] = (0, 0)
 
 
 def depth_range(objects: Sequence[Object], camera: Camera, diagonal: float) -> tuple[float, float]:

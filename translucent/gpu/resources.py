@@ -9,6 +9,7 @@ from translucent.gpu.densities import GridTexture
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.environment_maps import EnvironmentMaps
 from translucent.gpu.hierarchies import HierarchyCache
+from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.storage import Storage
 from translucent.gpu.textures import TextureCache
 
@@ -23,6 +24,7 @@ class Resources:
         self.textures = TextureCache(gl)
         self.hierarchies = HierarchyCache(gl)
         self.diffusion = DiffusionCache(gl)
+        self.shadows = ShadowAtlas(gl)
         #: Views from lights, which are the same for frames of all sizes.
         self.light_lists = Storage(gl, "light that media scatter")
 
@@ -35,6 +37,7 @@ class Resources:
             self.textures,
             self.hierarchies,
             self.diffusion,
+            self.shadows,
             self.light_lists,
         )
         for cache in caches:

@@ -45,6 +45,13 @@ class Targets:
         """RGBA32F irradiance of photons on the nearest opaque surface."""
         return self._get("photons", (4,))
 
+    def opaque_ends(self) -> moderngl.Framebuffer:
+        """Framebuffer `opaque` without radiance."""
+        if ("opaque", 0) not in self._views:
+            both = self.opaque()
+            self._views["opaque", 0] = self._gl.framebuffer(both.color_attachments[:1], both.depth_attachment)
+        return self._views["opaque", 0]
+
     def entered(self) -> moderngl.Framebuffer:
         """RGBA32F interface where a ray first enters a body: normal, axial depth, finish, color; with depth buffer."""
         return self._get("entered", (4, 4, 4), with_depth=True)

@@ -9,7 +9,7 @@ import moderngl
 from translucent.gpu.body_uniforms import BodyRole, body_uniforms
 from translucent.gpu.layout import BODY, VIEW, UniformBlock
 from translucent.gpu.placement import PlacedScene, SampleView
-from translucent.gpu.uniforms import view_uniforms
+from translucent.gpu.uniforms import media_center, view_uniforms
 
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.
 _ALIGNMENT = 256
@@ -46,9 +46,9 @@ class UniformBuffers:
 
     def place(self, view: SampleView) -> None:
         """Write and bind the uniforms for some sample points."""
-        placed = self._placed
+        placed, center = self._placed, media_center(self._placed.scene)
         for i, (placement, role) in enumerate(zip(placed.placements, self._roles, strict=True)):
-            record = body_uniforms(placement, view, role, placed.media, placed.scene.diagonal)
+            record = body_uniforms(placement, view, role, placed.media, placed.scene.diagonal, center)
             self._bodies.write(record, offset=i * _STRIDE)
         self._view.write(view_uniforms(view, placed))
         self.bind()

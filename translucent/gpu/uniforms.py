@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.formulas.lights import ALL_AROUND
 from translucent.formulas.two_stream import two_stream_absorption, two_stream_scattering
 from translucent.gpu.balance import Balance
 from translucent.gpu.body_uniforms import MAX_SCENE_OPTICAL_DEPTH, bounded_extinction
@@ -34,8 +35,8 @@ from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.environment import Environment
-from translucent.scene.lights import PointLight
-from translucent.scene.scene import Object, Scene
+from translucent.scene.lights import PositionalLight
+from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.surface import Surface
 
 
@@ -48,7 +49,8 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
     if opaque is not None:
         reach = ((opaque.near - media.near) / media.length, media.length / opaque.length)
     return VIEW.pack(
-        frame_size=[*view.size, *view.shift],
+        # Shaders count from the corner of their target.
+        frame_size=[*view.size, view.shift[0] - view.corner[0], view.shift[1] + view.corner[1]],
         ray_right=[*(camera.right * half_width * perspective), 0.0],
         ray_up=[*(camera.up * half_height * perspective), 0.0],
         ray_forward=[*camera.forward, 0.0],
@@ -114,13 +116,10 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
     """
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
     half_width, half_height = camera.half_extent(size)
-    position, power, spans = (np.zeros((MAX_SCATTER_LIGHTS, 4)) for _ in range(3))
     seen = scene.lights[: len(lights.spans)]
-    for i, light in enumerate(seen):
-        if isinstance(light, PointLight):
-            position[i], power[i, :3] = [*(np.asarray(light.position) - lights.center), 1.0], light.intensity
-        else:
-            position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
+    position, power, cone = light_records(seen, lights.center, MAX_SCATTER_LIGHTS)
+    spans = np.zeros((MAX_SCATTER_LIGHTS, 4))
+    for i in range(len(seen)):
         power[i, 3] = lights.inside[i]
         spans[i] = lights.spans[i]
     rows = np.zeros((4 * MAX_LIGHT_VIEWS, 4))
@@ -138,6 +137,7 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
         scatter_near=[media.near, media.near - float(center @ camera.forward), float(camera.fov_y is not None), 0.0],
         scatter_light_position=position,
         scatter_light_power=power,
+        scatter_light_cone=cone,
         scatter_light_views=spans,
         scatter_views=rows,
         gauss=gauss,
@@ -162,13 +162,21 @@ def light_uniforms(scene: Scene, shine: bool) -> bytes:
     lights = scene.lights if shine else ()
     if len(lights) > MAX_LIGHTS:
         raise InputError("lighting opaque objects", f"{len(lights)} lights", f"use at most {MAX_LIGHTS}")
-    position, power = np.zeros((MAX_LIGHTS, 4)), np.zeros((MAX_LIGHTS, 4))
+    position, power, cone = light_records(lights, scene.camera.eye, MAX_LIGHTS)
+    return LIGHTS.pack(light_position=position, light_power=power, light_cone=cone, light_count=len(lights))
+
+
+def light_records(lights: Sequence[Light], origin: Array, most: int) -> tuple[Array, Array, Array]:
+    """(most, 4) each: positions from an origin, w = 1, or directions to the light, w = 0; powers; and cones."""
+    position, power = np.zeros((2, most, 4))
+    cone = np.tile(ALL_AROUND, (most, 1))
     for i, light in enumerate(lights):
-        if isinstance(light, PointLight):
-            position[i], power[i, :3] = [*(np.asarray(light.position) - scene.camera.eye), 1.0], light.intensity
+        if isinstance(light, PositionalLight):
+            position[i], power[i, :3] = [*(np.asarray(light.position) - origin), 1.0], light.intensity
+            cone[i] = light.cone
         else:
             position[i], power[i, :3] = [*-np.asarray(light.direction), 0.0], light.irradiance
-    return LIGHTS.pack(light_position=position, light_power=power, light_count=len(lights))
+    return position, power, cone
 
 
 def shade_uniforms(scene: Scene, balance: Balance) -> bytes:

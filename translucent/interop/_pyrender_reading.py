@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -13,13 +12,13 @@ import numpy.typing as npt
 import pyrender
 
 from translucent.arrays import Array
-from translucent.errors import InputError, TranslucentWarning
+from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh, mended
 from translucent.interop._pyrender_pictures import GAMMA
 from translucent.media.medium import Medium
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PointLight, SpotLight
 from translucent.scene.scene import Light, Object, Overlap, Scene
 
 #: A camera whose optical center is off the middle by less than this, in pixels, looks through it.
@@ -129,24 +128,22 @@ def camera_of(scene: Any, size: tuple[int, int]) -> Camera:
 
 def _lights(scene: Any) -> list[Light]:
     found: list[Light] = []
-    spots = 0
     for node in sorted(scene.light_nodes, key=lambda node: (node.name or "", node.matrix.ravel().tolist())):
         light, pose = node.light, scene.get_pose(node)
-        if isinstance(light, pyrender.SpotLight):
-            spots += 1
-        elif np.linalg.matrix_rank(pose[:3, :3]) < 3:
+        if np.linalg.matrix_rank(pose[:3, :3]) < 3:
             raise InputError(
                 f"light {light.name or node.name or 'without a name'!r} of the pyrender scene",
                 "the transform of its node is singular (a scale of 0, in it or above it)",
                 "give every axis a scale other than 0",
             )
-        elif isinstance(light, pyrender.PointLight):
-            found.append(PointLight(pose[:3, 3], light.intensity * np.asarray(light.color, dtype=np.float64)))
+        power = light.intensity * np.asarray(light.color, dtype=np.float64)
+        if isinstance(light, pyrender.PointLight):
+            found.append(PointLight(pose[:3, 3], power))
+        elif isinstance(light, pyrender.SpotLight):
+            outer = min(math.degrees(light.outerConeAngle), 90.0)
+            # Equal cones are an edge, there.
+            inner = min(math.degrees(light.innerConeAngle), math.nextafter(outer, 0.0))
+            found.append(SpotLight(pose[:3, 3], -pose[:3, 2], power, inner, outer))
         else:
-            found.append(DirectionalLight(-pose[:3, 2], light.intensity * np.asarray(light.color, dtype=np.float64)))
-    if spots:
-        text = (
-            f"pyrender scene: left out: {spots} spot light{'s' if spots > 1 else ''}, which light only what is opaque"
-        )
-        warnings.warn(text, TranslucentWarning, stacklevel=4)
+            found.append(DirectionalLight(-pose[:3, 2], power))
     return found

@@ -12,8 +12,8 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.gpu.placement import depth_range
 from translucent.scene.camera import Camera
-from translucent.scene.lights import PointLight
-from translucent.scene.scene import Object, Scene
+from translucent.scene.lights import DirectionalLight, SpotLight
+from translucent.scene.scene import Light, Object, Scene
 
 
 def written(scene: Scene, near: float | None = None) -> Any:
@@ -53,15 +53,24 @@ def _add_lights(part: Any, scene: Scene) -> None:
             )
     for light in scene.lights:
         pose = np.eye(4)
-        if isinstance(light, PointLight):
-            pose[:3, 3] = np.asarray(light.position) - scene.camera.eye
-            _add(part, pyrender.PointLight(color=np.asarray(light.intensity), intensity=1.0), pose)
-        else:
+        if isinstance(light, SpotLight | DirectionalLight):
             backward = -np.asarray(light.direction)
             right = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
             right /= np.linalg.norm(right)
             pose = _turned(np.column_stack([right, np.cross(backward, right), backward]))
-            _add(part, pyrender.DirectionalLight(color=np.asarray(light.irradiance), intensity=1.0), pose)
+        if not isinstance(light, DirectionalLight):
+            pose[:3, 3] = np.asarray(light.position) - scene.camera.eye
+        _add(part, _light(light), pose)
+
+
+def _light(light: Light) -> Any:
+    if isinstance(light, DirectionalLight):
+        return pyrender.DirectionalLight(color=np.asarray(light.irradiance), intensity=1.0)
+    color = np.asarray(light.intensity)
+    if isinstance(light, SpotLight):
+        cones = np.radians((light.inner_cone, light.outer_cone))
+        return pyrender.SpotLight(color, intensity=1.0, innerConeAngle=cones[0], outerConeAngle=cones[1])
+    return pyrender.PointLight(color=color, intensity=1.0)
 
 
 def _camera(scene: Scene, near: float | None) -> Any:

@@ -8,8 +8,8 @@ pyrender's pictures have 8 bits, which hold radiance to the power of 1 / 2.2, cu
 most 1.1 / 255 of white, and by less where it is darker: 0.5 / 255 * 2.2 * L^(6/11) at a radiance L. Edges are the mean
 of four samples of these encoded values, as pyrender makes them.
 
-Units are the same: a `PointLight` of pyrender has W/sr, a `DirectionalLight` W/m^2 on a surface that faces it, each its
-intensity times its color, and `ambient_light` is the radiance of a constant environment.
+Units are the same: a `PointLight` and a `SpotLight` of pyrender have W/sr, a `DirectionalLight` W/m^2 on a surface that
+faces it, each its intensity times its color, and `ambient_light` is the radiance of a constant environment.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def scene_from_pyrender(
     -------
     Scene
         Meshes are welded and wound as by `load_mesh`. The environment is the background color of the pyrender scene.
-        Spot lights are left out, with a `TranslucentWarning`. The camera's clipping planes do not clip media.
+        The camera's clipping planes do not clip media.
 
     Raises
     ------

@@ -42,8 +42,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces
         text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
     effects += layer_effects(scene, interfaces=surfaces)
-    if scene.opaque:
-        effects.append(Note(NoteKind.SHADOWS, "shadows: light reaches opaque objects through everything"))
+    effects += _shadow_effects(scene)
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
         text = f'priorities: overlap="{scene.overlap}" does not use them'
         effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
@@ -72,6 +71,21 @@ def with_given_back_told(plan: RenderPlan, scene: Scene, back: GivenBack) -> Ren
         for why, items in reasons.items()
     )
     return replace(plan, given_back=back, unmodelled=(*plan.unmodelled, *notes))
+
+
+def _shadow_effects(scene: Scene) -> list[Note]:
+    """Notes on shadows on opaque objects that are not rendered."""
+    if not scene.opaque:
+        return []
+    notes = []
+    if not scene.environment_shadows and scene.environment.mean.any():
+        text = "shadows of the environment: its light reaches opaque objects through everything"
+        notes.append(Note(NoteKind.SHADOWS, text))
+    layers = [body for body in scene.bodies if body.covers]
+    if layers and (scene.lights or scene.environment_shadows):
+        text = f"shadows of layers: light reaches opaque objects through {object_names(layers)}"
+        notes.append(Note(NoteKind.SHADOWS, text))
+    return notes
 
 
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:

@@ -12,7 +12,7 @@ from translucent.planning.methods import Method, RayMarched
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.render_plan import Capabilities
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Scene, object_names
 
 #: Largest number of lights that are followed into media.
@@ -88,9 +88,11 @@ def scattered_again_method(scene: Scene) -> RayMarched:
     """Ray marching through fog of one density.
 
     A few Gauss-Legendre points, which are more accurate than four times as many steps; near a lamp inside, where light
-    falls off as 1 / r^2 from a peak, steps of equal angles instead.
+    falls off as 1 / r^2 from a peak, or for a spot, which shines between two angles, steps of equal angles instead.
     """
-    lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PointLight)]
+    if any(isinstance(light, SpotLight) for light in scene.lights):
+        return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
+    lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]
     fogs = [body.bounds for body in scene.bodies if isinstance(body.medium, DiffusedVolume)]
     if any((low <= lamp).all() and (lamp <= high).all() for lamp in lamps for low, high in fogs):
         return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")

@@ -10,6 +10,7 @@ from typing import Literal
 class PassName(StrEnum):
     """Name of a pass in plans, in their JSON and in `Frame.seconds`."""
 
+    SHADOW_MAPS = "shadow_maps"
     OPAQUE = "opaque"
     BACKDROP = "backdrop"
     CAUSTICS = "caustics"

@@ -30,6 +30,7 @@ from translucent.planning.paths import check_paths, straight_scene, with_paths
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering, SingleScattering
 from translucent.planning.scattering.choice import check_scattering, given_back, shown
+from translucent.planning.shadow_maps import ShadowMaps, check_shadows, shadow_passes
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
@@ -42,6 +43,7 @@ def plan(
     interfaces: Interfaces | None = None,
     scattering: Scattering | None = None,
     caustics: Caustics | None = None,
+    shadows: ShadowMaps | None = None,
 ) -> RenderPlan:
     """Choose the passes for a scene.
 
@@ -58,24 +60,42 @@ def plan(
         How to show light that media scatter more than once; None lets the planner pick.
     caustics : Caustics, optional
         Photons from the lights through interfaces onto opaque objects; None for none.
+    shadows : ShadowMaps, optional
+        How to find shadows on opaque objects; a renderer without OpenGL traces them. Default: `ShadowMaps()`.
 
     Raises
     ------
     InputError
-        If no available method can render the scene, or not with interfaces, scattering or caustics as asked for.
+        If no available method can render the scene, or not with interfaces, scattering, caustics or shadows as asked
+        for.
     """
+    check_caustics(caustics)
+    check_shadows(shadows)
+    chosen = _plan(scene, method, capabilities, interfaces, scattering)
+    if caustics is not None:
+        chosen = with_caustics(chosen, scene, caustics, method, capabilities or Capabilities())
+    if chosen.traced:
+        return chosen
+    passes = (*shadow_passes(scene), *chosen.passes)
+    return dataclasses.replace(chosen, passes=passes, shadows=shadows or ShadowMaps())
+
+
+def _plan(
+    scene: Scene,
+    method: Method | None,
+    capabilities: Capabilities | None,
+    interfaces: Interfaces | None = None,
+    scattering: Scattering | None = None,
+) -> RenderPlan:
+    """The plan but for shadows."""
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     check_interfaces(interfaces)
     check_scattering(scattering)
-    check_caustics(caustics)
     capabilities = capabilities or Capabilities()
-    if caustics is not None:
-        without = plan(scene, method, capabilities, interfaces=interfaces, scattering=scattering)
-        return with_caustics(without, scene, caustics, method, capabilities)
     if isinstance(method, PathTraced):
         check_paths(scene, method, capabilities, interfaces, scattering)
-        return with_paths(scene, method, plan(straight_scene(scene), None, capabilities))
+        return with_paths(scene, method, _plan(straight_scene(scene), None, capabilities))
     opengl = capabilities.opengl
     # Where nothing bends, a method that is asked for is the sum that is asked for, of light scattered once; and ambient
     # light stands for what is scattered often.
@@ -83,12 +103,12 @@ def plan(
     volumes = opengl and capabilities.shader_storage and (method is None or method.marches)
     if back := given_back(scene, scattering, layers=opengl, matched=matched, volumes=volumes):
         once = SingleScattering()
-        found = plan(shown(scene, back), method, capabilities, interfaces=interfaces, scattering=once)
+        found = _plan(shown(scene, back), method, capabilities, interfaces, once)
         return with_given_back_told(found, scene, back)
     if scene.scatters_ambient:
         emitted = scene.with_ambient_emitted
         shown_once = scattering or SingleScattering()
-        return with_ambient_told(plan(emitted, method, capabilities, interfaces=interfaces, scattering=shown_once))
+        return with_ambient_told(_plan(emitted, method, capabilities, interfaces, shown_once))
     if not scene.bodies:
         raise InputError(
             f"rendering {object_names(scene.objects)}",
@@ -161,6 +181,7 @@ def plan_over_backdrop(
     *,
     interfaces: Interfaces | None = None,
     scattering: Scattering | None = None,
+    shadows: ShadowMaps | None = None,
 ) -> RenderPlan:
     """Plan for a scene before a `Backdrop`, which another renderer has drawn.
 
@@ -182,7 +203,9 @@ def plan_over_backdrop(
     if interfaces is not None and interfaces.traced:
         found = "what is drawn elsewhere has no mesh that a ray could meet"
         raise InputError(f"{interfaces} before a backdrop", found, "use ScreenInterfaces()")
-    chosen = plan(scene, method, capabilities, interfaces=interfaces or ScreenInterfaces(), scattering=scattering)
+    chosen = plan(
+        scene, method, capabilities, interfaces=interfaces or ScreenInterfaces(), scattering=scattering, shadows=shadows
+    )
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
     return dataclasses.replace(
         chosen,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces
@@ -10,6 +10,7 @@ from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.scattering.choice import NOTHING_GIVEN_BACK, GivenBack
+from translucent.planning.shadow_maps import ShadowMaps
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,8 @@ class RenderPlan:
     opaque_to_shadows : frozenset of int
         Numbers of the objects through which no straight light of lamps falls onto others, since photons carry what
         their interfaces bend.
+    shadows : ShadowMaps
+        How shadows on opaque objects are found, if the plan has the pass.
     """
 
     method: Method
@@ -75,6 +78,7 @@ class RenderPlan:
     paths: PathTraced | None = None
     caustics: Caustics | None = None
     opaque_to_shadows: frozenset[int] = frozenset()
+    shadows: ShadowMaps = field(default_factory=ShadowMaps)
 
     @property
     def runs(self) -> str:

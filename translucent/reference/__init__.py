@@ -10,6 +10,7 @@ from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refraction import refracted_light
 from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
+from translucent.reference.surface_light import light_transmittance
 
 __all__ = [
     "SHEET_ON_OPAQUE",
@@ -19,6 +20,7 @@ __all__ = [
     "Rays",
     "camera_hits",
     "hit_counts",
+    "light_transmittance",
     "line_hits",
     "march",
     "opaque_counts",

@@ -21,7 +21,6 @@ from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Inside, Interfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge
 from translucent.reference.legs import Legs, joined
-from translucent.reference.light_paths import LightPaths
 from translucent.reference.meetings import Meetings
 from translucent.reference.opaque import OpaqueHits, nearest_opaque
 from translucent.reference.phase import scattered_directions
@@ -30,6 +29,7 @@ from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
 from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
 from translucent.reference.straight_light import StraightLight
+from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, _weights, points_on, volume_segments
 
 #: Share of light below which paths end by Russian roulette, or go on with this share.
@@ -71,7 +71,7 @@ class InterfacePaths:
 
     Parameters
     ----------
-    light : LightPaths
+    surface : SurfaceLight
     ends : RayEnds
     own : Optics
         For one of the channels.
@@ -83,14 +83,16 @@ class InterfacePaths:
 
     def __init__(
         self,
-        light: LightPaths,
+        surface: SurfaceLight,
         ends: RayEnds,
         own: Optics,
         channels: Integers,
         max_events: int | None,
         rng: np.random.Generator,
     ) -> None:
+        light = surface.paths
         self.light, self.scene, self.ends, self.own, self.rng = light, light.scene, ends, own, rng
+        self.surface = surface
         self.channels, self.max_events = channels, max_events
         self.scattering = light.volume.scattering[:, channels[0]]
         self.absorbing = Volume(light.scene)
@@ -182,7 +184,7 @@ class InterfacePaths:
         # A sheet that lies on an interface is met on one side of it only.
         at_interface = flight.interfaces.distance <= end
         until = np.where(at_interface, end - SHEET_ON_OPAQUE * self.scene.diagonal, end)
-        crossings = scene_crossings(self.scene, rays, flight.hits, sheets, until)
+        crossings = scene_crossings(self.scene, rays, flight.hits, sheets, until, self.surface.on_interfaces)
         return volume_segments(self.scene, self.absorbing, rays, merge(parts), crossings)
 
     def _collisions(self, rays: Rays, segments: Segments, filling: Array) -> tuple[Array, Array]:
@@ -241,7 +243,7 @@ class InterfacePaths:
         legs = self._moved(legs.where(met), interfaces.distance, interfaces.here, self.own.tolerance)
         if not len(legs):
             return legs
-        outcome = Meetings(self.own, legs, interfaces, self.rng, self.straight).outcome()
+        outcome = Meetings(self.own, legs, interfaces, self.surface.on_interfaces, self.rng, self.straight).outcome()
         self._add(legs, outcome.radiance)
         legs = self._one_branch(joined(outcome.branches))
         self.interfaces_met[legs.owner] += 1

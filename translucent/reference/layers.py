@@ -10,9 +10,9 @@ import numpy as np
 
 from translucent.arrays import Array
 from translucent.reference.hits import Hits, world_normals
-from translucent.reference.opaque import irradiance_at
+from translucent.reference.opaque import Irradiance
 from translucent.reference.rays import Rays
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Object
 from translucent.scene.surface import LEAST_COVER
 from translucent.scene.texture import Texture
 
@@ -37,7 +37,7 @@ def layer_depth(body: Object, hits: Hits) -> Array:
     return np.asarray(-np.log(np.maximum(1.0 - body.surface.opacity * _painted(body, hits)[:, 3], _LEAST_LEFT)))
 
 
-def layer_radiance(scene: Scene, body: Object, hits: Hits, rays: Rays) -> Array:
+def layer_radiance(body: Object, hits: Hits, rays: Rays, irradiance: Irradiance) -> Array:
     """(k, 3): radiance of a layer at its hits: diffuse, as opaque objects are here, plus emission."""
     if body.surface is None or not body.covers:
         return np.zeros((len(hits.pixel), 3))
@@ -47,7 +47,7 @@ def layer_radiance(scene: Scene, body: Object, hits: Hits, rays: Rays) -> Array:
     points = rays.origins[hits.pixel] + hits.distance[:, None] * directions
     glow = np.asarray(body.surface.emissive) * _sampled(body, hits, body.surface.emissive_texture)[:, :3]
     with np.errstate(under="ignore"):
-        lit = irradiance_at(scene, points, normals) / np.pi
+        lit = irradiance(points, normals) / np.pi
         return np.asarray(body.base_color * _painted(body, hits)[:, :3] * lit + glow)
 
 

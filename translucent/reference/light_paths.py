@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from translucent.reference.rays import Rays
 from translucent.reference.sheets import scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
-from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PointLight
+from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene
 
 #: Distance, as a share of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it lies
@@ -58,8 +59,13 @@ class LightPaths:
 
     def __init__(self, scene: Scene, sheets: tuple[float | None, ...]) -> None:
         self.scene, self.sheets = scene, sheets
-        self.tracer, self.volume = Tracer(scene), Volume(scene)
+        self.volume = Volume(scene)
         self.lights = tuple(_from_eye(light, scene.camera.eye) for light in scene.lights)
+
+    @cached_property
+    def tracer(self) -> Tracer:
+        """Ray caster for the objects."""
+        return Tracer(self.scene)
 
     def arrival(self, light: Light, points: Array) -> Arrival:
         """Light of one of `lights` that arrives at points (k, 3), unscattered."""
@@ -67,7 +73,7 @@ class LightPaths:
         return Arrival(*(np.concatenate([getattr(part, name) for part in parts]) for name in Arrival.__match_args__))
 
     def _arrival(self, light: Light, points: Array) -> Arrival:
-        travel, distance = _way(light, points)
+        travel, distance = way_of(light, points)
         transmittance, sound = self.transmittance(points, travel, distance)
         irradiance = light.irradiance_on(points, -travel)
         # So bright is only the light itself, and no sum over it converges.
@@ -97,7 +103,8 @@ class LightPaths:
         rays = Rays(points - length[:, None] * travel, travel, np.zeros((len(points), 2)))
         hits = [self._hits(index, rays, length) for index in range(len(self.scene.objects))]
         intervals, sound = self._intervals(hits, length)
-        crossings = scene_crossings(self.scene, rays, hits, self.sheets, length)
+        # Layers throw no shadows.
+        crossings = scene_crossings(self.scene, rays, hits, self.sheets, length, None)
         segments, _ = volume_segments(self.scene, self.volume, rays, intervals, crossings)
         with np.errstate(over="ignore", under="ignore"):
             depths = segments.extinction * segments.length[:, None]
@@ -140,10 +147,10 @@ class LightPaths:
 
 def _from_eye(light: Light, eye: Array) -> Light:
     """The light with its position, where it has one, relative to the eye."""
-    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light
 
 
-def _way(light: Light, points: Array) -> tuple[Array, Array]:
+def way_of(light: Light, points: Array) -> tuple[Array, Array]:
     """Unit vectors (k, 3) in which light travels to points (k, 3), and how far (k,)."""
     if isinstance(light, DirectionalLight):
         return np.broadcast_to(np.asarray(light.direction), points.shape), np.full(len(points), np.inf)

@@ -26,9 +26,10 @@ from translucent.reference.quadrature import Steps, even_steps, gauss_steps, has
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.render import CrossedMedia, crossed_media, scene_hits, seen_behind
 from translucent.reference.scattering import light_source, light_variable
+from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import points_on
 from translucent.scene.camera import check_size
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Scene
 
 Compositing = Literal["front-to-back", "back-to-front"]
@@ -88,7 +89,7 @@ def march(
         raise InputError("ray marching", "the scene has sheets, which have no inside", "use tl.reference.render")
     paths = LightPaths(scene, (None,) * len(scene.objects))
     rays = pixel_rays(scene.camera, (width, height))
-    media = crossed_media(scene, paths.volume, rays, scene_hits(scene, (width, height)), paths.sheets)
+    media = crossed_media(SurfaceLight(paths), rays, scene_hits(scene, (width, height)), paths.sheets)
     work = _March(scheme, paths, rays, media, width)
     arrays = work.arrays()
     return Frame(
@@ -168,7 +169,7 @@ class _March:
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Flat arrays of a frame by their names."""
         first, *others = (self._composited(terms) for terms in self._all_terms())
-        behind = seen_behind(self.paths.scene, self.rays, self.media.wall)
+        behind = seen_behind(SurfaceLight(self.paths), self.rays, self.media.wall)
         with np.errstate(under="ignore"):
             left = np.where(self._stopped(first)[:, None], 0.0, first.transmittance)
             radiance = first.color + sum((layer.color for layer in others), left * behind)
@@ -190,8 +191,8 @@ class _March:
         lights = self.paths.lights if self.paths.volume.scatters else ()
         if self.scheme.method.quadrature != "equiangular":
             return [_Terms(True, lights)]
-        point = tuple(light for light in lights if isinstance(light, PointLight))
-        other = tuple(light for light in lights if not isinstance(light, PointLight))
+        point = tuple(light for light in lights if isinstance(light, PositionalLight))
+        other = tuple(light for light in lights if not isinstance(light, PositionalLight))
         return [_Terms(True, other), *(_Terms(False, (light,), light) for light in point)]
 
     def _composited(self, terms: _Terms) -> Layer:

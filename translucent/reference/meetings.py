@@ -19,9 +19,9 @@ from translucent.formulas.interface import (
 from translucent.reference.interfaces import Inside, Interfaces, Optics, interface_normals
 from translucent.reference.legs import Legs
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
-from translucent.reference.opaque import irradiance_at, seen_from
+from translucent.reference.opaque import Irradiance, seen_from
 from translucent.reference.straight_light import StraightLight
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 
 #: Number of passages through a rough sheet after which light counts as lost.
 MOST_PASSAGES = 64
@@ -52,11 +52,13 @@ class Meetings:
     legs : Legs
         With their origins moved to the interfaces.
     interfaces : Interfaces
+    irradiance : callable
+        On paint: `SurfaceLight.on_interfaces`.
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     lamps : StraightLight, optional
-        To add the light of point and directional lights that rough interfaces of solids turn into the legs, on either
-        side, attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
+        To add the light of `Scene.lights` that rough interfaces of solids turn into the legs, on either side,
+        attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
     """
 
     def __init__(
@@ -64,10 +66,12 @@ class Meetings:
         own: Optics,
         legs: Legs,
         interfaces: Interfaces,
+        irradiance: Irradiance,
         rng: np.random.Generator | None,
         lamps: StraightLight | None = None,
     ) -> None:
-        self.own, self.legs, self.interfaces, self.rng, self.lamps = own, legs, interfaces, rng, lamps
+        self.own, self.legs, self.interfaces, self.irradiance = own, legs, interfaces, irradiance
+        self.rng, self.lamps = rng, lamps
         self.normals, self.faces = interface_normals(own, interfaces, legs.rays.directions)
         self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
         self.is_sheet = interfaces.before == interfaces.after
@@ -227,18 +231,18 @@ class Meetings:
             return
         points, normals = self.legs.rays.origins[chosen], self.normals[chosen]
         through = self._table("diffuse_transmission")[chosen, None]
-        front, back = (irradiance_at(self.own.scene, points, side * normals) for side in (1.0, -1.0))
+        front, back = (self.irradiance(points, side * normals) for side in (1.0, -1.0))
         behind = through * self._table("diffuse_transmission_color")[chosen] * back
         with np.errstate(under="ignore"):
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Add highlights of point and directional lights in rough interfaces, by single reflection without shadows."""
+        """Add highlights of `Scene.lights` in rough interfaces, by single reflection without shadows."""
         scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
         to_eye = -self.legs.rays.directions[rough]
         for light in scene.lights if rough.size else ():
             light = seen_from(light, scene.camera.eye)
-            if isinstance(light, PointLight):
+            if isinstance(light, PositionalLight):
                 to_light = np.asarray(light.position) - points
                 to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), np.finfo(np.float64).tiny)
             else:

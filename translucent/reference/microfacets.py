@@ -58,7 +58,7 @@ def lit_at_interface(
     Parameters
     ----------
     to_lights : (lights, n, 3) float64
-        Unit vectors to point and directional lights, on either side.
+        Unit vectors to point, spot and directional lights, on either side.
     """
     axes = _axes(normals)
     found, seen = np.zeros_like(directions), np.zeros(to_lights.shape[:2])

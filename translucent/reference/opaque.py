@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +10,11 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.rays import Rays
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
+
+#: Irradiance (k, 3) on surfaces at points (k, 3), in metres from the eye, with unit normals (k, 3).
+Irradiance = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,21 +61,20 @@ def nearest_opaque(scene: Scene, hits: Sequence[Hits], pixels: int) -> OpaqueHit
     return nearest
 
 
-def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits) -> Array:
+def reflected_radiance(scene: Scene, rays: Rays, nearest: OpaqueHits, irradiance: Irradiance) -> Array:
     """Diffusely reflected radiance of opaque surfaces towards the origins, (n, 3); 0 on rays without one.
 
-    Lambert: color / pi times the irradiance on the side that is seen. Nothing shadows, and no medium attenuates the
-    light on its way to the surface.
+    Lambert: color / pi times the irradiance on the side that is seen, as `SurfaceLight.on_opaque` gives it.
     """
     radiance = np.zeros((len(rays), 3))
     for i, body in enumerate(scene.objects):
         seen = np.flatnonzero(nearest.item == i)
         if seen.size:
-            radiance[seen] = _lambert(scene, body, nearest.face[seen], nearest.distance[seen], rays.where(seen))
+            radiance[seen] = _lambert(body, nearest.face[seen], nearest.distance[seen], rays.where(seen), irradiance)
     return radiance
 
 
-def _lambert(scene: Scene, body: Object, face: Integers, distance: Array, rays: Rays) -> Array:
+def _lambert(body: Object, face: Integers, distance: Array, rays: Rays, irradiance: Irradiance) -> Array:
     """(k, 3): radiance that one object reflects along rays that meet it at `distance`."""
     normals = world_normals(body, face)
     away = np.einsum("ki,ki->k", normals, rays.directions) > 0
@@ -80,17 +82,9 @@ def _lambert(scene: Scene, body: Object, face: Integers, distance: Array, rays: 
     # From the eye, as the rays are, so that the way to a light keeps its digits far from the world's origin.
     points = rays.origins + distance[:, None] * rays.directions
     with np.errstate(under="ignore"):
-        return np.asarray(body.base_color / np.pi * irradiance_at(scene, points, normals))
-
-
-def irradiance_at(scene: Scene, points: Array, normals: Array) -> Array:
-    """Irradiance (k, 3) of environment and lights at points (k, 3), in metres from the eye; nothing shadows them."""
-    irradiance = scene.environment.irradiance_on(normals)
-    for light in scene.lights:
-        irradiance = irradiance + seen_from(light, scene.camera.eye).irradiance_on(points, normals)
-    return irradiance
+        return np.asarray(body.base_color / np.pi * irradiance(points, normals))
 
 
 def seen_from(light: Light, eye: Array) -> Light:
     """Light with its position, if it has one, relative to the eye."""
-    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PointLight) else light
+    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light

@@ -28,6 +28,7 @@ from translucent.reference.refraction import bends, check_untextured
 from translucent.reference.render import scene_hits, shade_hits
 from translucent.reference.sheets import sheet_thicknesses
 from translucent.reference.straight_paths import StraightPaths
+from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
 
@@ -96,7 +97,7 @@ def path_trace(
             "path tracing", f"media up to {depth:.0e} deep, in which light is lost for ages", "give max_events"
         )
     rays = pixel_rays(scene.camera, (width, height))
-    arrays = shade_hits(scene, rays, scene_hits(scene, (width, height)), light.sheets)
+    arrays = shade_hits(scene, rays, scene_hits(scene, (width, height)), light.sheets, SurfaceLight(light))
     rng = np.random.default_rng(seed)
     radiance, error = np.zeros((2, len(rays), 3))
     for tracer in _tracers(light, width / height, max_events, rng):
@@ -150,7 +151,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
     ]
     if not scene.lights or not polished:
         return ()
-    text = "light of point and directional lights that polished interfaces bend on its way: in media, and as caustics"
+    text = "light of lamps and directional lights that polished interfaces bend on its way: in media, and as caustics"
     return (Note(NoteKind.LIGHTS_LEFT_OUT, text),)
 
 
@@ -169,7 +170,8 @@ def _tracers(light: LightPaths, aspect: float, max_events: int | None, rng: np.r
         return
     optics = [Optics(scene, light.sheets, channel) for channel in range(3)]
     for channels in _alike(np.concatenate([volume.scattering, np.stack([own.iors for own in optics], axis=1)])):
-        bent = InterfacePaths(light, RayEnds(scene, aspect), optics[channels[0]], channels, max_events, rng)
+        surface = SurfaceLight(light)
+        bent = InterfacePaths(surface, RayEnds(surface, aspect), optics[channels[0]], channels, max_events, rng)
         yield channels, BENT_BATCH, bent.radiance
 
 

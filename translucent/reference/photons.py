@@ -23,9 +23,10 @@ from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
 from translucent.reference.refraction import check_untextured
 from translucent.reference.sheets import sheet_thicknesses
+from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.tracer import Tracer
 from translucent.scene.camera import check_size
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PositionalLight
 from translucent.scene.scene import Light, Scene
 
 #: Share of the way to a photon within which nothing hides it from the eye: it lies on a surface itself.
@@ -55,7 +56,7 @@ class LandedPhotons:
 
 
 def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> LandedPhotons:
-    """Follow photons from each point and directional light to the first opaque surface (Jensen 1996).
+    """Follow photons from each light to the first opaque surface (Jensen 1996).
 
     They aim at a ball around all bodies. Interfaces reflect or refract them by chance, media absorb on the way what
     they absorb, and end what they scatter. Those that come straight are left out, as they are no caustics.
@@ -83,11 +84,12 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
     rng = np.random.default_rng(seed)
     sheets = sheet_thicknesses(scene)
     # Nothing but the photons themselves carries light of lamps.
-    light = LightPaths(replace(scene, lights=()), sheets)
+    light = LightPaths(replace(scene, lights=(), environment_shadows=0), sheets)
+    surface = SurfaceLight(light)
     optics = [Optics(scene, sheets, channel) for channel in range(3)]
     parts = []
     for channels in _alike(np.concatenate([light.volume.scattering, np.stack([own.iors for own in optics], axis=1)])):
-        paths = PhotonPaths(light, RayEnds(scene, 1.0), optics[channels[0]], channels, 0, rng)
+        paths = PhotonPaths(surface, RayEnds(surface, 1.0), optics[channels[0]], channels, 0, rng)
         for lamp in scene.lights:
             for first in range(0, photons, BENT_BATCH):
                 some = np.arange(first, min(first + BENT_BATCH, photons))
@@ -158,7 +160,7 @@ def _emitted(scene: Scene, light: Light, some: Integers, photons: int, rng: np.r
         origins = middle + across - 2.0 * (tracer.radius + radius) * direction
         power = np.asarray(light.irradiance) * np.pi * radius**2 / photons
         return Rays(origins, np.tile(direction, (len(some), 1)), none), np.tile(power, (len(some), 1))
-    assert isinstance(light, PointLight)
+    assert isinstance(light, PositionalLight)
     at = np.asarray(light.position) - scene.camera.eye
     away = float(np.linalg.norm(middle - at))
     # All directions from among the bodies.
@@ -166,8 +168,8 @@ def _emitted(scene: Scene, light: Light, some: Integers, photons: int, rng: np.r
     axis = (middle - at) / away if away > radius else np.array([0.0, 0.0, 1.0])
     fall = spread * u
     directions = (1.0 - fall)[:, None] * axis + np.sqrt(fall * (2.0 - fall))[:, None] * turn @ _across(axis)
-    power = np.asarray(light.intensity) * 2.0 * np.pi * spread / photons
-    return Rays(np.tile(at, (len(some), 1)), directions, none), np.tile(power, (len(some), 1))
+    power = light.intensity_along(directions) * 2.0 * np.pi * spread / photons
+    return Rays(np.tile(at, (len(some), 1)), directions, none), power
 
 
 def _across(axis: Array) -> Array:

@@ -8,7 +8,7 @@ from translucent.arrays import Array, Mask
 from translucent.reference.legs import Legs
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
 from translucent.reference.rays import Rays
-from translucent.scene.scene import Scene
+from translucent.reference.surface_light import SurfaceLight
 
 #: Smallest cosine between a ray and the view with which it meets the backdrop.
 ACROSS = 1e-2
@@ -19,17 +19,18 @@ class RayEnds:
 
     Parameters
     ----------
-    scene : Scene
+    light : SurfaceLight
+        On the surfaces of the scene.
     aspect : float
         Width of the picture divided by its height.
     """
 
-    def __init__(self, scene: Scene, aspect: float) -> None:
-        self.scene, self.aspect = scene, aspect
+    def __init__(self, light: SurfaceLight, aspect: float) -> None:
+        self.light, self.scene, self.aspect = light, light.scene, aspect
 
     def radiance(self, legs: Legs, wall: OpaqueHits) -> Array:
         """(k, 3): of the opaque surfaces that stop ray segments, or where none does of the environment."""
-        seen = reflected_radiance(self.scene, legs.rays, wall)
+        seen = reflected_radiance(self.scene, legs.rays, wall, self.light.on_opaque)
         free = np.flatnonzero(np.isinf(wall.distance))
         seen[free] = self._environment(legs.where(free))
         return seen

@@ -24,16 +24,14 @@ from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Interfaces, Optics
 from translucent.reference.intervals import Intervals, body_intervals, merge, unbalanced
 from translucent.reference.legs import Legs, joined
-from translucent.reference.light_paths import LightPaths
 from translucent.reference.meetings import Meetings
 from translucent.reference.opaque import nearest_opaque
 from translucent.reference.ray_ends import RayEnds
 from translucent.reference.rays import Rays
 from translucent.reference.scattering import scattered_once
 from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
-from translucent.reference.tracer import Tracer
-from translucent.reference.volume import Volume, volume_segments
-from translucent.scene.scene import Scene
+from translucent.reference.surface_light import SurfaceLight
+from translucent.reference.volume import volume_segments
 
 #: Smallest share of each color that a ray must carry to be followed.
 FAINTEST = 1e-5
@@ -65,36 +63,34 @@ class RefractedRays:
 
     Parameters
     ----------
-    scene : Scene
-        No surface in it has textures.
-    sheets : sequence of float or None
-        As `sheet_thicknesses` gives them.
+    light : SurfaceLight
+        On the surfaces of a scene; none of them has textures.
     aspect : float
         Width of the picture divided by its height.
     bounces : int
         Interfaces that a ray may meet.
-    paths : LightPaths, optional
-        To add light that media scatter once, to `tolerance`. Lights reach into media straight on.
+    scatter : bool
+        Add light that media scatter once, to `tolerance`. Lights reach into media straight on.
     rng : Generator, optional
         Chooses between reflection and refraction. Without it both are followed, and all interfaces are polished.
     """
 
     def __init__(
         self,
-        scene: Scene,
-        sheets: Sequence[float | None],
+        light: SurfaceLight,
         aspect: float,
         bounces: int,
-        paths: LightPaths | None = None,
+        scatter: bool = False,
         tolerance: float = 1e-6,
         rng: np.random.Generator | None = None,
     ) -> None:
-        self.scene, self.sheets, self.bounces = scene, sheets, bounces
-        self.paths, self.tolerance, self.rng = paths, tolerance, rng
-        self.ends = RayEnds(scene, aspect)
-        self.tracer, self.volume = Tracer(scene), Volume(scene)
+        self.light, self.scene, self.sheets, self.bounces = light, light.scene, light.paths.sheets, bounces
+        self.scatter, self.tolerance, self.rng = scatter, tolerance, rng
+        self.ends = RayEnds(light, aspect)
+        self.tracer, self.volume = light.paths.tracer, light.paths.volume
+        scene = self.scene
         dispersed = any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
-        self.channels = [Optics(scene, sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
+        self.channels = [Optics(scene, self.sheets, channel) for channel in ((0, 1, 2) if dispersed else (None,))]
 
     def see(self, rays: Rays) -> RefractedLight:
         """Trace rays of the camera."""
@@ -124,7 +120,9 @@ class _Tree:
             legs, interfaces = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
             if not len(legs):
                 return
-            outcome = Meetings(self.own, legs, interfaces, self.refracted.rng).outcome()
+            outcome = Meetings(
+                self.own, legs, interfaces, self.refracted.light.on_interfaces, self.refracted.rng
+            ).outcome()
             self._add(legs, outcome.radiance)
             legs = joined(outcome.branches)
             lost = np.asarray((legs.throughput < FAINTEST).all(axis=1) | ~legs.rays.directions.any(axis=1))
@@ -168,12 +166,12 @@ class _Tree:
         sheets = [None if i in self.own.walls else metres for i, metres in enumerate(self.refracted.sheets)]
         # A sheet that lies on an interface is met on one side of it only.
         until = np.where(interface < wall, interface - SHEET_ON_OPAQUE * scene.diagonal, wall)
-        crossings = scene_crossings(scene, rays, hits, sheets, until)
+        crossings = scene_crossings(scene, rays, hits, sheets, until, self.refracted.light.on_interfaces)
         segments, filling = volume_segments(scene, volume, rays, merge(parts), crossings)
         segments = emission_of_mixtures(volume, rays, segments, filling)
         emitted, depth = composite(segments, len(legs))
-        if self.refracted.paths is not None:
-            light = scattered_once(self.refracted.paths, rays, segments, filling, self.refracted.tolerance)
+        if self.refracted.scatter:
+            light = scattered_once(self.refracted.light.paths, rays, segments, filling, self.refracted.tolerance)
             emitted = emitted + light.radiance
             self.found.valid[legs.owner[~light.valid]] = False
         self._add(legs, emitted)

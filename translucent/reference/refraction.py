@@ -11,7 +11,7 @@ from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refracted import RefractedLight, RefractedRays
 from translucent.reference.sheets import sheet_thicknesses
-from translucent.reference.volume import Volume
+from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.scene import Scene
 
 #: Default number of interfaces that a ray may meet.
@@ -69,10 +69,11 @@ def refracted_light(
     """
     _check(scene, bounces, paths)
     sheets, rays = sheet_thicknesses(scene, method), pixel_rays(scene.camera, size)
-    light_paths = LightPaths(scene, sheets) if scene.lights and Volume(scene).scatters else None
+    light = SurfaceLight(LightPaths(scene, sheets))
+    scatter = bool(scene.lights) and light.paths.volume.scatters
     rough = any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies)
     rng = np.random.default_rng(seed) if rough else None
-    refracted = RefractedRays(scene, sheets, size[0] / size[1], bounces, light_paths, tolerance, rng)
+    refracted = RefractedRays(light, size[0] / size[1], bounces, scatter, tolerance, rng)
     return _mean(refracted, rays, paths) if rough else (refracted.see(rays), np.zeros((len(rays), 3)))
 
 

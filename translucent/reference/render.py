@@ -30,6 +30,7 @@ from translucent.reference.refraction import BOUNCES, PATHS, bends, refracted_li
 from translucent.reference.scattering import scattered_once
 from translucent.reference.segments import Segments
 from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thicknesses
+from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
@@ -59,7 +60,8 @@ def render(
     Radiance holds what is behind, what media emit, what they scatter of `Scene.ambient`, and the light of all lights
     that solid media scatter once; not what they scatter out of the environment, what sheets scatter out of lights, or
     what is scattered twice (`path_trace` has it all).
-    Lights reach media through all bodies, and opaque objects throw shadows into them, not onto each other.
+    Lights reach media and opaque objects through all bodies, straight on, and opaque objects throw shadows: bodies
+    color them. So does the environment on opaque objects, in `Scene.environment_shadows` directions.
 
     Where light changes at the interfaces of bodies (`Object.has_interface`), radiance is that of rays that bend and
     split there; see `translucent.reference.refracted`. All else is that of the straight rays, also then. Lights reach
@@ -110,23 +112,24 @@ def render(
     crossed = time.perf_counter()
     rays, sheets = pixel_rays(scene.camera, size), sheet_thicknesses(scene, method)
     scatters = scene.lights and not bent and Volume(scene).scatters
-    light_paths = LightPaths(scene, sheets) if scatters else None
+    light_paths = LightPaths(scene, sheets)
+    light = SurfaceLight(light_paths)
     found = []
     for part in _parts(hits, len(rays)):
         own = rays.where(part), [_along(line, part) for line in hits]
-        shaded = shade_hits(scene, *own, sheets)
-        if light_paths is not None:
-            _add_scattered(shaded, scene, *own, light_paths, tolerance)
+        shaded = shade_hits(scene, *own, sheets, light)
+        if scatters:
+            _add_scattered(shaded, *own, light, tolerance)
         found.append(shaded)
     arrays = {name: np.concatenate([shaded[name] for shaded in found]) for name in found[0]}
     provenance = {"backend": "reference", "numpy": np.__version__}
-    if light_paths is not None:
+    if scatters:
         error = arrays.pop("error")[arrays["valid"]]
         provenance["scattering error"] = f"{error.max(initial=0.0):.1e}"
     if bent:
-        light, noise = refracted_light(scene, size, method, tolerance, bounces, paths, seed)
-        arrays["radiance"], arrays["valid"] = light.radiance, arrays["valid"] & light.valid
-        for name, array in (("residual", light.residual), ("standard error", noise)):
+        seen, noise = refracted_light(scene, size, method, tolerance, bounces, paths, seed)
+        arrays["radiance"], arrays["valid"] = seen.radiance, arrays["valid"] & seen.valid
+        for name, array in (("residual", seen.residual), ("standard error", noise)):
             provenance[name] = f"{array[arrays['valid']].max(initial=0.0):.1e}"
     end = time.perf_counter()
     return Frame(
@@ -146,7 +149,11 @@ def _with_own_interfaces(chosen: RenderPlan, bent: bool) -> RenderPlan:
 
 
 def shade_hits(
-    scene: Scene, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
+    scene: Scene,
+    rays: Rays,
+    hits: Sequence[Hits],
+    sheets: Sequence[float | None],
+    light: SurfaceLight | None = None,
 ) -> dict[str, npt.NDArray[Any]]:
     """Shade rays from all surfaces on them, however these were found.
 
@@ -160,6 +167,8 @@ def shade_hits(
         `Hits.pixel` is a number among `rays`.
     sheets : sequence of float or None
         Thickness in metres of the sheet that each object is, or None for a solid: see `sheet_thicknesses`.
+    light : SurfaceLight, optional
+        On surfaces of the scene. Default: one made for these rays.
 
     Returns
     -------
@@ -168,11 +177,12 @@ def shade_hits(
         before an opaque surface stops it. Invalid is one that ends inside a solid though nothing stops it, that a
         solid's faces wind around a negative number of times, or whose optical depth overflows.
     """
-    media = crossed_media(scene, Volume(scene), rays, hits, sheets)
+    light = light or SurfaceLight(LightPaths(scene, tuple(sheets)))
+    media = crossed_media(light, rays, hits, sheets)
     segments, defective = media.segments, media.defective
     emitted, depth = composite(segments, len(rays))
     transmittance = optics.transmittance(depth)
-    behind = seen_behind(scene, rays, media.wall)
+    behind = seen_behind(light, rays, media.wall)
     coverage = defective.copy()
     coverage[segments.pixel] = True
     with np.errstate(under="ignore"):
@@ -209,42 +219,42 @@ class CrossedMedia:
 
 
 def crossed_media(
-    scene: Scene, volume: Volume, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
+    light: SurfaceLight, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None]
 ) -> CrossedMedia:
-    """Media on rays, from all surfaces on them; parameters as for `shade_hits`, and the `Volume` of the scene."""
+    """Media on rays, from all surfaces on them; parameters as for `shade_hits`."""
+    scene, volume = light.scene, light.paths.volume
     wall = nearest_opaque(scene, hits, len(rays))
     solids = [i for i, body in enumerate(scene.objects) if body.medium is not None and sheets[i] is None]
     intervals, defective = scene_intervals(scene, hits, solids, wall.distance)
-    crossings = scene_crossings(scene, rays, hits, sheets, wall.distance)
+    crossings = scene_crossings(scene, rays, hits, sheets, wall.distance, light.on_interfaces)
     segments, filling = volume_segments(scene, volume, rays, intervals, crossings)
     segments = emission_of_mixtures(volume, rays, segments, filling)
     return CrossedMedia(wall, segments, filling, defective)
 
 
-def seen_behind(scene: Scene, rays: Rays, wall: OpaqueHits) -> npt.NDArray[np.float64]:
+def seen_behind(light: SurfaceLight, rays: Rays, wall: OpaqueHits) -> npt.NDArray[np.float64]:
     """(n, 3): radiance behind all media, of the environment or of the opaque surface."""
     return np.where(
         np.isinf(wall.distance)[:, None],
-        scene.environment.radiance(rays.directions, rays.backdrop),
-        reflected_radiance(scene, rays, wall),
+        light.scene.environment.radiance(rays.directions, rays.backdrop),
+        reflected_radiance(light.scene, rays, wall, light.on_opaque),
     )
 
 
 def _add_scattered(
     shaded: dict[str, npt.NDArray[Any]],
-    scene: Scene,
     rays: Rays,
     hits: Sequence[Hits],
-    paths: LightPaths,
+    light: SurfaceLight,
     tolerance: float,
 ) -> None:
     """Add light scattered once to what `shade_hits` gives, and its relative ``error`` (n,)."""
-    media = crossed_media(scene, paths.volume, rays, hits, paths.sheets)
-    light = scattered_once(paths, rays, media.segments, media.filling, tolerance)
-    brightest = light.radiance.max(axis=1)
-    shaded["radiance"] = shaded["radiance"] + light.radiance
-    shaded["valid"] = shaded["valid"] & light.valid
-    shaded["error"] = light.error.max(axis=1) / np.where(brightest > 0, brightest, 1.0)
+    media = crossed_media(light, rays, hits, light.paths.sheets)
+    found = scattered_once(light.paths, rays, media.segments, media.filling, tolerance)
+    brightest = found.radiance.max(axis=1)
+    shaded["radiance"] = shaded["radiance"] + found.radiance
+    shaded["valid"] = shaded["valid"] & found.valid
+    shaded["error"] = found.error.max(axis=1) / np.where(brightest > 0, brightest, 1.0)
 
 
 def hit_counts(scene: Scene, size: tuple[int, int]) -> npt.NDArray[np.int64]:

@@ -19,9 +19,9 @@ from translucent.reference.equiangular import equiangular
 from translucent.reference.light_paths import LightPaths
 from translucent.reference.rays import Rays
 from translucent.reference.segments import Segments
-from translucent.reference.shadow_edges import outline_edges, shadow_edges
+from translucent.reference.shadow_edges import cone_edges, outline_edges, shadow_edges
 from translucent.reference.volume import points_on
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light
 
 #: Largest number of cuts near the start of segments: a rule of 15 points then resolves the thin visible layer of a
@@ -160,7 +160,7 @@ def light_source(
     Parameters
     ----------
     paths : LightPaths
-    light : PointLight or DirectionalLight
+    light : PointLight, SpotLight or DirectionalLight
         One of `LightPaths.lights`.
     weights : (k, n) float64
         What fills the points, as `Volume.at` gives it.
@@ -183,7 +183,7 @@ def light_variable(
 
     For a point light equal steps of u are equal angles as seen from it, else equal lengths.
     """
-    if not isinstance(light, PointLight):
+    if not isinstance(light, PositionalLight):
         length = (end - start)[:, None]
         return start[:, None] + u * length, np.broadcast_to(length, u.shape)
     way, direction = np.asarray(light.position) - rays.origins[ray], rays.directions[ray]
@@ -203,11 +203,12 @@ def depths_before(segments: Segments, pixels: int) -> Array:
 
 
 def _spans(paths: LightPaths, number: int, rays: Rays, segments: Segments, chosen: Integers) -> _Spans:
-    """Spans of some segments, cut at shadow edges."""
+    """Spans of some segments, cut at the edges of shadows and cones."""
     seen = np.unique(segments.pixel[chosen])
     light = paths.lights[number]
     edges = np.concatenate([outline_edges(traced, light) for traced in paths.tracer.objects])
-    ray, t = shadow_edges(rays.where(seen), edges, light)
+    cuts = shadow_edges(rays.where(seen), edges, light), cone_edges(rays.where(seen), light)
+    ray, t = (np.concatenate(parts) for parts in zip(*cuts, strict=True))
     # In the order along each ray, a cut belongs to the segment that began last, if it has not ended.
     pixel = np.concatenate([segments.pixel[chosen], seen[ray]])
     t = np.concatenate([segments.t_enter[chosen], t])

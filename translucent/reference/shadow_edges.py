@@ -1,5 +1,7 @@
 """Shadow edges on view rays: kinks of the incoming light at the outlines of bodies as seen from the light.
 
+The light of a spot has kinks of its own, at its cones.
+
 There its path through a body begins to exist, or a shadow begins. Rules of quadrature take such a point for smooth
 unless an interval ends there, and miss what is between two of them.
 """
@@ -12,7 +14,7 @@ from translucent.arrays import Array, Integers
 from translucent.geometry.grouping import shared_edges
 from translucent.reference.rays import Rays
 from translucent.reference.tracer import TracedObject
-from translucent.scene.lights import DirectionalLight
+from translucent.scene.lights import DirectionalLight, SpotLight
 from translucent.scene.scene import Light
 
 #: Number of pairs of an edge and a ray that are tested together: the working arrays stay below 100 MB.
@@ -43,6 +45,30 @@ def shadow_edges(rays: Rays, edges: Array, light: Light) -> tuple[Integers, Arra
     for begin in range(0, len(rays), each):
         ray, t = _shadow_edges(rays.where(slice(begin, begin + each)), edges, light)
         found.append((ray + begin, t))
+    return np.concatenate([ray for ray, _ in found]), np.concatenate([t for _, t in found])
+
+
+@np.errstate(all="ignore")
+def cone_edges(rays: Rays, light: Light) -> tuple[Integers, Array]:
+    """Indices of rays (k,), and distances (k,) at which they cross the inner or the outer cone of a spot."""
+    if not isinstance(light, SpotLight):
+        return np.empty(0, np.int64), np.empty(0)
+    axis, from_light = np.asarray(light.direction), rays.origins - np.asarray(light.position)
+    along = [way @ axis for way in (from_light, rays.directions)]
+    across = [way - s[:, None] * axis for way, s in zip((from_light, rays.directions), along, strict=True)]
+    found = []
+    for angle in np.radians((light.inner_cone, light.outer_cone)):
+        # On the cone, or on its mirror image behind: (sin * along)^2 = (cos * across)^2. For an angle of 0, where the
+        # ray is nearest to the axis: smooth, but all light of narrow cones is about there.
+        a, b, c = (
+            (np.sin(angle) ** 2 * along[i] * along[j])
+            - np.cos(angle) ** 2 * np.einsum("ki,ki->k", across[i], across[j])
+            for i, j in ((1, 1), (0, 1), (0, 0))
+        )
+        root = np.sqrt(np.maximum(b * b - a * c, 0.0) if angle == 0.0 else b * b - a * c)
+        for t in ((-b - root) / a, (-b + root) / a):
+            front = np.flatnonzero(np.isfinite(t) & (along[0] + t * along[1] >= 0.0))
+            found.append((front, t[front]))
     return np.concatenate([ray for ray, _ in found]), np.concatenate([t for _, t in found])
 
 

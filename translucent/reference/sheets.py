@@ -13,6 +13,7 @@ from translucent.formulas import optics
 from translucent.planning.methods import Method
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.layers import layer_depth, layer_radiance, without_holes
+from translucent.reference.opaque import Irradiance
 from translucent.reference.rays import Rays
 from translucent.scene.scene import Object, Scene
 
@@ -67,7 +68,12 @@ def sheet_hits(scene: Scene, body: Object, hits: Hits, end: Array) -> Hits:
 
 
 def scene_crossings(
-    scene: Scene, rays: Rays, hits: Sequence[Hits], sheets: Sequence[float | None], end: Array
+    scene: Scene,
+    rays: Rays,
+    hits: Sequence[Hits],
+    sheets: Sequence[float | None],
+    end: Array,
+    irradiance: Irradiance | None,
 ) -> Crossings:
     """Crossings of rays with all sheets of a scene.
 
@@ -81,16 +87,18 @@ def scene_crossings(
         As `sheet_thicknesses` gives them.
     end : (n,) float64
         Where an opaque surface stops each ray, in metres; inf where none does.
+    irradiance : callable, optional
+        On layers; without it they are left out.
     """
     none: tuple[npt.NDArray[np.generic], ...]
     none = (np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64), np.empty(0), np.empty((0, 3)))
     parts = [none]
     for i, (body, metres) in enumerate(zip(scene.objects, sheets, strict=True)):
-        if metres is not None:
+        if metres is not None and (irradiance is not None or not body.covers):
             seen = sheet_hits(scene, body, hits[i], end)
             path = _paths(body, metres, seen, rays.directions[seen.pixel])
-            layer = layer_depth(body, seen), layer_radiance(scene, body, seen, rays)
-            parts.append((seen.pixel, seen.distance, path, np.full(len(path), i), *layer))
+            shown = np.zeros((len(path), 3)) if irradiance is None else layer_radiance(body, seen, rays, irradiance)
+            parts.append((seen.pixel, seen.distance, path, np.full(len(path), i), layer_depth(body, seen), shown))
     return Crossings(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 

@@ -9,12 +9,12 @@ from translucent.reference.boxes import Lines
 from translucent.reference.interfaces import Inside, Optics
 from translucent.reference.legs import Legs
 from translucent.reference.light_paths import LightPaths
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light
 
 
 class StraightLight:
-    """Light of point and directional lights, as far as no interface bends it.
+    """Light of point, spot and directional lights, as far as no interface bends it.
 
     A path that polished interfaces bend meets such a light with probability 0, so that nothing random finds it.
 
@@ -99,7 +99,7 @@ class StraightLight:
 
 def _way(light: Light, points: Array) -> tuple[Array, Array]:
     """Unit vectors (k, 3) from points (k, 3) to a light, and how far it is (k,)."""
-    if not isinstance(light, PointLight):
+    if not isinstance(light, PositionalLight):
         return np.tile(-np.asarray(light.direction), (len(points), 1)), np.full(len(points), np.inf)
     way = np.asarray(light.position) - points
     distance = np.linalg.norm(way, axis=1)

@@ -17,6 +17,7 @@ from translucent.reference.light_paths import LightPaths
 from translucent.reference.phase import scattered_directions
 from translucent.reference.rays import Rays
 from translucent.reference.render import CrossedMedia, crossed_media, seen_behind
+from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import points_on
 
 #: Weight below which paths end by Russian roulette, or go on with this weight.
@@ -46,6 +47,7 @@ class StraightPaths:
 
     def __init__(self, light: LightPaths, channels: Integers, max_events: int | None, rng: np.random.Generator) -> None:
         self.light, self.scene, self.volume = light, light.scene, light.volume
+        self.surface = SurfaceLight(light)
         self.channels, self.max_events, self.rng = channels, max_events, rng
         self.extinction, self.scattering = (
             table[:, channels[0]] for table in (light.volume.extinction, light.volume.scattering)
@@ -75,7 +77,7 @@ class StraightPaths:
     def _media(self, rays: Rays) -> CrossedMedia:
         everywhere = np.full(len(rays), np.inf)
         hits = self.light.tracer.hits(Lines(rays.origins, rays.directions, -everywhere, everywhere))
-        return crossed_media(self.scene, self.volume, rays, hits, self.light.sheets)
+        return crossed_media(self.surface, rays, hits, self.light.sheets)
 
     def _fly(self, rays: Rays, media: CrossedMedia, throughput: Array, owner: Integers) -> _Events:
         """Follow the rays to their first events; adds the emission of media on the way."""
@@ -114,7 +116,7 @@ class StraightPaths:
     ) -> None:
         through = np.ones(len(rays), dtype=bool)
         through[met.path] = False
-        behind = seen_behind(self.scene, rays, media.wall)
+        behind = seen_behind(self.surface, rays, media.wall)
         if scattered:
             open_to = np.isinf(media.wall.distance)
             behind[open_to] = self.scene.environment.lighting(rays.directions[open_to])

@@ -7,11 +7,13 @@ mesh is seen as in `translucent.reference.hits`, and the same exact edge functio
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.reference.boxes import BoxTree, Lines
 from translucent.reference.hits import Hits, cross_triangles, sorted_hits
 from translucent.scene.scene import Object, Scene
@@ -29,13 +31,10 @@ class TracedObject:
     body : Object
     corners : (m, 3, 3) float64
         Of its faces.
-    tree : BoxTree
-        Around them.
     """
 
     body: Object
     corners: Array
-    tree: BoxTree
 
     @classmethod
     def of(cls, body: Object, eye: Array) -> TracedObject:
@@ -43,17 +42,26 @@ class TracedObject:
         x, y, z = (body.mesh.vertices - body.mesh.center).T[:, :, None] * body.matrix[:3, :3].T[:, None]
         # The mesh keeps its shape to the last digit wherever it is: only the one offset to the eye is large.
         corners = (x + y + z + center_from(body, eye))[body.mesh.faces]
-        return cls(body, corners, BoxTree.of(corners))
+        return cls(body, corners)
+
+    @cached_property
+    def tree(self) -> BoxTree:
+        """Boxes around the faces."""
+        return BoxTree.of(self.corners)
 
     def hits(self, lines: Lines) -> Hits:
         """All surfaces on the lines; `Hits.pixel` is the number of the line."""
+        hits = self.crossings(lines, self.tree.candidates(lines))
+        return hits.where((hits.distance >= lines.start[hits.pixel]) & (hits.distance <= lines.end[hits.pixel]))
+
+    def crossings(self, lines: Lines, candidates: Iterable[tuple[Integers, Integers]]) -> Hits:
+        """All of the candidates, pairs (k,), (k,) of a line and a face, that meet, anywhere on the line."""
         parts = []
-        for line, face in self.tree.candidates(lines):
+        for line, face in candidates:
             seen = _sheared(self.corners[face] - lines.origins[line, None], lines.directions[line])
             keep, *found = cross_triangles(seen, np.ones(seen.shape[:2]), np.zeros((len(seen), 2)), perspective=False)
             parts.append((line[keep], face[keep], *found))
-        hits = sorted_hits(parts, -1 if self.body.faces_inwards else 1)
-        return hits.where((hits.distance >= lines.start[hits.pixel]) & (hits.distance <= lines.end[hits.pixel]))
+        return sorted_hits(parts, -1 if self.body.faces_inwards else 1)
 
 
 def center_from(body: Object, eye: Array) -> Array:

@@ -1,32 +1,29 @@
-"""Point and directional lights."""
+"""Point, spot and directional lights."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.formulas.lights import ALL_AROUND, cone_attenuation, light_cone
 from translucent.frozen import Frozen
 from translucent.scene.camera import MAX_COORDINATE
 
 #: Largest radiance, intensity or irradiance: its products with lengths stay within float32.
 MAX_RADIANCE = 1e18
 
+#: Smallest half angle of a cone in degrees: half a per cent of it is a rounding of float32 in a direction.
+NARROWEST_CONE = 1e-3
 
-@dataclass(frozen=True, eq=False)
-class PointLight(Frozen):
-    """Light that shines alike in all directions and falls off with the inverse square (KHR_lights_punctual).
 
-    Parameters
-    ----------
-    position : array_like (3,)
-        In metres.
-    intensity : array_like (3,)
-        Radiant intensity in W/sr, linear RGB; one number stands for all channels.
-    """
+class PositionalLight(Frozen):
+    """Base class of lights that shine from a point and fall off with the inverse square."""
 
     position: npt.ArrayLike
     intensity: npt.ArrayLike
@@ -37,6 +34,21 @@ class PointLight(Frozen):
             raise InputError("light position", f"{farthest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "intensity", positive_triple("light intensity", self.intensity))
+
+    @property
+    def cone(self) -> Array:
+        """(4,): cone in which it shines, as `translucent.formulas.lights.cone_attenuation` takes it."""
+        return np.array(ALL_AROUND)
+
+    @property
+    def mean_share(self) -> float:
+        """Mean over all directions of the share of its intensity with which it shines there."""
+        return 1.0
+
+    def intensity_along(self, travel: npt.ArrayLike) -> Array:
+        """Radiant intensity in unit directions (..., 3) in which light leaves, (..., 3) in W/sr."""
+        with np.errstate(under="ignore"):
+            return np.asarray(np.asarray(self.intensity) * cone_attenuation(travel, self.cone)[..., None])
 
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
         """Irradiance I cos / r^2 on surfaces that nothing shadows, (..., 3) in W/m^2; at most 1e18, and 0 in the light.
@@ -56,8 +68,80 @@ class PointLight(Frozen):
             length = np.linalg.norm(scaled, axis=-1, keepdims=True)
             length = np.where(length > 0, length, 1.0)
             cosine = np.maximum(np.sum(scaled * np.asarray(normals), axis=-1, keepdims=True) / length, 0.0)
-            irradiance = np.asarray(self.intensity) * cosine / (reach * length) / (reach * length)
+            irradiance = self.intensity_along(-scaled / length) * cosine / (reach * length) / (reach * length)
         return np.asarray(np.minimum(irradiance, MAX_RADIANCE))
+
+
+@dataclass(frozen=True, eq=False)
+class PointLight(PositionalLight):
+    """Light that shines alike in all directions and falls off with the inverse square (KHR_lights_punctual).
+
+    Parameters
+    ----------
+    position : array_like (3,)
+        In metres.
+    intensity : array_like (3,)
+        Radiant intensity in W/sr, linear RGB; one number stands for all channels.
+    """
+
+    position: npt.ArrayLike
+    intensity: npt.ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class SpotLight(PositionalLight):
+    """Light that shines in a cone and falls off with the inverse square (KHR_lights_punctual).
+
+    Within the inner cone the intensity is whole. From there to the outer cone it falls to 0, as the square of
+    (cos a - cos outer_cone) / (cos inner_cone - cos outer_cone) at an angle a from the direction.
+
+    Parameters
+    ----------
+    position : array_like (3,)
+        In metres.
+    direction : array_like (3,)
+        In which the middle of the cone shines; any length but 0.
+    intensity : array_like (3,)
+        Radiant intensity within the inner cone, in W/sr, linear RGB; one number stands for all channels.
+    inner_cone, outer_cone : float
+        Half angles of the cones in degrees: 0 <= inner_cone < outer_cone <= 90, and outer_cone at least 0.001.
+
+    Raises
+    ------
+    InputError
+        If a value is not in its range, or the direction has no length.
+    """
+
+    position: npt.ArrayLike
+    direction: npt.ArrayLike
+    intensity: npt.ArrayLike
+    inner_cone: float = 0.0
+    outer_cone: float = 45.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "direction", _unit(self.direction))
+        for name in ("inner_cone", "outer_cone"):
+            object.__setattr__(self, name, _angle(name, getattr(self, name)))
+        if not (self.outer_cone >= NARROWEST_CONE and self.inner_cone < self.outer_cone):
+            raise InputError(
+                f"light with inner_cone {self.inner_cone:g} and outer_cone {self.outer_cone:g} degrees",
+                f"the inner is not below the outer, or the outer is below {NARROWEST_CONE:g}",
+                "give 0 <= inner_cone < outer_cone <= 90",
+            )
+
+    @cached_property
+    def cone(self) -> Array:
+        """(4,): cone in which it shines, as `translucent.formulas.lights.cone_attenuation` takes it."""
+        cone = light_cone(self.direction, math.radians(self.inner_cone), math.radians(self.outer_cone))
+        cone.setflags(write=False)
+        return cone
+
+    @property
+    def mean_share(self) -> float:
+        """Mean over all directions of the share of its intensity with which it shines there."""
+        within, without = (2.0 * math.sin(0.5 * math.radians(a)) ** 2 for a in (self.inner_cone, self.outer_cone))
+        return 0.5 * (within + (without - within) / 3.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +160,7 @@ class DirectionalLight(Frozen):
     irradiance: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        direction = _vector("light direction", self.direction)
-        if not (length := float(np.linalg.norm(direction))) > 0:
-            raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
-        direction = direction / length
-        direction.setflags(write=False)
-        object.__setattr__(self, "direction", direction)
+        object.__setattr__(self, "direction", _unit(self.direction))
         object.__setattr__(self, "irradiance", positive_triple("light irradiance", self.irradiance))
 
     def irradiance_on(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> Array:
@@ -89,6 +168,22 @@ class DirectionalLight(Frozen):
         with np.errstate(under="ignore"):
             cosine = np.maximum(-np.sum(np.asarray(normals) * np.asarray(self.direction), axis=-1, keepdims=True), 0.0)
             return np.asarray(cosine * np.asarray(self.irradiance))
+
+
+def _unit(value: npt.ArrayLike) -> Array:
+    direction = _vector("light direction", value)
+    if not (length := float(np.linalg.norm(direction))) > 0:
+        raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
+    # What has unit length keeps it to the last bit, so that copies of a light have the same direction.
+    direction = direction / length if abs(length - 1.0) > 1e-15 else direction.copy()
+    direction.setflags(write=False)
+    return direction
+
+
+def _angle(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 <= value <= 90:
+        raise InputError(f"light with {name} {value!r}", "not 0 to 90", "give the half angle of a cone in degrees")
+    return float(value)
 
 
 def _vector(what: str, value: npt.ArrayLike) -> Array:

@@ -19,17 +19,20 @@ from translucent.media.density import Density
 from translucent.media.medium import MAX_EMISSION, Medium
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment, parse_radiance
-from translucent.scene.lights import DirectionalLight, PointLight
+from translucent.scene.lights import DirectionalLight, PointLight, SpotLight
 from translucent.scene.surface import Surface
 
 Overlap = Literal["add", "union", "priority"]
-Light = PointLight | DirectionalLight
+Light = PointLight | SpotLight | DirectionalLight
 
 #: Default reflectance of opaque objects: a light gray, as of clay.
 OPAQUE_COLOR = (0.6, 0.6, 0.6)
 
 #: Largest number of names that a message lists.
 MOST_NAMES = 8
+
+#: Largest number of directions in which things throw shadows of an environment.
+MOST_ENVIRONMENT_SHADOWS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +218,7 @@ class Scene(Frozen):
     objects : sequence of Object
         At least one.
     camera : Camera
-    lights : sequence of PointLight or DirectionalLight
+    lights : sequence of PointLight, SpotLight or DirectionalLight
     environment : Environment
         Default: white from everywhere.
     overlap : {"add", "union", "priority"}
@@ -227,6 +230,9 @@ class Scene(Frozen):
         as text, or linear RGB. Media scatter it into the view rays, sigma_s times ambient for each metre, whatever
         their phase function. It stands for light that has been scattered often, or comes from the environment, which
         by itself lights opaque objects only. Default: none.
+    environment_shadows : int
+        Directions of the environment, 0 to 256, in which objects keep its light from opaque ones: the more, the
+        smoother the shadows; 32 are good to a few percent. 0: it reaches them through everything.
     """
 
     objects: Sequence[Object]
@@ -235,9 +241,10 @@ class Scene(Frozen):
     environment: Environment = field(default_factory=lambda: Environment.constant((1.0, 1.0, 1.0)))
     overlap: Overlap = "add"
     ambient: ColorLike = (0.0, 0.0, 0.0)
+    environment_shadows: int = 0
 
     def __post_init__(self) -> None:
-        for field_name, kinds in (("objects", Object), ("lights", (PointLight, DirectionalLight))):
+        for field_name, kinds in (("objects", Object), ("lights", (PointLight, SpotLight, DirectionalLight))):
             given = getattr(self, field_name)
             items = tuple(given) if isinstance(given, Iterable) else (given,)
             for item in items:
@@ -250,6 +257,15 @@ class Scene(Frozen):
         if self.overlap not in get_args(Overlap):
             raise InputError(
                 f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
+            )
+        if (
+            not isinstance(self.environment_shadows, int)
+            or not 0 <= self.environment_shadows <= MOST_ENVIRONMENT_SHADOWS
+        ):
+            raise InputError(
+                f"environment_shadows {self.environment_shadows!r}",
+                f"not a whole number in 0 to {MOST_ENVIRONMENT_SHADOWS}",
+                "use for example 32, or 0 for none",
             )
         object.__setattr__(self, "ambient", parse_radiance("ambient radiance", self.ambient))
         for body in self.bodies:

@@ -54,7 +54,7 @@ def showcase(
         Default: from the front right and above, the whole mesh in view.
     environment : Environment, optional
         Default: a light table, white above and light gray below. Lights show best before a dark one.
-    lights : sequence of PointLight or DirectionalLight
+    lights : sequence of PointLight, SpotLight or DirectionalLight
         What shines into the medium, if it scatters.
     """
     shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))

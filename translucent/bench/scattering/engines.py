@@ -27,7 +27,7 @@ from translucent.formulas.two_stream import (
     two_stream_scattering,
     two_stream_transmittance,
 )
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 
 #: Largest weight of a term in a fit: an artist would not give more.
 MOST = 5.0
@@ -189,9 +189,10 @@ class Frostbite(Engine):
         front = shot.scene.environment.irradiance_on(shot.normals)
         behind = np.zeros_like(front)
         for light in shot.scene.lights:
-            if isinstance(light, PointLight):
+            if isinstance(light, PositionalLight):
                 away = np.asarray(light.position) - shot.points
-                strength = np.asarray(light.intensity) / (away**2).sum(axis=1, keepdims=True)
+                distance = np.linalg.norm(away, axis=1, keepdims=True)
+                strength = light.intensity_along(-away / distance) / distance**2
             else:
                 away, strength = -np.asarray(light.direction)[None], np.asarray(light.irradiance)
             towards = away / np.linalg.norm(away, axis=1, keepdims=True)

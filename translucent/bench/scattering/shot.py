@@ -20,7 +20,7 @@ from translucent.media.medium import Medium
 from translucent.planning.scattering import SingleScattering
 from translucent.reference import pixel_rays
 from translucent.renderer import Renderer
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
 
 #: Rays from each point that find what shadows the environment, and how thick the body is below.
@@ -90,10 +90,12 @@ class Shot:
         found = np.pi * sky.reshape(-1, RAYS, 3).mean(axis=1)
         for light in self.scene.lights:
             away = (
-                np.asarray(light.position) - points if isinstance(light, PointLight) else -np.asarray(light.direction)
+                np.asarray(light.position) - points
+                if isinstance(light, PositionalLight)
+                else -np.asarray(light.direction)
             )
             away = np.broadcast_to(away, points.shape)
-            far = np.linalg.norm(away, axis=1) if isinstance(light, PointLight) else np.full(len(points), np.inf)
+            far = np.linalg.norm(away, axis=1) if isinstance(light, PositionalLight) else np.full(len(points), np.inf)
             towards = away / np.linalg.norm(away, axis=1, keepdims=True)
             seen = self.surface.distance(points, towards, normals) > far * (1.0 - 1e-6)
             found = found + light.irradiance_on(points, normals) * (seen | ~np.isfinite(far))[:, None]

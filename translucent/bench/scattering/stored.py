@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import DirectionalLight, SpotLight
 from translucent.scene.scene import Scene
 
 #: Relative and absolute difference of parameters up to which a scene is the one whose truth is stored: rounding.
@@ -132,10 +132,11 @@ def scene_parameters(scene: Scene) -> Array:
         if medium is not None:
             found += [medium.absorption, medium.scattering, medium.emission, medium.anisotropy, medium.ior]
     for light in scene.lights:
-        if isinstance(light, PointLight):
-            found += [light.position, light.intensity]
-        else:
+        if isinstance(light, DirectionalLight):
             found += [light.direction, light.irradiance]
+        else:
+            found += [light.position, light.intensity]
+            found += [light.cone] if isinstance(light, SpotLight) else []
     return np.concatenate([np.ravel(np.asarray(one, np.float64)) for one in found])
 
 

@@ -18,6 +18,7 @@ from translucent.gpu.passes.layers import LayersPass
 from translucent.gpu.passes.light_views import LightViewsPass
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.path_trace import PathTracePass
+from translucent.gpu.passes.shadow_maps import ShadowMapsPass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.surfaces import SurfacesPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
@@ -44,6 +45,7 @@ PASSES: dict[PassName, type[Pass]] = {
     PassName.THIN_LAYER: ThinLayerPass,
     PassName.THIN_LAYER_FALLBACK: ThinLayerPass,
     PassName.BACK_FACE_DEPTH: BackFaceDepthPass,
+    PassName.SHADOW_MAPS: ShadowMapsPass,
     PassName.OPAQUE: OpaquePass,
     PassName.BACKDROP: BackdropPass,
     PassName.CAUSTICS: CausticsPass,

@@ -12,7 +12,7 @@ from translucent.gpu.constants import PHOTON_WIDTH
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.ledger import before_making
-from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps
+from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.photon_aims import PhotonAim, photon_aims
@@ -116,6 +116,7 @@ class CausticsPass:
             "aim": number,
             "aim_shift": tuple(shift),
             "light_from": tuple(aim.light),
+            "cone": tuple(aim.cone),
             "aim_middle": tuple(aim.middle),
             "aim_right": tuple(aim.right),
             "aim_up": tuple(aim.up),
@@ -153,11 +154,14 @@ class CausticsPass:
         framebuffer.clear(depth=1.0)
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<="
+        unshadowed = shadow_switches(False, job.resources)
         for i in objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
-                program = self._plain.program(WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0)
+                program = self._plain.program(
+                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **unshadowed
+                )
             else:
-                program = self._finished.program(SURFACE=1, **look_switches(job.scene.objects[i]))
+                program = self._finished.program(SURFACE=1, **look_switches(job.scene.objects[i]), **unshadowed)
                 self._maps.bind(job)
                 self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
             job.draw(program, (i,))

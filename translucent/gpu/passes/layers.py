@@ -72,7 +72,12 @@ class LayersPass:
         surface = body.surface
         assert surface is not None
         program = self._painted.program(
-            GLOW=not body.covers, OPAQUE=job.features.has_opaque, BODIES=bodies, **look_switches(body)
+            GLOW=not body.covers,
+            OPAQUE=job.features.has_opaque,
+            BODIES=bodies,
+            SHADOW_MAPS=0,
+            SHADOW_SPECTRAL=0,
+            **look_switches(body),
         )
         self._maps.set_finish(job, program, surface, surface.alpha_cutoff or (LEAST_COVER if body.covers else 0.0))
         if body.covers:

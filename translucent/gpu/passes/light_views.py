@@ -19,7 +19,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightLookup
 from translucent.planning.passes import PassName, PassSpec
-from translucent.scene.lights import PointLight
+from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light
 
 #: Bytes of a node, and of the record at each.
@@ -179,9 +179,12 @@ def _seen(job: FrameJob) -> object:
         for body in scene.objects
     )
     # What lists hold depends on whether media vary.
-    return objects, tuple(_light_key(light) for light in scene.lights), scene.overlap, job.features.varies
+    return objects, tuple(light_key(light) for light in scene.lights), scene.overlap, job.features.varies
 
 
-def _light_key(light: Light) -> tuple[object, ...]:
-    where = light.position if isinstance(light, PointLight) else light.direction
-    return type(light), np.asarray(where).tobytes()
+def light_key(light: Light) -> tuple[object, ...]:
+    """Key of where a light is, and where it shines."""
+    if isinstance(light, DirectionalLight):
+        return DirectionalLight, np.asarray(light.direction).tobytes()
+    # The view of a spot is no wider than its cone.
+    return type(light), np.asarray(light.position).tobytes(), light.cone.tobytes()

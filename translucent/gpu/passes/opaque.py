@@ -8,13 +8,14 @@ import numpy as np
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants, look_switches
+from translucent.gpu.resources import Resources
 from translucent.gpu.scene_view import SceneView
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.planning.passes import PassSpec
 from translucent.scene.surface import Surface
 
-_MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table")
+_MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table", "shadow_sums", "shadow_ends")
 _FIRST_TEXTURE = len(_MAPS)
 #: Texture units of ``shaders/shade/opaque_surface.glsl``.
 FINISH_UNITS = {name: unit for unit, name in enumerate(_MAPS)} | texture_units(_FIRST_TEXTURE)
@@ -38,20 +39,43 @@ class OpaquePass:
         view.gl.depth_func = "<="
         environment = view.scene.environment
         light_map = environment.kind == "image"
+        if view.shadow_maps:
+            view.resources.shadows.use(FINISH_UNITS)
+        common = {"LIGHT_MAP": light_map, "DEPTH_ONLY": False, **shadow_switches(view.shadow_maps, view.resources)}
         if light_map:
             view.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
         for i in spec.objects[::-1]:
             if (surface := view.scene.objects[i].surface) is None:
                 program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, LIGHT_MAP=light_map, VERTEX_COLORS=0, OCCLUSION=0
+                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **common
                 )
             else:
                 looks = look_switches(view.scene.objects[i])
-                program = self._finished.program(SURFACE=1, LIGHT_MAP=light_map, **looks)
+                program = self._finished.program(SURFACE=1, **common, **looks)
                 self._maps.bind(view)
                 self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
             view.draw(program, (i,))
         view.gl.depth_func = "<"
+
+    def draw_depth(self, view: SceneView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer) -> None:
+        """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer."""
+        framebuffer.use()
+        view.gl.enable_only(moderngl.DEPTH_TEST)
+        common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "SHADOW_MAPS": False, "SHADOW_SPECTRAL": False}
+        for i in objects:
+            surface = view.scene.objects[i].surface
+            if surface is None or not surface.alpha_cutoff:
+                switches = {"WITH_NORMAL": 1, "WITH_POSITION": 1, "SURFACE": 0, "VERTEX_COLORS": 0, "OCCLUSION": 0}
+                program = self._plain.program(**switches, **common)
+            else:
+                program = self._finished.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))
+                self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
+            view.draw(program, (i,))
+
+
+def shadow_switches(used: bool, resources: Resources) -> dict[str, bool]:
+    """Switches of ``shaders/shade/shadows.glsl``."""
+    return {"SHADOW_MAPS": used, "SHADOW_SPECTRAL": used and resources.shadows.spectral}
 
 
 class FinishMaps:

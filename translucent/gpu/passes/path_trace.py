@@ -14,6 +14,7 @@ from translucent.errors import RenderError
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.opaque import shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed, record_at_eye
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
@@ -39,6 +40,8 @@ _UNITS = {
             "light_levels",
             "reflectance_table",
             "seen_map",
+            "shadow_sums",
+            "shadow_ends",
         )
     )
 }
@@ -255,6 +258,7 @@ class PathTracer:
             ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
             DISPERSION=False,
             OPAQUE=job.features.has_opaque,
+            **shadow_switches(job.features.has_shadow_maps, job.resources),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
         )
@@ -277,6 +281,7 @@ class PathTracer:
             "light_levels": maps.levels,
             "reflectance_table": self._reflectance,
         }
+        job.resources.shadows.use(_UNITS)
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets.opaque().color_attachments
         if environment.seen.kind == "image":

@@ -8,7 +8,7 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
-from translucent.gpu.passes.opaque import blurred_opaque
+from translucent.gpu.passes.opaque import blurred_opaque, shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
@@ -35,6 +35,8 @@ _SAMPLERS = (
     "light_irradiance",
     "seen_map",
     "diffused_light",
+    "shadow_sums",
+    "shadow_ends",
 )
 _ENTERED = ("entered", "surface_finish", "surface_color")
 _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
@@ -78,6 +80,7 @@ class TracedInterfacesPass:
         self._bind(job, hierarchies, *tables)
         if diffused is not None:
             diffused.texture.use(_UNITS["diffused_light"])
+        job.resources.shadows.use(_UNITS)
         program = self._program(job)
         depth, forks = job.plan.interfaces.tree if job.plan.interfaces else (0, 0)
         values = {
@@ -114,6 +117,7 @@ class TracedInterfacesPass:
             MICROFACETS=any(surface.roughness > 0 for surface in surfaces),
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
+            **shadow_switches(job.features.has_shadow_maps, job.resources),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,

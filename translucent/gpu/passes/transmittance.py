@@ -6,6 +6,7 @@ import moderngl
 
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import set_uniform
 from translucent.planning.passes import PassSpec
 
 _SAMPLERS = (
@@ -35,14 +36,7 @@ class TransmittancePass:
         """Shade the frame from its accumulated paths; for a job of several samples, add a sample's radiance and
         transmittance instead.
         """
-        gl, plan, features = job.gl, job.plan, job.features
-        inputs = {
-            "accumulated": job.accumulator() if features.accumulates else None,
-            "fallback": job.accumulator("fallback") if features.has_fallback else None,
-            "unlit": job.accumulator("unlit") if features.has_unlit else None,
-            "ordered_depth": job.targets.ordered() if plan.ordered else None,
-            "opaque_axial_depth": job.targets.opaque() if features.has_opaque else None,
-        }
+        gl, features = job.gl, job.features
         seen = job.scene.environment.seen
         seen_map = seen.kind == "image" and not features.has_surfaces
         if seen_map:
@@ -56,19 +50,9 @@ class TransmittancePass:
             gl.blend_func = moderngl.ONE, moderngl.ONE
         else:
             gl.enable_only(moderngl.NOTHING)
-        for first, framebuffer in inputs.items():
-            if framebuffer is not None:
-                for unit, texture in enumerate(framebuffer.color_attachments, _SAMPLERS.index(first)):
-                    texture.use(unit)
-        paths = {
-            "SPECTRAL": plan.spectral,
-            "FALLBACK": features.has_fallback,
-            "UNLIT": features.has_unlit,
-            "EMISSION": features.emits and not plan.ordered,
-            "ORDERED": plan.ordered,
-            "ACCUMULATED": features.accumulates,
-        }
+        paths = self._bind_paths(job)
         switches = {
+            "MAP": False,
             "AVERAGE": sums,
             "SURFACES": features.has_surfaces,
             "SEEN_MAP": seen_map,
@@ -79,3 +63,51 @@ class TransmittancePass:
         empty = self._variants.program(**switches, **dict.fromkeys(paths, False))
         self._variants.draw_covered(job, program, into, top_first=True)
         self._variants.draw_rest(job, empty, into, top_first=True)
+
+    def run_map(
+        self, job: FrameJob, into: moderngl.Framebuffer, corner: tuple[int, int], ahead: tuple[float, float]
+    ) -> None:
+        """Write optical depths, and where the first opaque surface is, into the map of shadows with this corner.
+
+        `ahead` is metres ahead of the center of the media at axial depth 0, and from there to axial depth 1.
+        """
+        paths = self._bind_paths(job) | {"UNLIT": False, "EMISSION": False}
+        opaque = job.features.has_opaque
+        switches = {"MAP": True, "AVERAGE": False, "SURFACES": False, "SEEN_MAP": False, "OPAQUE": opaque}
+        x, y, *extent = job.covered.scissor
+        into.use()
+        job.gl.enable_only(moderngl.NOTHING)
+        into.viewport = (*corner, *job.targets.size)
+        for found, scissor in (
+            (dict.fromkeys(paths, False), (*corner, *job.targets.size)),
+            (paths, (corner[0] + x, corner[1] + y, *extent)),
+        ):
+            into.scissor = scissor
+            program = self._variants.program(**switches, **found)
+            set_uniform(program, "map_place", (*corner, *ahead))
+            self._variants.draw_fullscreen(program)
+        into.scissor = None
+        into.viewport = (0, 0, *into.size)
+
+    def _bind_paths(self, job: FrameJob) -> dict[str, bool]:
+        """Bind what passes before have found, and the switches that say what that is."""
+        plan, features = job.plan, job.features
+        inputs = {
+            "accumulated": job.accumulator() if features.accumulates else None,
+            "fallback": job.accumulator("fallback") if features.has_fallback else None,
+            "unlit": job.accumulator("unlit") if features.has_unlit else None,
+            "ordered_depth": job.targets.ordered() if plan.ordered else None,
+            "opaque_axial_depth": job.targets.opaque() if features.has_opaque else None,
+        }
+        for first, framebuffer in inputs.items():
+            if framebuffer is not None:
+                for unit, texture in enumerate(framebuffer.color_attachments, _SAMPLERS.index(first)):
+                    texture.use(unit)
+        return {
+            "SPECTRAL": plan.spectral,
+            "FALLBACK": features.has_fallback,
+            "UNLIT": features.has_unlit,
+            "EMISSION": features.emits and not plan.ordered,
+            "ORDERED": plan.ordered,
+            "ACCUMULATED": features.accumulates,
+        }

@@ -26,7 +26,7 @@ class PathTraced(Method):
     which choose approximations. `Frame.standard_error` tells the noise; thickness, optical depth and transmittance are
     those of the planner's own choice of method, and exact.
 
-    Light of point and directional lights that polished interfaces bend is found by no path.
+    Light of point, spot and directional lights that polished interfaces bend is found by no path.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class PathTraced(Method):
         notes = []
         bending = [body for body in scene.bodies if _bends(body)]
         if scene.lights and bending:
-            text = "light of point and directional lights that polished interfaces bend: in media, and as caustics"
+            text = "light of lamps and directional lights that polished interfaces bend: in media, and as caustics"
             notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
         surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
         if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:

@@ -1,0 +1,110 @@
+// Light that reaches a point of an opaque surface through everything on the straight way: a lookup in maps of paths to the
+// first opaque surface on each ray of a light. Transmittance is interpolated between four texels, each of which counts only if the surface, made
+// flat, is not behind what is opaque there (receiver plane, Isidoro 2006): so no surface shadows itself, however it is inclined.
+// Needs <constants>. Points count from the center of the media; normals are unit vectors.
+
+#if SHADOW_MAPS
+#include <Shadows>
+#include <SkyShadows>
+
+uniform sampler2D shadow_sums;  // path, or of several media optical depths, for each metre ahead
+uniform sampler2D shadow_ends;  // metres ahead of the center where an opaque surface ends the ray
+
+// A map, and how a point projects into it: from -1 to 1, and metres ahead of the light.
+struct ShadowView {
+    vec4 right;
+    vec4 up;
+    vec4 ahead;
+    vec2 corner;
+    float size;
+    bool perspective;
+    bool ends;  // opaque objects are in the way of some rays
+};
+
+ShadowView shadow_view(int number) {
+    vec4 place = shadow_views[4 * number + 3];
+    return ShadowView(shadow_views[4 * number], shadow_views[4 * number + 1], shadow_views[4 * number + 2], place.xy, place.z,
+        mod(place.w, 2.0) == 1.0, place.w >= 2.0);
+}
+
+ShadowView sky_view(int number) {
+    float numbered = sky_views[4 * number + 3].w;
+    int place = int(abs(numbered)) - 1;
+    vec2 corner = float(sky_size) * vec2(place % sky_columns, place / sky_columns);
+    return ShadowView(sky_views[4 * number], sky_views[4 * number + 1], sky_views[4 * number + 2], corner, float(sky_size),
+        false, numbered < 0.0);
+}
+
+// Which of the six views of a cube looks at a point, given from the light.
+int shadow_cube_face(vec3 from_light) {
+    vec3 size = abs(from_light);
+    int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    return 2 * axis + (from_light[axis] < 0.0 ? 1 : 0);
+}
+
+// Transmittance of a texel's ray, which advances so many metres for each metre ahead.
+vec3 texel_transmittance(ivec2 at, float advance) {
+#if SHADOW_SPECTRAL
+    vec3 optical_depth = texelFetch(shadow_sums, at, 0).rgb;
+#else
+    vec3 optical_depth = texelFetch(shadow_sums, at, 0).r * shadow_extinction.rgb;
+#endif
+    return exp(-clamp(optical_depth * advance, 0.0, MAX_OPTICAL_DEPTH));
+}
+
+// Transmittance of the way to a point; 1 beyond the map, where nothing is that throws a shadow.
+vec3 light_through(ShadowView view, vec3 point, vec3 normal) {
+    vec4 here = vec4(point, 1.0);
+    vec3 seen = vec3(dot(view.right, here), dot(view.up, here), dot(view.ahead, here));
+    float spread = view.perspective ? seen.z : 1.0;
+    vec2 place = seen.xy / spread;
+    if (spread <= 0.0 || max(abs(place.x), abs(place.y)) >= 1.0) { return vec3(1.0); }
+    // The plane of the surface, in these coordinates.
+    vec3 plane = vec3(dot(normal, view.right.xyz) / dot(view.right.xyz, view.right.xyz),
+                      dot(normal, view.up.xyz) / dot(view.up.xyz, view.up.xyz), dot(normal, view.ahead.xyz));
+    float ahead = dot(view.ahead.xyz, point);
+    vec2 spans = inversesqrt(vec2(dot(view.right.xyz, view.right.xyz), dot(view.up.xyz, view.up.xyz)));
+    float texel_metres = 2.0 * spread * spans.x / view.size;
+    float steepest = STEEPEST_SHADOW * texel_metres;
+    vec2 position = (0.5 * place + 0.5) * view.size - 0.5;
+    vec2 corner = floor(position);
+    vec2 share = position - corner;
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < 4; ++i) {
+        vec2 aside = vec2(i & 1, i >> 1);
+        vec2 texel = clamp(corner + aside, vec2(0.0), vec2(view.size - 1.0));
+        vec2 there = (texel + 0.5) * (2.0 / view.size) - 1.0;
+        float tilt = view.perspective ? dot(plane, vec3(there, 1.0)) : plane.z;
+        float rise = spread * dot(plane.xy, place - there) / (abs(tilt) > 1e-6 ? tilt : 1e-6);
+        ivec2 at = ivec2(view.corner + texel);
+        if (view.ends && ahead + clamp(rise, -steepest, steepest) > texelFetch(shadow_ends, at, 0).r + SHADOW_MARGIN * texel_metres) { continue; }
+        vec2 weights = mix(1.0 - share, share, aside);
+        sum += weights.x * weights.y * texel_transmittance(at, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0);
+    }
+    return sum;
+}
+
+vec3 light_reaching(int light, vec3 point, vec3 normal) {
+    int first = int(shadow_lights[light].x), count = int(shadow_lights[light].y);
+    if (count == 0) { return vec3(1.0); }
+    if (count == 1) { return light_through(shadow_view(first), point, normal); }
+    // All six look from the light; the first along +x.
+    vec3 from_light = vec3(shadow_views[4 * first + 2].w, shadow_views[4 * (first + 2) + 2].w, shadow_views[4 * (first + 4) + 2].w) + point;
+    return light_through(shadow_view(first + shadow_cube_face(from_light)), point, normal);
+}
+
+// Share of the light of the environment that reaches a surface.
+vec3 environment_reaching(vec3 point, vec3 normal) {
+    if (sky_count == 0) { return vec3(1.0); }
+    vec3 all = vec3(0.0), reaching = vec3(0.0);
+    for (int i = 0; i < sky_count; ++i) {
+        vec3 light = sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
+        all += light;
+        if (i % sky_step == sky_first && light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal); }
+    }
+    return mix(vec3(1.0), float(sky_step) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+}
+#else
+vec3 light_reaching(int light, vec3 point, vec3 normal) { return vec3(1.0); }
+vec3 environment_reaching(vec3 point, vec3 normal) { return vec3(1.0); }
+#endif

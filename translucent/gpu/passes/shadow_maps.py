@@ -1,0 +1,252 @@
+"""Maps of shadows: signed depth from each light, and from directions of the environment, down to what is opaque."""
+
+from __future__ import annotations
+
+import contextlib
+import weakref
+from collections.abc import Callable
+from dataclasses import replace
+
+import moderngl
+import numpy as np
+
+from translucent.arrays import Array
+from translucent.gpu.body_uniforms import bounded_extinction
+from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.job import FrameJob
+from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
+from translucent.gpu.light_cameras import outermost
+from translucent.gpu.passes.depth_peeling import DepthPeelingPass
+from translucent.gpu.passes.fragment_lists import FragmentListsPass
+from translucent.gpu.passes.light_views import light_key
+from translucent.gpu.passes.opaque import OpaquePass
+from translucent.gpu.passes.signed_depth import SignedDepthPass
+from translucent.gpu.passes.thin_layer import ThinLayerPass
+from translucent.gpu.passes.transmittance import TransmittancePass
+from translucent.gpu.placement import AxialRange, PlacedScene
+from translucent.gpu.resources import Resources
+from translucent.gpu.shadow_atlas import ShadowView, ShadowViews
+from translucent.gpu.shadow_cameras import ShadowThrowers
+from translucent.gpu.targets import Targets
+from translucent.gpu.uniforms import media_center
+from translucent.media.medium import Medium
+from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.paths import straight_scene
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.scene.environment import Environment
+from translucent.scene.lights import DirectionalLight
+from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.shadow_directions import shadow_directions
+
+#: First OpenGL version in which shaders write to buffers.
+_SHADER_STORAGE = 430
+
+#: Optical depth across a body whose light photons carry.
+_DENSE = 1e4
+
+_BLACK = Environment.constant((0.0, 0.0, 0.0))
+
+
+class MapJob(FrameJob):
+    """Frame that a light sees, drawn into its place in the atlas; axial depths are metres ahead of the scene's center.
+
+    Parameters
+    ----------
+    gl, scene, plan, targets, resources
+    view : ShadowView
+    center : (3,) float64
+        Of the media.
+    """
+
+    def __init__(
+        self,
+        gl: moderngl.Context,
+        scene: Scene,
+        plan: RenderPlan,
+        targets: Targets,
+        resources: Resources,
+        view: ShadowView,
+        center: Array,
+    ) -> None:
+        self._view = view
+        self.corner = view.corner
+        zero = float(scene.camera.forward @ (center - scene.camera.eye))
+        placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
+        super().__init__(gl, scene, plan, targets, resources, placed=placed)
+
+    def at_place(self, framebuffer: moderngl.Framebuffer) -> moderngl.Framebuffer:
+        """The framebuffer, with its viewport where the map is."""
+        framebuffer.viewport = (*self._view.corner, self._view.size, self._view.size)
+        return framebuffer
+
+    def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
+        """Target in which thickness passes add up."""
+        return self.at_place(self.resources.shadows.sums)
+
+    def bind_opaque(self, unit: int) -> None:
+        """Bind where rays end for the shader that reads texture `unit`, if there are any."""
+        if self.features.has_opaque:
+            self.resources.shadows.ends.color_attachments[0].use(unit)
+
+
+class ShadowMapsPass:
+    """Transmittance to the first opaque surface on each ray of each light; see ``shaders/shade/shadows.glsl``.
+
+    Each map is a frame of its own, which the light sees: its scene has no interfaces and only absorbs, and the passes
+    of the plan for that scene find the paths through its media.
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._opaque = OpaquePass(gl)
+        self._resolve = TransmittancePass(gl)
+        self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
+        self._targets: dict[int, Targets] = {}
+
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
+        """Render the maps, if objects or lights have changed, and write the uniforms."""
+        atlas, scene = job.resources.shadows, job.scene
+        if atlas.held != (seen := _seen(job)):
+            self._render(job)
+            atlas.held = seen
+        assert atlas.views is not None
+        center = media_center(scene)
+        # Of several samples of a pixel, each looks into its share of the directions.
+        turns = (job.sample % job.samples, job.samples)
+        extinction = bounded_extinction(scene.bodies[0].medium, scene.diagonal)
+        job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
+        irradiance = shadow_directions(scene.environment, max(scene.environment_shadows, 1))[1]
+        job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
+        job.uniforms.bind()
+
+    def _render(self, job: FrameJob) -> None:
+        """Render all maps."""
+        scene, atlas = job.scene, job.resources.shadows
+        corners = [outermost(item) for item in scene.objects]
+        lights, sky = (
+            [ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene))
+        )
+        limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
+        views = ShadowViews.of(
+            [(found.cameras(), not found.open_ways) for found in lights],
+            [(found.cameras(), not found.open_ways) for found in sky],
+            job.plan.shadows.size,
+            limit,
+        )
+        dark = _darkened(scene, job.plan.opaque_to_shadows)
+        everything = self._planned(dark, opaque=True)
+        # Sums can be added up in place; others, and what depends on whether they balance, are copied.
+        in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
+        spectral = everything[1].spectral or not in_place or dark is not scene
+        atlas.make(views, spectral=spectral)
+        center = media_center(scene)
+        found_plans = {(True, dark is scene): everything}
+        for view in views:
+            if view.size not in self._targets:
+                self._targets[view.size] = Targets(self._gl, (view.size, view.size))
+            # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
+            clear = dark is scene or view in views.sky
+            if (key := (view.ends, clear)) not in found_plans:
+                found_plans[key] = self._planned(scene if clear else dark, opaque=view.ends)
+            seen, chosen = found_plans[key]
+            chosen = replace(chosen, spectral=spectral)
+            before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
+            if in_place:
+                self._add_up(MapJob(self._gl, *before, view, center))
+            else:
+                self._copy(FrameJob(self._gl, *before), view, center)
+        for size in self._targets.keys() - {view.size for view in views}:
+            self._targets.pop(size).release()
+        job.uniforms.bind()
+
+    def _planned(self, scene: Scene, *, opaque: bool) -> tuple[Scene, RenderPlan]:
+        """The scene without interfaces, with or without opaque objects, and its plan."""
+        objects = [item for item in scene.objects if opaque or item.medium is not None]
+        seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
+        return seen, plan(seen, None, Capabilities(shader_storage=self._gl.version_code >= _SHADER_STORAGE))
+
+    def _add_up(self, light: MapJob) -> None:
+        """Draw one map where it is."""
+        with contextlib.ExitStack() as stack:
+            stack.callback(light.release)
+            for step in light.plan.passes:
+                if step.name is PassName.OPAQUE:
+                    self._opaque.draw_depth(light, step.objects, light.at_place(light.resources.shadows.ends))
+                elif step.name is not PassName.TRANSMITTANCE:
+                    self._step(step.name)(light, step)
+
+    def _copy(self, light: FrameJob, view: ShadowView, center: Array) -> None:
+        """Draw one map as a frame, and copy it to its place."""
+        with contextlib.ExitStack() as stack:
+            stack.callback(light.release)
+            for step in light.plan.passes:
+                if step.name is PassName.OPAQUE:
+                    ends = light.targets.opaque_ends()
+                    ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
+                    self._opaque.draw_depth(light, step.objects, ends)
+                elif step.name is not PassName.TRANSMITTANCE:
+                    self._step(step.name)(light, step)
+            camera, media = light.scene.camera, light.placed.media
+            ahead = media.near + float(camera.forward @ (camera.eye - center))
+            self._resolve.run_map(light, light.resources.shadows.both, view.corner, (ahead, media.length))
+
+    def _step(self, name: PassName) -> Callable[[FrameJob, PassSpec], None]:
+        if name not in self._made:
+            self._made[name] = _STEPS[name](self._gl).run
+        return self._made[name]
+
+
+#: Passes whose sums are read where they were added up.
+_IN_PLACE = (PassName.OPAQUE, PassName.SIGNED_DEPTH, PassName.THIN_LAYER, PassName.TRANSMITTANCE)
+
+#: Passes that plans for scenes without interfaces and light have.
+_STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass | DepthPeelingPass]] = {
+    PassName.SIGNED_DEPTH: SignedDepthPass,
+    PassName.SIGNED_DEPTH_FALLBACK: SignedDepthPass,
+    PassName.THIN_LAYER: ThinLayerPass,
+    PassName.THIN_LAYER_FALLBACK: ThinLayerPass,
+    PassName.FRAGMENT_LISTS: FragmentListsPass,
+    PassName.DEPTH_PEELING: DepthPeelingPass,
+}
+
+
+def _darkened(scene: Scene, opaque: frozenset[int]) -> Scene:
+    """The scene with these of its bodies so dense that no light passes; the scene itself if there are none."""
+    if not opaque:
+        return scene
+
+    def dense(body: Object) -> Object:
+        return replace(
+            body, medium=Medium(_DENSE / float(np.linalg.norm(body.bounds[1] - body.bounds[0]))), surface=None
+        )
+
+    return replace(scene, objects=[dense(body) if i in opaque else body for i, body in enumerate(scene.objects)])
+
+
+def _sky_lights(scene: Scene) -> list[Light]:
+    """Lights from the directions of the environment that throw shadows."""
+    if not scene.environment_shadows:
+        return []
+    towards, _ = shadow_directions(scene.environment, scene.environment_shadows)
+    return [DirectionalLight(-direction, 1.0) for direction in towards]
+
+
+def _seen(job: FrameJob) -> object:
+    """Key of the maps, equal for frames in which lights see the same; keeps nothing alive."""
+    scene = job.scene
+    objects = tuple(
+        (
+            weakref.ref(item.mesh),
+            item.matrix.tobytes(),
+            None if item.medium is None else np.asarray(item.medium.extinction).tobytes(),
+            item.priority,
+            item.sheet_thickness,
+            item.medium is None and item.surface,
+            None if item.density is None else weakref.ref(item.density),
+        )
+        for item in scene.objects
+    )
+    lights = tuple(light_key(light) for light in scene.lights)
+    sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
+    return objects, lights, sky, scene.overlap, job.plan.shadows.size, job.plan.opaque_to_shadows

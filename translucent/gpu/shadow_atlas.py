@@ -1,0 +1,275 @@
+"""Texture with the maps of shadows from all lights, and the uniforms by which shaders find their place in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.errors import RenderError
+from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.layout import MAX_LIGHTS, MAX_SHADOW_VIEWS, MAX_SKY_VIEWS, SHADOWS, SKY_SHADOWS
+from translucent.scene.camera import Camera
+
+#: Bytes of a texel at most: sums in three channels and a count, the place of the first opaque surface, and depth.
+_TEXEL = 24
+
+#: Bytes that all maps may take together: beyond, they are smaller than asked for.
+MOST_BYTES = 512 << 20
+
+#: Maps of the environment's directions along the side of a light's map.
+SKY_SHARE = 4
+
+#: Smallest maps, where there are many.
+LEAST_TEXELS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowView:
+    """Map of one view from a light.
+
+    Attributes
+    ----------
+    camera : Camera
+    corner : (int, int)
+        Of its texels in the atlas.
+    size : int
+        Texels along a side.
+    ends : bool
+        Opaque objects are in the way of some rays.
+    """
+
+    camera: Camera
+    corner: tuple[int, int]
+    size: int
+    ends: bool
+
+    def rows(self, center: Array) -> npt.NDArray[np.float64]:
+        """(4, 4): from points, given from `center`, to right and up (at the edges of the map 1, in perspective after
+        division) and metres ahead of the light, with where their zero is; and corner and size of the map, and 1 if in
+        perspective, with 2 if it has ends.
+        """
+        camera = self.camera
+        half_width, half_height = camera.half_extent((self.size, self.size))
+        axes = np.stack([camera.right / half_width, camera.up / half_height, camera.forward])
+        perspective = camera.fov_y is not None
+        return np.concatenate(
+            [
+                np.column_stack([axes, axes @ (center - camera.eye)]),
+                [[*self.corner, self.size, perspective + 2 * self.ends]],
+            ]
+        )
+
+
+#: Cameras of a light, and whether opaque objects are in its way.
+Seen: TypeAlias = tuple[Sequence[Camera], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowViews:
+    """Places of all maps in an atlas.
+
+    Attributes
+    ----------
+    lights : tuple of tuple of ShadowView
+        Of each light; none where nothing throws a shadow.
+    sky : tuple of ShadowView
+        Of directions of the environment.
+    extent : (int, int)
+        Width and height of the atlas.
+    """
+
+    lights: tuple[tuple[ShadowView, ...], ...]
+    sky: tuple[ShadowView, ...]
+    extent: tuple[int, int]
+
+    @classmethod
+    def of(cls, lights: Sequence[Seen], sky: Sequence[Seen], size: int, limit: int) -> ShadowViews:
+        """Places for the maps of cameras, `size` texels wide, or smaller ones where they take more room than there is.
+
+        Parameters
+        ----------
+        lights, sky : sequence of (sequence of Camera, bool)
+            Of each light, and whether opaque objects are in its way.
+        size : int
+        limit : int
+            Largest width of a texture.
+
+        Raises
+        ------
+        RenderError
+            If not even small maps fit into a texture of `limit` texels along a side.
+        """
+        count = sum(len(cameras) for cameras, _ in lights)
+        side = size
+        while side >= LEAST_TEXELS * SKY_SHARE:
+            small = side // SKY_SHARE
+            places = SKY_SHARE**2 * count + len(sky)
+            columns = SKY_SHARE * max(int(np.ceil(np.sqrt(places) / SKY_SHARE)), 1)
+            rows = -(-count * SKY_SHARE // columns) * SKY_SHARE + -(-len(sky) // columns)
+            extent = columns * small, rows * small
+            if max(extent) <= limit and _TEXEL * extent[0] * extent[1] <= MOST_BYTES:
+                return cls(*_placed(lights, sky, side, small, columns), extent)
+            side //= 2
+        raise RenderError(
+            f"shadows of {len(lights)} lights and {len(sky)} directions of the environment",
+            f"no texture of this OpenGL, at most {limit} texels wide, holds their maps",
+            "use fewer",
+        )
+
+    def __iter__(self) -> Iterator[ShadowView]:
+        """All maps."""
+        yield from (view for views in self.lights for view in views)
+        yield from self.sky
+
+    def light_uniforms(self, center: Array, first_and_step: tuple[int, int], extinction: Array) -> bytes:
+        """Contents of the Shadows block, for positions that count from `center`.
+
+        Of the directions of the environment, the first and every so-many-th after it are looked at, and count for all.
+        `extinction` (3,) is that of the one medium, where the maps are paths.
+        """
+        first, spans = 0, np.zeros((MAX_LIGHTS, 4))
+        rows = np.zeros((MAX_SHADOW_VIEWS, 4, 4))
+        for i, views in enumerate(self.lights):
+            spans[i, :2] = first, len(views)
+            for view in views:
+                rows[first] = view.rows(center)
+                first += 1
+        return SHADOWS.pack(
+            shadow_lights=spans,
+            shadow_views=rows.reshape(-1, 4),
+            shadow_extinction=[*extinction, 0.0],
+            sky_count=len(self.sky),
+            sky_size=self.sky[0].size if self.sky else 0,
+            sky_columns=self._columns,
+            sky_first=first_and_step[0],
+            sky_step=first_and_step[1],
+        )
+
+    def sky_uniforms(self, center: Array, irradiance: Array) -> bytes:
+        """Contents of the SkyShadows block, with what each direction sends, (k, 3)."""
+        rows = np.zeros((MAX_SKY_VIEWS, 4, 4))
+        for row, view, light in zip(rows, self.sky, irradiance, strict=False):
+            row[:] = view.rows(center)
+            x, y = np.floor_divide(view.corner, view.size)
+            number = y * self._columns + x + 1
+            row[3] = [*light, -number if view.ends else number]
+        return SKY_SHADOWS.pack(sky_views=rows.reshape(-1, 4))
+
+    @property
+    def _columns(self) -> int:
+        """Maps of directions of the environment that fit into a row of the atlas."""
+        return self.extent[0] // self.sky[0].size if self.sky else 0
+
+
+def _placed(
+    lights: Sequence[Seen], sky: Sequence[Seen], side: int, small: int, columns: int
+) -> tuple[tuple[tuple[ShadowView, ...], ...], tuple[ShadowView, ...]]:
+    across, number, groups = columns // SKY_SHARE, 0, []
+    for cameras, ends in lights:
+        places = [divmod(number + i, across) for i in range(len(cameras))]
+        groups.append(
+            tuple(
+                ShadowView(camera, (x * side, y * side), side, ends)
+                for camera, (y, x) in zip(cameras, places, strict=True)
+            )
+        )
+        number += len(cameras)
+    first = -(-number // across) * SKY_SHARE * columns
+    places = [divmod(first + i, columns) for i in range(len(sky))]
+    return tuple(groups), tuple(
+        ShadowView(cameras[0], (x * small, y * small), small, ends)
+        for (cameras, ends), (y, x) in zip(sky, places, strict=True)
+    )
+
+
+class ShadowAtlas:
+    """Textures with all maps: what rays of lights go through, and where each meets the first opaque surface.
+
+    Attributes
+    ----------
+    held : object
+        Key of what the textures hold.
+    views : ShadowViews, optional
+        Places of the maps.
+    spectral : bool
+        The maps are optical depths (RGBA32F), since media differ, and not paths (RG32F).
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        self._gl = gl
+        self._framebuffers: tuple[moderngl.Framebuffer, ...] = ()
+        self.held: object = None
+        self.views: ShadowViews | None = None
+        self.spectral = False
+
+    def make(self, views: ShadowViews, *, spectral: bool) -> None:
+        """Make room for maps; what the textures held is lost.
+
+        Raises
+        ------
+        RenderError
+            If OpenGL has no room.
+        """
+        self.held = None
+        if not self._framebuffers or self._framebuffers[0].size != views.extent or self.spectral != spectral:
+            self.release()
+            self._framebuffers = self._made(views.extent, spectral)
+        self.views, self.spectral = views, spectral
+        for framebuffer in (self.sums, self.ends):
+            framebuffer.viewport = (0, 0, *views.extent)
+        self.sums.clear()
+        if any(view.ends for view in views):
+            self.ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
+
+    @property
+    def sums(self) -> moderngl.Framebuffer:
+        """Framebuffer of paths or optical depths per metre ahead, with counts."""
+        return self._framebuffers[0]
+
+    @property
+    def ends(self) -> moderngl.Framebuffer:
+        """Framebuffer (R32F) of metres ahead of the center where opaque surfaces end rays; with a depth buffer."""
+        return self._framebuffers[1]
+
+    @property
+    def both(self) -> moderngl.Framebuffer:
+        """Framebuffer of sums and ends."""
+        return self._framebuffers[2]
+
+    def use(self, units: Mapping[str, int]) -> None:
+        """Bind the textures for shaders that read `shadow_sums` and `shadow_ends` from these units."""
+        if self._framebuffers:
+            self.sums.color_attachments[0].use(units["shadow_sums"])
+            self.ends.color_attachments[0].use(units["shadow_ends"])
+
+    def release(self) -> None:
+        """Free the textures now."""
+        for attachment in (
+            *(framebuffer.color_attachments[0] for framebuffer in self._framebuffers[:2]),
+            *(framebuffer.depth_attachment for framebuffer in self._framebuffers[1:2]),
+            *self._framebuffers,
+        ):
+            if attachment is not None:
+                attachment.release()
+        self._framebuffers, self.held, self.views = (), None, None
+
+    def _made(self, extent: tuple[int, int], spectral: bool) -> tuple[moderngl.Framebuffer, ...]:
+        gl = self._gl
+        try:
+            sums, ends = (gl.texture(extent, count, dtype="f4") for count in (4 if spectral else 2, 1))
+            depth = gl.depth_renderbuffer(extent)
+        except moderngl.Error as error:
+            raise RenderError(
+                "maps of shadows",
+                f"OpenGL has no room for {_TEXEL * extent[0] * extent[1] / 1e6:.0f} MB of them ({error})",
+                "give shadows=tl.ShadowMaps(size=...) a smaller size",
+            ) from error
+        for texture in (sums, ends):
+            texture.filter = moderngl.NEAREST, moderngl.NEAREST
+        return gl.framebuffer([sums]), gl.framebuffer([ends], depth), gl.framebuffer([sums, ends])

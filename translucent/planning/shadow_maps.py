@@ -1,0 +1,68 @@
+"""Shadows on opaque objects: maps of what reaches them from each light, and from directions of the environment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from translucent.errors import InputError
+from translucent.planning.bodies import count_of, indices, media_differ
+from translucent.planning.methods import SignedDepth
+from translucent.planning.passes import PassName, PassSpec
+from translucent.scene.scene import Scene
+
+#: Sizes that make sense: below, shadows are blots; above, no texture holds them.
+LEAST_SIZE, MOST_SIZE = 64, 8192
+
+
+@dataclass(frozen=True)
+class ShadowMaps:
+    """Colored shadows on opaque objects: the transmittance of the straight way from each light.
+
+    From each light, one draw of the opaque objects and one of the bodies find the transmittance to the first opaque
+    surface on each ray: thickness ends there, so that no bias is needed. Where the surface is read, it is interpolated
+    between texels, as transmittance and not as thickness. Maps are kept until objects or lights change.
+
+    Parameters
+    ----------
+    size : int
+        Texels along a side of each light's map, 64 to 8192. Those of directions of the environment
+        (`Scene.environment_shadows`) have a quarter of it.
+
+    Raises
+    ------
+    InputError
+        If the size is not a whole number in this range.
+    """
+
+    size: int = 1024
+
+    def __post_init__(self) -> None:
+        if isinstance(self.size, bool) or not isinstance(self.size, int) or not LEAST_SIZE <= self.size <= MOST_SIZE:
+            raise InputError(
+                f"ShadowMaps size {self.size!r}",
+                f"not a whole number in {LEAST_SIZE} to {MOST_SIZE}",
+                "give for example 1024",
+            )
+
+
+def check_shadows(shadows: object) -> None:
+    """Raise `InputError` for what is no choice of shadows."""
+    if shadows is not None and not isinstance(shadows, ShadowMaps):
+        raise InputError(f"shadows {shadows!r}", "not a choice of shadows", "give for example tl.ShadowMaps(size=2048)")
+
+
+def shadow_passes(scene: Scene) -> tuple[PassSpec, ...]:
+    """The pass that renders maps of shadows; none without opaque objects and light on them."""
+    opaque = indices(scene, lambda item: item.medium is None)
+    views = len(scene.lights) + scene.environment_shadows
+    if not opaque or not views:
+        return ()
+    lights = f"{len(scene.lights)} {'light' if len(scene.lights) == 1 else 'lights'}"
+    sky = f"{scene.environment_shadows} directions of the environment"
+    sources = " and ".join(what for what, there in ((lights, scene.lights), (sky, scene.environment_shadows)) if there)
+    reason = (
+        f"{sources} on {count_of(opaque, 'opaque object', 'opaque objects')}: signed depth from each, as far as the "
+        "first opaque surface, tells the color of its shadow; kept until objects or lights change"
+    )
+    cost = views * (1.0 + SignedDepth.cost_for(spectral=media_differ(scene)))
+    return (PassSpec(PassName.SHADOW_MAPS, reason, tuple(range(len(scene.objects))), views, cost=cost),)
