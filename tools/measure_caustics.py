@@ -18,6 +18,7 @@ import numpy.typing as npt
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.commands.common import read_size
+from translucent.planning.passes import PassName
 
 Array = npt.NDArray[np.floating]
 
@@ -56,14 +57,17 @@ def goblet() -> tl.Scene:
 
 
 def irradiance(renderer: tl.Renderer, scene: tl.Scene, size: tuple[int, int], caustics: tl.Caustics) -> Array:
-    """(h, w, 3): of photons on the ground."""
+    """(h, w, 3): of photons on the ground, as the picture shows it."""
     gpu, plan = renderer.gpu, renderer.plan(scene, caustics=caustics)
+    radiance = []
     with gpu.context.current():
         job = gpu.prepare(scene, size, plan)
-        gpu.run(job)
-        data = job.targets.photons().read(components=4, dtype="f4")
+        for leave_out in ((PassName.CAUSTICS,), ()):
+            gpu.run(job, leave_out=leave_out)
+            data = job.targets.opaque().read(components=4, attachment=1, dtype="f4")
+            radiance.append(np.frombuffer(data, np.float32).reshape(*size[::-1], 4)[::-1, :, :3].astype(np.float64))
         job.release()
-    return np.frombuffer(data, np.float32).reshape(*size[::-1], 4)[::-1, :, :3].astype(np.float64)
+    return (radiance[1] - radiance[0]) * np.pi / np.asarray(GROUND.color)
 
 
 def areas(scene: tl.Scene, size: tuple[int, int]) -> Array:

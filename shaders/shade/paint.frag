@@ -24,6 +24,7 @@ const vec4 vertex_color = vec4(1.0);
 #endif
 
 layout(location = 0) out vec4 paint;
+layout(location = 1) out vec4 receiver_normal;  // unit, to the side that the mesh calls outside
 
 void main() {
 #if SURFACE
@@ -31,6 +32,7 @@ void main() {
     if (finish.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
+    receiver_normal = vec4(normalize(world_normal), 0.0);
     gl_FragDepth = clamp((axial * axial_depth_scale + axial_depth_start - opaque_range.x) * opaque_range.y, 0.0, 1.0);
 #if SURFACE
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;

@@ -5,5 +5,5 @@ flat in vec3 irradiance;
 layout(location = 0) out vec4 out_irradiance;
 
 void main() {
-    out_irradiance = vec4(irradiance, 0.0);
+    out_irradiance = vec4(irradiance, 1.0);
 }

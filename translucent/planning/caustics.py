@@ -14,13 +14,16 @@ MAX_PHOTONS = 1 << 30
 
 @dataclass(frozen=True)
 class Caustics:
-    """Light of point and directional lights that interfaces bend and mirror onto opaque objects, by photons.
+    """Light of lamps and directional lights that interfaces bend and mirror onto opaque objects, by photons.
 
     Photons (Jensen 1996) leave the lights towards the bodies, and are refracted or reflected there by chance, as
     Fresnel says; media absorb on the way. Those that have been bent or mirrored land on the first opaque surface, and
     are drawn as points into the picture of the opaque objects (McGuire & Luebke 2009), each divided by the area that
-    its pixel covers there. Surfaces reflect them diffusely. The energy is right whatever their number; the noise of a
-    pixel falls with its square root. Of several samples of a pixel each follows its part of the photons.
+    its pixel covers there; where there are few, they are spread over some pixels. Surfaces reflect them diffusely. The
+    energy is right whatever their number; the noise of a pixel falls with its square root. Of several samples of a
+    pixel each follows its part of the photons.
+
+    The straight light of lamps ends at solids that bend light (`RenderPlan.opaque_to_shadows`).
 
     Interfaces show caustics behind them wherever the picture shows the receiver without them.
 
