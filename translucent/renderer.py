@@ -218,60 +218,31 @@ class Renderer:
             raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
         self._require_open()
         size = check_size(size)
+        over_backdrop = backdrop is not None and not transparent
+        if over_backdrop:
+            _check_backdrop(backdrop, size)
+        chosen = self.plan(
+            scene,
+            method,
+            over_backdrop=over_backdrop,
+            interfaces=interfaces,
+            scattering=scattering,
+            caustics=caustics,
+            shadows=shadows,
+        )
         try:
-            frame = self._render(
-                scene,
-                size,
-                method,
-                samples,
-                backdrop,
-                transparent=transparent,
-                interfaces=interfaces,
-                scattering=scattering,
-                caustics=caustics,
-                shadows=shadows,
-                progress=progress,
-            )
+            if transparent:
+                frame = self._render_transparent(scene, size, chosen, samples, backdrop, progress)
+            elif backdrop is not None:
+                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
+            else:
+                frame = self._run(scene, size, chosen, samples, progress)
         except BaseException as error:
             self._note_interruption(error)
             raise
         frame.provenance.update(self.provenance)
         _warn(frame)
         return frame
-
-    def _render(
-        self,
-        scene: Scene,
-        size: tuple[int, int],
-        method: Method | None,
-        samples: int,
-        backdrop: Backdrop | TextureBackdrop | None,
-        *,
-        transparent: bool,
-        interfaces: Interfaces | None,
-        scattering: Scattering | None,
-        caustics: Caustics | None,
-        shadows: ShadowMaps | None,
-        progress: Callable[[float], None] | None,
-    ) -> Frame:
-        if transparent or backdrop is None:
-            chosen = self.plan(
-                scene, method, interfaces=interfaces, scattering=scattering, caustics=caustics, shadows=shadows
-            )
-            if transparent:
-                return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
-            return self._run(scene, size, chosen, samples, progress)
-        _check_backdrop(backdrop, size)
-        chosen = self.plan(
-            scene,
-            method,
-            over_backdrop=True,
-            interfaces=interfaces,
-            scattering=scattering,
-            caustics=caustics,
-            shadows=shadows,
-        )
-        return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _run(
         self,
@@ -403,7 +374,7 @@ def _cpu_renderer() -> CpuRenderer:
     return CpuRenderer()
 
 
-def _check_backdrop(backdrop: Backdrop | TextureBackdrop, size: tuple[int, int]) -> None:
+def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int, int]) -> None:
     if not isinstance(backdrop, Backdrop | TextureBackdrop):
         raise InputError(f"backdrop {backdrop!r}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
     if backdrop.size != size:
