@@ -323,6 +323,19 @@ def test_photons_are_the_same_however_many_follow(renderer: tl.Renderer, landed:
     assert (few != other).any()
 
 
+def test_a_frame_that_is_run_again_shows_the_same(renderer: tl.Renderer) -> None:
+    gpu, one = renderer.gpu, scene()
+    plan, pictures = renderer.plan(one, caustics=tl.Caustics(500)), []
+    with gpu.context.current():
+        job = gpu.prepare(one, (16, 12), plan)
+        for _ in range(2):
+            gpu.run(job)
+            pictures.append(job.targets.opaque().read(components=4, attachment=1, dtype="f4"))
+        job.release()
+    assert np.frombuffer(pictures[0], np.float32).max() > 0.0
+    np.testing.assert_allclose(*(np.frombuffer(picture, np.float32) for picture in pictures), rtol=1e-4, atol=1e-6)
+
+
 def test_a_frame_without_caustics_has_no_pass_of_them(renderer: tl.Renderer) -> None:
     frame = renderer.render(scene(), (8, 8))
     assert not frame.plan.has(PassName.CAUSTICS)

@@ -58,8 +58,8 @@ class FrameJob(SceneView):
         Number of the sample that is drawn, from 0, and how many are summed up; 0 of 1 at the pixel centers.
     paths_traced : int
         Random paths of each pixel that have ended so far.
-    photons_followed : int
-        In the samples of the frame so far.
+    averaged : bool
+        The averages have all samples: what is drawn now belongs to the pixel centers, but no picture is read of it.
     report : callable
         Takes the share of the frame's paths that have ended, now and then.
     corner : (int, int)
@@ -87,7 +87,7 @@ class FrameJob(SceneView):
         self.averaging = False
         self.sample, self.samples = 0, 1
         self.paths_traced = 0
-        self.photons_followed = 0
+        self.averaged = False
         self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
         placed = placed or PlacedScene.of(scene)

@@ -49,8 +49,8 @@ class CausticsPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the photons of this sample, and add their light to the opaque objects."""
-        if job.photons_followed and not job.averaging:
-            return  # the averages have all of them, and nothing reads this picture
+        if job.averaged:
+            return
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
         with ExitStack() as stack:
@@ -62,7 +62,6 @@ class CausticsPass:
             for number, aim in enumerate(aims):
                 self._aim(program, aim, number, job)
                 begin, end = (aim.photons * (job.sample + i) // job.samples for i in range(2))
-                job.photons_followed += end - begin
                 for first in range(begin, end, BATCH):
                     count = min(BATCH, end - first)
                     for unit, texture in enumerate(textures):
