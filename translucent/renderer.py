@@ -6,6 +6,7 @@ import dataclasses
 import sys
 import warnings
 from collections.abc import Callable
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeAlias, get_args
 from weakref import WeakKeyDictionary
@@ -18,6 +19,7 @@ from translucent.frames.frame import Frame, check_exposure
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
+from translucent.planning.caustics import Caustics, check_caustics
 from translucent.planning.interface_choice import check_interfaces
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
@@ -45,8 +47,8 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for beside the scene: method, whether there is a backdrop, interfaces, scattering, shadows.
-_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, ShadowMaps | None]
+#: What a plan is made for beside the scene: method, whether there is a backdrop, interfaces, scattering, caustics, shadows.
+_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, Caustics | None, ShadowMaps | None]
 
 
 class Renderer:
@@ -122,6 +124,7 @@ class Renderer:
         over_backdrop: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
@@ -129,10 +132,14 @@ class Renderer:
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         check_interfaces(interfaces)
         check_scattering(scattering)
+        check_caustics(caustics)
         check_shadows(shadows)
+        if over_backdrop and caustics is not None:
+            found = "what is drawn elsewhere has no mesh that light could land on"
+            raise InputError("caustics before a backdrop", found, "leave out one of the two")
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, interfaces, scattering, shadows)) not in plans:
-            make = plan_over_backdrop if over_backdrop else plan
+        if (key := (method, over_backdrop, interfaces, scattering, caustics, shadows)) not in plans:
+            make = plan_over_backdrop if over_backdrop else partial(plan, caustics=caustics)
             plans[key] = make(
                 scene,
                 method,
@@ -154,6 +161,7 @@ class Renderer:
         transparent: bool = False,
         interfaces: Interfaces | None = None,
         scattering: Scattering | None = None,
+        caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
@@ -183,6 +191,9 @@ class Renderer:
         scattering : Diffusion, ScatteringLayer or SingleScattering, optional
             How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
             back, or not at all; None lets the planner pick for each body.
+        caustics : Caustics, optional
+            Photons that carry the light of lamps through interfaces, and by their mirrors, onto opaque objects. None,
+            the default: no caustics.
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional
@@ -198,7 +209,8 @@ class Renderer:
         ------
         InputError
             If the size is not positive, or no method can render the scene; if the backdrop is of another size, or the
-            scene has opaque objects besides it; if interfaces or scattering cannot be had as asked for.
+            scene has opaque objects besides it; if interfaces, scattering or caustics cannot be had
+            as asked for.
         RenderError
             If the frame is larger than this OpenGL allows, or a backdrop is given to a renderer without OpenGL.
         """
@@ -206,50 +218,31 @@ class Renderer:
             raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MAX_SAMPLES}", "give for example 16")
         self._require_open()
         size = check_size(size)
+        over_backdrop = backdrop is not None and not transparent
+        if over_backdrop:
+            _check_backdrop(backdrop, size)
+        chosen = self.plan(
+            scene,
+            method,
+            over_backdrop=over_backdrop,
+            interfaces=interfaces,
+            scattering=scattering,
+            caustics=caustics,
+            shadows=shadows,
+        )
         try:
-            frame = self._render(
-                scene,
-                size,
-                method,
-                samples,
-                backdrop,
-                transparent=transparent,
-                interfaces=interfaces,
-                scattering=scattering,
-                shadows=shadows,
-                progress=progress,
-            )
+            if transparent:
+                frame = self._render_transparent(scene, size, chosen, samples, backdrop, progress)
+            elif backdrop is not None:
+                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
+            else:
+                frame = self._run(scene, size, chosen, samples, progress)
         except BaseException as error:
             self._note_interruption(error)
             raise
         frame.provenance.update(self.provenance)
         _warn(frame)
         return frame
-
-    def _render(
-        self,
-        scene: Scene,
-        size: tuple[int, int],
-        method: Method | None,
-        samples: int,
-        backdrop: Backdrop | TextureBackdrop | None,
-        *,
-        transparent: bool,
-        interfaces: Interfaces | None,
-        scattering: Scattering | None,
-        shadows: ShadowMaps | None,
-        progress: Callable[[float], None] | None,
-    ) -> Frame:
-        if transparent or backdrop is None:
-            chosen = self.plan(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
-            if transparent:
-                return self._render_transparent(scene, size, chosen, samples, backdrop, progress)
-            return self._run(scene, size, chosen, samples, progress)
-        _check_backdrop(backdrop, size)
-        chosen = self.plan(
-            scene, method, over_backdrop=True, interfaces=interfaces, scattering=scattering, shadows=shadows
-        )
-        return self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
 
     def _run(
         self,
@@ -374,7 +367,7 @@ def _cpu_renderer() -> CpuRenderer:
     return CpuRenderer()
 
 
-def _check_backdrop(backdrop: Backdrop | TextureBackdrop, size: tuple[int, int]) -> None:
+def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int, int]) -> None:
     if not isinstance(backdrop, Backdrop | TextureBackdrop):
         raise InputError(f"backdrop {backdrop!r}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
     if backdrop.size != size:

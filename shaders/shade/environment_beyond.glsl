@@ -1,25 +1,7 @@
-// Points of the scene in the picture, and the environment along rays that have left a body. Positions count from the center
-// of the media. Needs <View>, <Surfaces>, background.glsl and environment_light.glsl.
+// The environment along rays that have left a body. Positions count from the center of the media. Needs <View>, <Surfaces>,
+// background.glsl and environment_light.glsl.
 
-// Point at an axial depth on the ray through a pixel.
-vec3 point_at(vec2 pixel, float axial_depth) {
-    vec2 ndc = 2.0 * pixel / frame_size.xy - 1.0;
-    float ahead = surface_ahead.x + axial_depth * surface_ahead.y;
-    float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
-    return ahead * ray_forward.xyz + spread * (ndc.x * surface_right.xyz - ndc.y * surface_up.xyz) - surface_off_axis.xyz;
-}
-
-// Where a point is in the picture: pixels right and down from the top left corner, and axial depth. Behind the eye: outside
-// of it, and nearer than all.
-vec3 seen_at(vec3 point) {
-    float ahead = dot(point, ray_forward.xyz);
-    float spread = surface_right.w == 1.0 ? ahead + surface_ahead.z : 1.0;
-    vec3 aside = point + surface_off_axis.xyz;
-    vec2 ndc = vec2(dot(aside, surface_right.xyz) / dot(surface_right.xyz, surface_right.xyz),
-                    -dot(aside, surface_up.xyz) / dot(surface_up.xyz, surface_up.xyz)) / spread;
-    return spread > 0.0 ? vec3(0.5 * (ndc + 1.0) * frame_size.xy, (ahead - surface_ahead.x) / surface_ahead.y)
-                        : vec3(-1.0, -1.0, -NOTHING);
-}
+#include "shade/in_picture.glsl"
 
 // The squares of a checkerboard, averaged over a box of this width in squares.
 float blurred_checkerboard_share(vec2 at, float tiles, float width) {
@@ -44,20 +26,6 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
     float share = blurred_checkerboard_share(wall.xy / frame_size.y, seen_tiles, heights * seen_tiles);
     return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
 #endif
-}
-
-// The nearest texel: samples aside from the centers of pixels reach past the last ones, where nothing may be fetched.
-ivec2 texel_of(vec2 pixel) {
-    return ivec2(clamp(floor(pixel - frame_size.zw), vec2(0.0), frame_size.xy - 1.0));
-}
-
-bool in_picture(vec2 pixel) {
-    return all(greaterThanEqual(pixel, vec2(0.0))) && all(lessThan(pixel, frame_size.xy));
-}
-
-// Texel of textures that are stored with row 0 at the bottom.
-ivec2 stored(ivec2 texel) {
-    return ivec2(texel.x, int(frame_size.y) - 1 - texel.y);
 }
 
 #if OPAQUE

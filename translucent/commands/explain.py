@@ -22,7 +22,7 @@ from translucent.commands.common import (
     unit_option,
 )
 from translucent.commands.console import echo
-from translucent.commands.method_options import paths_option, read_method
+from translucent.commands.method_options import caustics_option, paths_option, read_caustics, read_method
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 @paths_option
 @interface_options
 @scattering_options
+@caustics_option
 @common_options
 def explain(
     model: str,
@@ -61,6 +62,7 @@ def explain(
     interface_forks: int | None,
     scattering_name: str | None,
     diffusion_resolution: int | None,
+    caustics: int | None,
     as_json: bool,
 ) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
@@ -75,7 +77,10 @@ def explain(
     method = read_method(method_name, None, paths)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     scattering = read_scattering(scattering_name, diffusion_resolution)
-    chosen = plan(scene, method, interfaces=interfaces, scattering=scattering) if scene.bodies else None
+    asked = read_caustics(caustics)
+    chosen = None
+    if scene.bodies:
+        chosen = plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=asked)
     if as_json:
         echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):

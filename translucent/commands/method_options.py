@@ -10,6 +10,7 @@ import click
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
+    from translucent.planning.caustics import Caustics
     from translucent.planning.methods import Method
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -40,6 +41,22 @@ def paths_option(command: F) -> F:
     """Option for the number of random paths."""
     told = "Of --method path-traced: random paths of each pixel. Default: 64. Four times as many halve the noise."
     return click.option("--paths", type=int, metavar="N", help=told)(command)
+
+
+def caustics_option(command: F) -> F:
+    """Option for photons from lights through interfaces onto opaque objects."""
+    told = (
+        "Let N photons carry the light of lamps through interfaces onto opaque objects. Default: none; without N: a "
+        "million. Four times as many halve the noise."
+    )
+    return click.option("--caustics", type=int, is_flag=False, flag_value=1_000_000, metavar="[N]", help=told)(command)
+
+
+def read_caustics(photons: int | None) -> Caustics | None:
+    """Caustics by so many photons, if any are asked for."""
+    from translucent.planning.caustics import Caustics
+
+    return None if photons is None else Caustics(photons)
 
 
 def read_method(name: str | None, thickness: str | None, paths: int | None = None) -> Method | None:

@@ -29,7 +29,13 @@ from translucent.commands.common import (
 )
 from translucent.commands.console import echo
 from translucent.commands.darkness import warn_if_black
-from translucent.commands.method_options import method_option, paths_option, read_method
+from translucent.commands.method_options import (
+    caustics_option,
+    method_option,
+    paths_option,
+    read_caustics,
+    read_method,
+)
 from translucent.commands.model import (
     DEFAULT_FOV,
     DEFAULT_UP,
@@ -67,6 +73,7 @@ from translucent.errors import InputError
 @paths_option
 @interface_options
 @scattering_options
+@caustics_option
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -113,6 +120,7 @@ def render(
     interface_forks: int | None,
     scattering_name: str | None,
     diffusion_resolution: int | None,
+    caustics: int | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -143,6 +151,9 @@ def render(
     if stage not in (None, NO_STAGE) and opaque_with is not None:
         raise InputError(f"--stage {stage}", "--opaque-with, which throws no such shadows", "leave out one of the two")
     scattering = read_scattering(scattering_name, diffusion_resolution)
+    photons = read_caustics(caustics)
+    if photons is not None and opaque_with is not None:
+        raise InputError("--caustics", "--opaque-with, which draws what light lands on", "leave out one of the two")
     pictures = Pictures(output, exposure, tone or "none", turntable, fps, aov)
     pictures.check()
     refuse_overwriting(output, model, environment, background)
@@ -168,6 +179,7 @@ def render(
             transparent=transparent,
             interfaces=interfaces,
             scattering=scattering,
+            caustics=photons,
             progress=Progress(f"path tracing on {renderer.provenance.get('renderer', 'the CPU')}"),
         )
         if opaque_with is not None:

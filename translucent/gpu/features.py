@@ -99,6 +99,11 @@ class FrameFeatures:
         return self.plan.has(PassName.PATH_TRACE)
 
     @property
+    def has_caustics(self) -> bool:
+        """Whether photons light opaque objects."""
+        return self.plan.has(PassName.CAUSTICS)
+
+    @property
     def finds_exits(self) -> bool:
         """Whether the intervals give each ray's first exit from all bodies: touching interfaces need it."""
         return self.has_surfaces and self.plan.method.finds_exits

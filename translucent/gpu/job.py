@@ -58,6 +58,8 @@ class FrameJob(SceneView):
         Number of the sample that is drawn, from 0, and how many are summed up; 0 of 1 at the pixel centers.
     paths_traced : int
         Random paths of each pixel that have ended so far.
+    averaged : bool
+        The averages have all samples: what is drawn now belongs to the pixel centers, but no picture is read of it.
     report : callable
         Takes the share of the frame's paths that have ended, now and then.
     corner : (int, int)
@@ -88,6 +90,7 @@ class FrameJob(SceneView):
         self.averaging = False
         self.sample, self.samples = 0, 1
         self.paths_traced = 0
+        self.averaged = False
         self.report: Callable[[float], None] = lambda share: None
         self.features = FrameFeatures(scene, plan)
         placed = placed or PlacedScene.of(scene)
@@ -203,6 +206,6 @@ def _contents(
         LIGHTS: light_uniforms(scene, shine),
         ENVIRONMENT: environment_uniforms(scene.environment),
     }
-    if features.has_surfaces or features.path_traced:
+    if features.has_surfaces or features.path_traced or features.has_caustics:
         contents[SURFACES] = surface_uniforms(placed, size)
     return contents

@@ -289,7 +289,7 @@ class GpuRenderer:
             job.sample, job.samples = number, samples
             job.place((right, down))
             self._run_passes(job)
-        job.averaging, job.sample, job.samples = False, 0, 1
+        job.averaging, job.averaged, job.sample, job.samples = False, True, 0, 1
         job.place((0.0, 0.0))
 
 

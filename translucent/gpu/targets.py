@@ -37,6 +37,18 @@ class Targets:
         """R32F depth and RGBA32F radiance of the nearest opaque surface, with a depth buffer."""
         return self._get("opaque", (1, 4), with_depth=True)
 
+    def paint(self) -> moderngl.Framebuffer:
+        """RGBA32F share of light that the nearest opaque surface reflects diffusely, and its normal; depth buffer."""
+        return self._get("paint", (4, 4), with_depth=True)
+
+    def photons(self) -> moderngl.Framebuffer:
+        """RGBA32F irradiance of photons on the nearest opaque surface, and how many there are."""
+        return self._get("photons", (4,))
+
+    def photon_spread(self) -> moderngl.Framebuffer:
+        """RG32F: how far the photons of a pixel are spread, and the share that each pixel gets."""
+        return self._get("photon_spread", (2,))
+
     def opaque_ends(self) -> moderngl.Framebuffer:
         """Framebuffer `opaque` without radiance."""
         if ("opaque", 0) not in self._views:

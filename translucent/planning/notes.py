@@ -34,6 +34,7 @@ class NoteKind(StrEnum):
     DIMMED_AMBIENT = "dimmed ambient"
     UNUSED_LIGHTS = "unused lights"
     SHADOWS = "shadows"
+    CAUSTICS = "caustics"
     REFRACTION = "refraction"
     TOUCHING_INTERFACES = "touching interfaces"
     LATER_REFRACTION = "later refraction"

@@ -13,6 +13,7 @@ class PassName(StrEnum):
     SHADOW_MAPS = "shadow_maps"
     OPAQUE = "opaque"
     BACKDROP = "backdrop"
+    CAUSTICS = "caustics"
     SIGNED_DEPTH = "signed_depth"
     SIGNED_DEPTH_FALLBACK = "signed_depth_fallback"
     THIN_LAYER = "thin_layer"

@@ -8,6 +8,8 @@ from translucent.errors import InputError
 from translucent.media.given_back import DiffusedVolume
 from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
+from translucent.planning.caustic_plan import with_caustics
+from translucent.planning.caustics import Caustics, check_caustics
 from translucent.planning.effects import unmodelled_effects, with_ambient_told, with_given_back_told
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
@@ -40,6 +42,7 @@ def plan(
     *,
     interfaces: Interfaces | None = None,
     scattering: Scattering | None = None,
+    caustics: Caustics | None = None,
     shadows: ShadowMaps | None = None,
 ) -> RenderPlan:
     """Choose the passes for a scene.
@@ -55,16 +58,22 @@ def plan(
         How to find the interfaces at which light refracts and reflects; None lets the planner pick.
     scattering : Diffusion, ScatteringLayer or SingleScattering, optional
         How to show light that media scatter more than once; None lets the planner pick.
+    caustics : Caustics, optional
+        Photons from the lights through interfaces onto opaque objects; None for none.
     shadows : ShadowMaps, optional
         How to find shadows on opaque objects; a renderer without OpenGL traces them. Default: `ShadowMaps()`.
 
     Raises
     ------
     InputError
-        If no available method can render the scene, or not with interfaces, scattering or shadows as asked for.
+        If no available method can render the scene, or not with interfaces, scattering, caustics or shadows as asked
+        for.
     """
+    check_caustics(caustics)
     check_shadows(shadows)
     chosen = _plan(scene, method, capabilities, interfaces, scattering)
+    if caustics is not None:
+        chosen = with_caustics(chosen, scene, caustics, method, capabilities or Capabilities())
     if chosen.traced:
         return chosen
     passes = (*shadow_passes(scene), *chosen.passes)

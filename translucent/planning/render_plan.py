@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from translucent.planning.caustics import Caustics
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method, PathTraced
 from translucent.planning.notes import Note, NoteKind
@@ -57,6 +58,11 @@ class RenderPlan:
         then: whether bodies are sheets.
     paths : PathTraced, optional
         The random paths that make the radiance, in place of interfaces and of what is given back; None where none do.
+    caustics : Caustics, optional
+        The photons that land on opaque objects; None where none do.
+    opaque_to_shadows : frozenset of int
+        Numbers of the objects through which no straight light of lamps falls onto others, since photons carry what
+        their interfaces bend.
     shadows : ShadowMaps
         How shadows on opaque objects are found, if the plan has the pass.
     """
@@ -70,6 +76,8 @@ class RenderPlan:
     given_back: GivenBack = NOTHING_GIVEN_BACK
     traced: bool = False
     paths: PathTraced | None = None
+    caustics: Caustics | None = None
+    opaque_to_shadows: frozenset[int] = frozenset()
     shadows: ShadowMaps = field(default_factory=ShadowMaps)
 
     @property
@@ -118,6 +126,7 @@ class RenderPlan:
             "exact": self.exact,
             "interfaces": None if self.interfaces is None else str(self.interfaces),
             "given_back": str(self.given_back) if self.given_back else None,
+            "caustics": None if self.caustics is None else str(self.caustics),
             "cost": round(self.cost, 2),
             "passes": [
                 {

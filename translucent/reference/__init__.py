@@ -1,9 +1,11 @@
-"""Ground truth in float64 on the CPU, independent of any GPU: `render`, `march` and `path_trace`."""
+"""Ground truth in float64 on the CPU, independent of any GPU: `render`, `march`, `path_trace` and
+`trace_photons`."""
 
 from translucent.reference.hits import Hits, camera_hits, line_hits
 from translucent.reference.intervals import Intervals
 from translucent.reference.march import march
 from translucent.reference.path_trace import path_trace
+from translucent.reference.photons import LandedPhotons, photon_irradiance, trace_photons
 from translucent.reference.rays import Rays, pixel_rays
 from translucent.reference.refraction import refracted_light
 from translucent.reference.render import hit_counts, opaque_counts, render, shade_hits
@@ -14,6 +16,7 @@ __all__ = [
     "SHEET_ON_OPAQUE",
     "Hits",
     "Intervals",
+    "LandedPhotons",
     "Rays",
     "camera_hits",
     "hit_counts",
@@ -22,9 +25,11 @@ __all__ = [
     "march",
     "opaque_counts",
     "path_trace",
+    "photon_irradiance",
     "pixel_rays",
     "refracted_light",
     "render",
     "shade_hits",
     "sheet_thicknesses",
+    "trace_photons",
 ]

@@ -9,6 +9,7 @@ import moderngl
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.back_face_depth import BackFaceDepthPass
 from translucent.gpu.passes.backdrop import BackdropPass
+from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
 from translucent.gpu.passes.interfaces import InterfacesPass
@@ -47,6 +48,7 @@ PASSES: dict[PassName, type[Pass]] = {
     PassName.SHADOW_MAPS: ShadowMapsPass,
     PassName.OPAQUE: OpaquePass,
     PassName.BACKDROP: BackdropPass,
+    PassName.CAUSTICS: CausticsPass,
     PassName.LIGHT_VIEWS: LightViewsPass,
     PassName.DEPTH_PEELING: DepthPeelingPass,
     PassName.FRAGMENT_LISTS: FragmentListsPass,

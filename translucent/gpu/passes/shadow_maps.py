@@ -29,6 +29,7 @@ from translucent.gpu.shadow_atlas import ShadowView, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
+from translucent.media.medium import Medium
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.paths import straight_scene
@@ -36,11 +37,14 @@ from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight
-from translucent.scene.scene import Light, Scene
+from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
 #: First OpenGL version in which shaders write to buffers.
 _SHADER_STORAGE = 430
+
+#: Optical depth across a body whose light photons carry.
+_DENSE = 1e4
 
 _BLACK = Environment.constant((0.0, 0.0, 0.0))
 
@@ -135,21 +139,23 @@ class ShadowMapsPass:
         )
         # Where all bodies are drawn as sheets, these throw the shadows, too.
         method = job.plan.method if job.plan.method.makes_sheets else None
-        everything = self._planned(scene, method, opaque=True)
-        bodies = (
-            self._planned(scene, method, opaque=False)
-            if any(found.open_ways for found in (*lights, *sky))
-            else everything
-        )
+        dark = _darkened(scene, job.plan.opaque_to_shadows)
+        everything = self._planned(dark, method, opaque=True)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
-        atlas.make(views, spectral=everything[1].spectral or not in_place)
+        spectral = everything[1].spectral or not in_place or dark is not scene
+        atlas.make(views, spectral=spectral)
         center = media_center(scene)
+        found_plans = {(True, dark is scene): everything}
         for view in views:
             if view.size not in self._targets:
                 self._targets[view.size] = Targets(self._gl, (view.size, view.size))
-            # Where no opaque object is in the way, none has to be drawn.
-            seen, chosen = everything if view.ends else bodies
+            # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
+            clear = dark is scene or view in views.sky
+            if (key := (view.ends, clear)) not in found_plans:
+                found_plans[key] = self._planned(scene if clear else dark, method, opaque=view.ends)
+            seen, chosen = found_plans[key]
+            chosen = replace(chosen, spectral=spectral)
             before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
             if in_place:
                 self._add_up(MapJob(self._gl, *before, view, center))
@@ -217,6 +223,19 @@ _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass 
 }
 
 
+def _darkened(scene: Scene, opaque: frozenset[int]) -> Scene:
+    """The scene with these of its bodies so dense that no light passes; the scene itself if there are none."""
+    if not opaque:
+        return scene
+
+    def dense(body: Object) -> Object:
+        return replace(
+            body, medium=Medium(_DENSE / float(np.linalg.norm(body.bounds[1] - body.bounds[0]))), surface=None
+        )
+
+    return replace(scene, objects=[dense(body) if i in opaque else body for i, body in enumerate(scene.objects)])
+
+
 def _sky_lights(scene: Scene) -> list[Light]:
     """Lights from the directions of the environment that throw shadows."""
     if not scene.environment_shadows:
@@ -244,4 +263,4 @@ def _seen(job: FrameJob) -> object:
     lights = tuple(light_key(light) for light in scene.lights)
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
     sheets = job.plan.method if job.plan.method.makes_sheets else None
-    return objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size
+    return objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows

@@ -1,0 +1,9 @@
+// One photon; blending adds them up.
+
+flat in vec3 irradiance;
+
+layout(location = 0) out vec4 out_irradiance;
+
+void main() {
+    out_irradiance = vec4(irradiance, 1.0);
+}

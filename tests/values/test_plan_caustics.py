@@ -1,0 +1,90 @@
+"""Plans with caustics: where photons come, what they leave out, which bodies stop straight light, what is refused."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+import translucent as tl
+from translucent.geometry.solids import Box
+from translucent.planning.notes import NoteKind
+from translucent.planning.passes import PassName
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities
+
+CLEAR = tl.Medium(1.0, ior=1.5)
+SUN = tl.DirectionalLight((0, -1, 0), 1.0)
+FEW = tl.Caustics(photons=1000)
+
+
+def body(medium: tl.Medium | None = CLEAR, x: float = 0.0, **options: Any) -> tl.Object:
+    return tl.Object(Box((x, 0, 0), (x + 1, 1, 1)).tessellate(), medium, **options)
+
+
+def scene(*objects: tl.Object, lights: Any = (SUN,), **options: Any) -> tl.Scene:
+    given = objects or (body(), body(None, 3.0))
+    return tl.Scene(given, tl.Camera.look_at((0.5, 0.5, 9), (0.5, 0.5, 0)), lights, **options)
+
+
+def test_photons_land_on_the_picture_of_what_is_opaque() -> None:
+    found = plan(scene(), caustics=FEW)
+    assert [step.name for step in found.passes][:3] == [PassName.SHADOW_MAPS, PassName.OPAQUE, PassName.CAUSTICS]
+    assert "1,000 photons from 1 light through 'box'" in found.passes[2].reason
+    assert found.cost - plan(scene()).cost == pytest.approx(FEW.cost_of_a_million * 1e-3)
+    assert (found.caustics, found.summary()["caustics"]) == (FEW, "Caustics(photons=1000, seed=0)")
+    notes = [str(note) for note in found.unmodelled if note.kind is NoteKind.CAUSTICS]
+    assert notes[0] == "caustics of light of the environment"
+    assert len(notes) == 2
+    milk = plan(scene(body(tl.Medium(1.0, 50.0, ior=1.4)), body(None, 3.0)), caustics=FEW)
+    assert "caustics in media that scatter" in str(milk)
+
+
+def test_nobody_gets_caustics_unasked() -> None:
+    found = plan(scene())
+    assert not found.has(PassName.CAUSTICS)
+    assert (found.caustics, found.opaque_to_shadows, found.summary()["caustics"]) == (None, frozenset(), None)
+
+
+def test_what_bends_light_stops_it_on_its_straight_way() -> None:
+    """Solids alone: sheets let light straight through, and so does what has the index of air."""
+    tinted = body(tl.Medium(1.0), 4.0, surface=tl.Surface(color=(1.0, 0.5, 0.5)))
+    one = scene(body(None, 3.0), body(), body(x=2.0, sheet_thickness=1e-3), tinted)
+    assert plan(one, caustics=FEW).opaque_to_shadows == {1}
+
+
+@pytest.mark.parametrize(
+    ("one", "options", "message"),
+    [
+        (scene(lights=()), {}, "caustics; the scene has no lights; add a tl.PointLight or tl.DirectionalLight"),
+        (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
+        (scene(body()), {}, "caustics; no opaque object that light could land on; add a ground"),
+        (scene(), {"method": tl.PathTraced()}, "leave out one of the two"),
+        (scene(), {"method": tl.ThinLayer()}, "it takes every face for a sheet, which bends nothing"),
+        (scene(), {"capabilities": Capabilities(opengl=False)}, "this renderer works on the CPU; use tl.reference"),
+        (
+            scene(body(density=tl.LinearDensity(1, 0.0, 1.0)), body(None, 3.0)),
+            {},
+            "the density of 'box' varies",
+        ),
+        (
+            scene(body(sheet_thickness=1e-3, surface=tl.Surface(roughness=0.5)), body(None, 3.0)),
+            {},
+            "'box': a sheet that is rough; give it an inside",
+        ),
+    ],
+)
+def test_scenes_that_no_photon_could_light_are_refused(one: tl.Scene, options: Any, message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        plan(one, caustics=FEW, **options)
+
+
+@pytest.mark.parametrize("photons", [0, -1, 10**12, 1e6, True, "many"])
+def test_numbers_of_photons_that_make_no_sense_are_refused(photons: Any) -> None:
+    with pytest.raises(tl.InputError, match=r"Caustics photons .*; not a whole number in 1 to 1073741824"):
+        tl.Caustics(photons)
+    with pytest.raises(tl.InputError, match=r"caustics 7; not tl.Caustics; give for example tl.Caustics"):
+        plan(scene(), caustics=7)  # type: ignore[arg-type]
+    with pytest.raises(tl.InputError, match="Caustics seed -1"):
+        tl.Caustics(seed=-1)
