@@ -47,7 +47,7 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for beside the scene: method, whether there is a backdrop, interfaces, scattering, caustics, shadows.
+#: What a plan is made for beside the scene: method, whether over a backdrop, interfaces, scattering, caustics, shadows.
 _Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, Caustics | None, ShadowMaps | None]
 
 

@@ -17,11 +17,12 @@ from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.densities import density_uniforms, scene_grids
 from translucent.gpu.diffusion import DiffusedLight
 from translucent.gpu.features import FrameFeatures
-from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES, UniformBlock
+from translucent.gpu.layout import DENSITY, ENVIRONMENT, LIGHTS, MEDIA, SCATTER, SHADE, SURFACES
 from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import PlacedScene, SampleView, depth_range
 from translucent.gpu.resources import Resources
 from translucent.gpu.scene_view import SceneView
+from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import (
     LightLookup,

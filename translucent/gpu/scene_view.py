@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import moderngl
 
 from translucent.gpu.body_uniforms import BodyRole
-from translucent.gpu.layout import UniformBlock
 from translucent.gpu.placement import PlacedScene
 from translucent.gpu.resources import Resources
+from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniform_buffers import UniformBuffers
 

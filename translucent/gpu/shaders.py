@@ -12,7 +12,8 @@ import moderngl
 from translucent.assets import shader_path
 from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
+from translucent.gpu.layout import BLOCKS, TABLES
+from translucent.gpu.std140 import PackedTable, UniformBlock
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
 _CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import moderngl
 
 from translucent.gpu.body_uniforms import BodyRole, body_uniforms
-from translucent.gpu.layout import BODY, VIEW, UniformBlock
+from translucent.gpu.layout import BODY, VIEW
 from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.uniforms import media_center, view_uniforms
 
 #: Offsets of uniform buffer ranges must be multiples of this on every driver in use.

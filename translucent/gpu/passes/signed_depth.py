@@ -14,10 +14,16 @@ class SignedDepthPass:
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/body.vert", "thickness/signed_depth.frag", opaque_axial_depth=0)
+        self._paths = Variants(gl, "geometry/body.vert", "thickness/signed_path.frag", opaque_axial_depth=0)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the bodies."""
         job.begin_adding(spec.target)
         job.bind_opaque(0)
-        switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.features.has_opaque, "PATH_ONLY": job.path_only}
-        job.draw(self._variants.program(WITH_NORMAL=0, WITH_POSITION=0, **switches), spec.objects)
+        switches = {"WITH_NORMAL": False, "WITH_POSITION": False, "OPAQUE": job.features.has_opaque}
+        program = (
+            self._paths.program(**switches)
+            if job.path_only
+            else self._variants.program(SPECTRAL=job.plan.spectral, **switches)
+        )
+        job.draw(program, spec.objects)
