@@ -143,3 +143,19 @@ def test_thickness_needs_no_stage() -> None:
 def test_mistakes_are_told(run: Run, tmp_path: Path, options: tuple[str, ...], message: str) -> None:
     assert message in one_error_line(run("render", "bear", "-o", str(tmp_path / "a.png"), *options))
     assert not list(tmp_path.iterdir())
+
+
+def test_shadows_have_the_size_and_number_asked_for(run: Run, tmp_path: Path) -> None:
+    told = run("explain", "soap", "--environment-shadows", 5, "--shadow-size", 256, "--json").out
+    assert "5 directions of the environment" in json.loads(told)["plan"]["passes"][0]["reason"]
+    none = run("explain", "soap", "--stage", "none", "--json").out
+    assert "shadow_maps" not in [step["name"] for step in json.loads(none)["plan"]["passes"]]
+    output = tmp_path / "soap.npz"
+    assert run("render", "soap", "-o", output, "--size", "8x8", "--samples", 1, "--shadow-size", 64).code == 0
+    for option, message in (
+        (("--shadow-size", 9), "ShadowMaps size 9; not a whole number in 64 to 8192"),
+        (("--environment-shadows", -1), "environment_shadows -1; not a whole number in 0 to 256"),
+    ):
+        refused = run("render", "soap", "-o", output, *option)
+        assert refused.code == 2
+        assert message in refused.err

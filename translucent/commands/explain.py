@@ -22,7 +22,15 @@ from translucent.commands.common import (
     unit_option,
 )
 from translucent.commands.console import echo
-from translucent.commands.method_options import caustics_option, paths_option, read_caustics, read_method
+from translucent.commands.method_options import (
+    caustics_option,
+    paths_option,
+    read_caustics,
+    read_method,
+    read_shadows,
+    shadow_options,
+    with_environment_shadows,
+)
 from translucent.commands.model import is_scene_file, medium_lines, read_scene
 
 if TYPE_CHECKING:
@@ -43,6 +51,7 @@ if TYPE_CHECKING:
 @interface_options
 @scattering_options
 @caustics_option
+@shadow_options
 @common_options
 def explain(
     model: str,
@@ -63,6 +72,8 @@ def explain(
     scattering_name: str | None,
     diffusion_resolution: int | None,
     caustics: int | None,
+    shadow_size: int | None,
+    environment_shadows: int | None,
     as_json: bool,
 ) -> None:
     """Say what is known about MODEL, which passes would render it, and why.
@@ -74,13 +85,14 @@ def explain(
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(None, preset_name)
     scene = read_scene(model, unit, medium, roughness=roughness, stage=stage, allow_outside=allow_outside)
+    scene = with_environment_shadows(scene, environment_shadows)
     method = read_method(method_name, None, paths)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     scattering = read_scattering(scattering_name, diffusion_resolution)
-    asked = read_caustics(caustics)
+    asked, shadows = read_caustics(caustics), read_shadows(shadow_size)
     chosen = None
     if scene.bodies:
-        chosen = plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=asked)
+        chosen = plan(scene, method, interfaces=interfaces, scattering=scattering, caustics=asked, shadows=shadows)
     if as_json:
         echo(json.dumps({**_summary(model, scene), "plan": None if chosen is None else chosen.summary()}))
     elif is_scene_file(model):

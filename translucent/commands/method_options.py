@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -12,6 +13,8 @@ from translucent.errors import InputError
 if TYPE_CHECKING:
     from translucent.planning.caustics import Caustics
     from translucent.planning.methods import Method
+    from translucent.planning.shadow_maps import ShadowMaps
+    from translucent.scene.scene import Scene
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,6 +53,31 @@ def caustics_option(command: F) -> F:
         "million. Four times as many halve the noise."
     )
     return click.option("--caustics", type=int, is_flag=False, flag_value=1_000_000, metavar="[N]", help=told)(command)
+
+
+def shadow_options(command: F) -> F:
+    """Options for shadows on opaque objects."""
+    command = click.option(
+        "--environment-shadows",
+        type=int,
+        metavar="N",
+        help="Directions of the environment that throw shadows onto opaque objects, 0 to 256. Default: 32 on a stage, "
+        "else none.",
+    )(command)
+    told = "Texels along a side of each light's map of shadows, 64 to 8192. Default: 1024. More make edges sharper."
+    return click.option("--shadow-size", type=int, metavar="N", help=told)(command)
+
+
+def read_shadows(size: int | None) -> ShadowMaps | None:
+    """Maps of shadows of this size, if one is asked for."""
+    from translucent.planning.shadow_maps import ShadowMaps
+
+    return None if size is None else ShadowMaps(size)
+
+
+def with_environment_shadows(scene: Scene, count: int | None) -> Scene:
+    """Scene with so many directions of the environment that throw shadows, if a number is given."""
+    return scene if count is None else replace(scene, environment_shadows=count)
 
 
 def read_caustics(photons: int | None) -> Caustics | None:

@@ -35,6 +35,9 @@ from translucent.commands.method_options import (
     paths_option,
     read_caustics,
     read_method,
+    read_shadows,
+    shadow_options,
+    with_environment_shadows,
 )
 from translucent.commands.model import (
     DEFAULT_FOV,
@@ -74,6 +77,7 @@ from translucent.errors import InputError
 @interface_options
 @scattering_options
 @caustics_option
+@shadow_options
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
@@ -121,6 +125,8 @@ def render(
     scattering_name: str | None,
     diffusion_resolution: int | None,
     caustics: int | None,
+    shadow_size: int | None,
+    environment_shadows: int | None,
     thickness: str | None,
     samples: int,
     opaque_with: str | None,
@@ -167,6 +173,7 @@ def render(
     scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, allow_outside=allow_outside)
     if tone is None and len(scene.shown) < len(scene.objects):
         pictures = pictures._replace(tone=STAGED_TONE)
+    scene = with_environment_shadows(scene, environment_shadows)
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)
@@ -180,6 +187,7 @@ def render(
             interfaces=interfaces,
             scattering=scattering,
             caustics=photons,
+            shadows=read_shadows(shadow_size),
             progress=Progress(f"path tracing on {renderer.provenance.get('renderer', 'the CPU')}"),
         )
         if opaque_with is not None:
