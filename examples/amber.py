@@ -22,7 +22,7 @@ resin = tl.Medium.from_color((0.93, 0.46, 0.06), distance=0.02, ior=1.54)
 amber = tl.Object(tl.load_mesh(mesh_path("amber")), resin, turned)
 
 camera = tl.Camera.look_at((0.0, 0.06, 0.15), (0.0, 0.0145, 0.0), fov_y=24.0)
-scene = tl.Scene([amber], camera, environment=tl.Environment.studio())
+scene = tl.staged(tl.Scene([amber], camera))  # on a ground, with soft boxes to mirror
 
 width = int(os.environ.get("EXAMPLE_WIDTH", "960"))
 with tl.Renderer() as renderer:

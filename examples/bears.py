@@ -33,7 +33,7 @@ for color, position, angle in zip(colors, positions, np.radians(angles), strict=
 # only the order tells where a ray leaves both, so the planner sorts; with ``ior=1`` it would take one unsorted pass.
 
 camera = tl.Camera.look_at((0.0, 0.03, 0.09), (0.0, 0.0092, 0.0), fov_y=24.0)
-scene = tl.Scene(bears, camera, environment=tl.Environment.studio())
+scene = tl.staged(tl.Scene(bears, camera))
 
 width = int(os.environ.get("EXAMPLE_WIDTH", "960"))
 with tl.Renderer() as renderer:

@@ -27,11 +27,10 @@ polish = tl.Surface(roughness=0.18)
 bangle = tl.Object(tl.load_mesh(mesh_path("bangle")), stone, transform=leaning, surface=polish)
 
 camera = tl.Camera.look_at((0.02, 0.09, 0.24), (0.0, 0.036, 0.0), fov_y=24.0)
-sun = tl.DirectionalLight((0.5, -0.4, 0.9), irradiance=1.2)
-scene = tl.Scene([bangle], camera, [sun], tl.Environment.studio())
+scene = tl.staged(tl.Scene([bangle], camera))
 
 # %%
-# Light that enters from the studio and the sun spreads in the stone, and leaves elsewhere: shadows are soft and green.
+# Light that enters from the studio spreads in the stone, and leaves elsewhere: shadows are soft and green.
 # It is solved for before the first picture; further ones, from elsewhere, only look it up.
 
 width = int(os.environ.get("EXAMPLE_WIDTH", "960"))

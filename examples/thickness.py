@@ -14,7 +14,7 @@ from translucent.assets import mesh_path
 jade = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
 width = int(os.environ.get("EXAMPLE_WIDTH", "640"))
 size = (width, 3 * width // 4)
-scene = tl.showcase(tl.load_mesh(mesh_path("knot")), jade, size=size)
+scene = tl.showcase(tl.load_mesh(mesh_path("knot")), jade, size=size, stage="none")
 with tl.Renderer() as renderer:
     frame = renderer.render(scene, size)
 print(frame.plan)

@@ -30,7 +30,7 @@ scene = tl.Scene([tl.Object(mesh, glass)], camera, environment=tl.Environment.co
 SCENES = {
     "absorbing": """
 size = (512, 512)
-scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 0.3, 0.2), 0.01), size)
+scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 0.3, 0.2), 0.01), size, stage="none")
 """,
     "glass": _BEAR.format(target="center"),
     "empty": _BEAR.format(target="2 * eye - center"),

@@ -47,7 +47,7 @@ def throughput(
         that tried all faces, since what Embree had found was not proved to be all.
     """
     threads = threads or processors()
-    scene = showcase(mesh, size=size)
+    scene = showcase(mesh, size=size, stage="none")
     (body,) = scene.objects
     picture = Picture.of(scene.camera, size)
     tracer = Tracer(TracedMesh.of(mesh), body, picture)

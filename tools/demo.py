@@ -9,6 +9,8 @@ from pathlib import Path
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.frames.metrics import interior
+from translucent.scene.showcase import framing
+from translucent.scene.stages import stage_named
 
 SIZE = (960, 720)
 OUT = Path("out")
@@ -21,11 +23,10 @@ PICTURES = {
 
 
 def scene_of(bodies: list[tuple[str, str]]) -> tl.Scene:
-    """The bodies, framed together, in a studio."""
+    """The bodies, framed together for a studio."""
     meshes = [tl.load_mesh(mesh_path(name)) for name, _ in bodies]
-    stage = tl.showcase(max(meshes, key=lambda mesh: mesh.diagonal), size=SIZE)
     objects = [tl.Object(mesh, medium=tl.preset(name).medium) for mesh, (_, name) in zip(meshes, bodies, strict=True)]
-    return tl.Scene(objects, stage.camera, environment=tl.Environment.studio())
+    return tl.Scene(objects, framing(objects, SIZE, stage=stage_named("studio")))
 
 
 def main() -> int:
@@ -40,7 +41,7 @@ def main() -> int:
         for name, bodies in PICTURES.items():
             scene = scene_of(bodies)
             path = OUT / f"{name}.png"
-            renderer.render(scene, SIZE, samples=8).save(path, tone="neutral")
+            renderer.render(tl.staged(scene), SIZE, samples=8).save(path, tone="neutral")
             frame = renderer.render(
                 scene, SIZE
             )  # once more at one sample: shaders are compiled, and rays are the reference's

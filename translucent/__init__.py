@@ -92,6 +92,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.scene import Object as Object
     from translucent.scene.scene import Scene as Scene
     from translucent.scene.showcase import showcase as showcase
+    from translucent.scene.staging import staged as staged
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
 
@@ -138,6 +139,7 @@ _NAMES = {
     "scene.lights": "DirectionalLight PointLight SpotLight",
     "scene.scene": "Object Scene",
     "scene.showcase": "showcase",
+    "scene.staging": "staged",
     "scene.surface": "Surface",
     "scene.texture": "Texture",
 }

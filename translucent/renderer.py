@@ -31,8 +31,8 @@ from translucent.planning.scattering.choice import check_scattering
 from translucent.planning.shadow_maps import ShadowMaps, check_shadows
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
-from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
+from translucent.scene.shadow_catchers import before_page, page_radiance
 from translucent.version import VERSION
 
 if TYPE_CHECKING:
@@ -183,7 +183,8 @@ class Renderer:
         transparent : bool
             Leave out the environment as far as it is seen behind everything, and give the frame an `alpha`; it still
             lights, and is mirrored. Costs a second rendering: alpha is one minus the difference between frames before
-            white and before black (Smith & Blinn 1996).
+            white and before black (Smith & Blinn 1996). Of shadow catchers, such as the ground of a stage, no more is
+            seen than what their shadows take from what is behind.
         interfaces : TracedInterfaces, ScreenInterfaces or FrontInterface, optional
             How to find the interfaces at which light refracts and reflects: by rays through the meshes, drawn in screen
             space, or drawn where rays enter alone; None lets the planner pick. Thickness, optical depth and
@@ -268,20 +269,13 @@ class Renderer:
     ) -> Frame:
         if backdrop is not None:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
+        white = page_radiance(scene)
         before_black, before_white = (
-            self._run(
-                dataclasses.replace(
-                    scene, environment=scene.environment.with_background(Environment.constant((level,) * 3))
-                ),
-                size,
-                chosen,
-                samples,
-                progress,
-            )
-            for level in (0.0, 1.0)
+            self._run(before_page(scene, level), size, chosen, samples, progress) for level in (0.0, white)
         )
-        behind = np.mean(before_white.radiance.astype(np.float64) - before_black.radiance, axis=-1)
-        return dataclasses.replace(before_black, alpha=(1.0 - np.clip(behind, 0.0, 1.0)).astype(np.float32))
+        passed = np.clip((before_white.radiance.astype(np.float64) - before_black.radiance) / white, 0.0, 1.0)
+        alpha = 1.0 - passed.mean(axis=-1)
+        return dataclasses.replace(before_black, alpha=alpha.astype(np.float32), passed=passed.astype(np.float32))
 
     def draw(
         self,

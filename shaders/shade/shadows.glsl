@@ -98,9 +98,11 @@ vec3 environment_reaching(vec3 point, vec3 normal) {
     if (sky_count == 0) { return vec3(1.0); }
     vec3 all = vec3(0.0), reaching = vec3(0.0);
     for (int i = 0; i < sky_count; ++i) {
+        all += sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
+    }
+    for (int i = sky_first; i < sky_count; i += sky_step) {
         vec3 light = sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
-        all += light;
-        if (i % sky_step == sky_first && light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal); }
+        if (light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal); }
     }
     return mix(vec3(1.0), float(sky_step) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }

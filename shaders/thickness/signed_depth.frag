@@ -1,5 +1,6 @@
 // Signed depth (Baker & Boyd 2001): exits count up, entries count down, in any order, added up by blending.
-// The sum is the path inside the body; a count that does not balance betrays a hole or a flipped face.
+// The sum is the path inside the body; a count that does not balance betrays a hole or a flipped face. PATH_ONLY: bodies without
+// any, so that nothing is counted.
 
 #include <Body>
 #include "thickness/snapping.glsl"
@@ -9,7 +10,9 @@
 
 in float axial;
 
-#if SPECTRAL
+#if PATH_ONLY
+layout(location = 0) out float path;
+#elif SPECTRAL
 layout(location = 0) out vec4 optical_depth_and_count;  // per metre of ray advance
 layout(location = 1) out float path;
 #else
@@ -18,13 +21,17 @@ layout(location = 0) out vec2 path_and_count;
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
+#if !PATH_ONLY
     float count = count_with_share(side * count_weight + count_offset, snapping(axial, snapping_share));
+#endif
     float reached = max(axial, axial_start);
 #if OPAQUE
     reached = min(reached, last_axial());
 #endif
     float signed_path = side * reached;
-#if SPECTRAL
+#if PATH_ONLY
+    path = signed_path;
+#elif SPECTRAL
     optical_depth_and_count = vec4(signed_path * extinction.rgb, count);
     path = signed_path;
 #else

@@ -109,7 +109,7 @@ class TestRendering:
 
     @pytest.mark.parametrize("name", ["spin.webp", "spin.gif", "frames"])
     def test_a_turntable_shows_the_model_from_all_around(self, run: Run, tmp_path: Path, name: str) -> None:
-        result = run("render", "bear", "-o", tmp_path / name, *SMALL, "--turntable", "4", "--json")
+        result = run("render", "bear", "-o", tmp_path / name, *SMALL, "--stage", "none", "--turntable", "4", "--json")
         assert (result.code, result.err) == (0, "")
         assert json.loads(result.out)["output"] == str(tmp_path / name)
         if name == "frames":
@@ -130,7 +130,8 @@ class TestRendering:
             assert np.ptp(edge, axis=1).max() < 20
 
     def test_quantities_are_written_as_pictures(self, run: Run, tmp_path: Path) -> None:
-        result = run("render", "bear", "-o", tmp_path / "bear.png", *SMALL, "--aov", tmp_path / "aovs")
+        options = (*SMALL, "--stage", "none", "--aov", tmp_path / "aovs")
+        result = run("render", "bear", "-o", tmp_path / "bear.png", *options)
         assert (result.code, result.err) == (0, "")
         names = sorted(file.name for file in (tmp_path / "aovs").iterdir())
         assert names == ["thickness.png", "transmittance.png", "validity.png"]

@@ -11,7 +11,7 @@ from translucent.bench.record import CaseRecord
 
 
 def case_of(mesh: tl.Mesh, **more: object) -> Case:
-    return Case("mine", "Mine", "mine", lambda size: tl.showcase(mesh, size=size), **more)  # type: ignore[arg-type]
+    return Case("mine", "Mine", "mine", lambda size: tl.showcase(mesh, size=size, stage="none"), **more)  # type: ignore[arg-type]
 
 
 def measured(studio: Studio, case: Case, *names: str, size: tuple[int, int] = (64, 64)) -> CaseRecord:

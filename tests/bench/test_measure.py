@@ -124,7 +124,7 @@ def test_shortcuts_get_the_best_thickness_that_there_is(studio: Studio) -> None:
     assert rows["sphere assumption"].thickness.rms < 0.01  # type: ignore[union-attr]
     constant = rows["constant thickness"]
     assert constant.thickness is not None
-    scene = tl.showcase(Sphere().tessellate(96), size=(96, 96))
+    scene = tl.showcase(Sphere().tessellate(96), size=(96, 96), stage="none")
     truth = tl.reference.render(scene, size=(96, 96))
     best = truth.thickness[truth.coverage].mean()
     assert float(constant.parameters.split()[0]) == pytest.approx(best, rel=0.01)

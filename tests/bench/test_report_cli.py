@@ -266,7 +266,7 @@ def test_a_model_that_is_no_solid_is_a_row_that_failed(run: Run, tmp_path: Path)
 
 
 def test_models_of_one_name_are_told_apart() -> None:
-    scene = showcase(load_mesh(mesh_path("bear")))
+    scene = showcase(load_mesh(mesh_path("bear")), stage="none")
     cases = model_cases({"a/x.stl": scene, "b/x.stl": scene, "c/y.stl": scene})
     assert [case.title for case in cases] == ["a/x.stl", "b/x.stl", "y.stl"]
     assert {case.effect for case in cases} == {"absorption"}
@@ -276,9 +276,9 @@ def test_media_decide_what_is_worth_measuring() -> None:
     mesh = load_mesh(mesh_path("bear"))
     mist = Medium(absorption=(1, 1, 1), scattering=(1, 1, 1))
     assert effect_of(showcase(mesh, mist, lights=[DirectionalLight((0, -1, 0), (1, 1, 1))])) == "scattering"
-    assert effect_of(showcase(mesh, mist)) == "absorption", "without a light there is nothing to scatter"
-    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), emission=(1, 1, 1)))) == "emission"
-    scene = showcase(mesh)
+    assert effect_of(showcase(mesh, mist, stage="none")) == "absorption", "without a light there is nothing to scatter"
+    assert effect_of(showcase(mesh, Medium(absorption=(1, 1, 1), emission=(1, 1, 1)), stage="none")) == "emission"
+    scene = showcase(mesh, stage="none")
     sheet = dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], sheet_thickness=1e-3)])
     assert effect_of(sheet) == "sheet"
 

@@ -16,9 +16,9 @@ SIZE = (160, 120)
 
 def _check(renderer: tl.Renderer, mesh: tl.Mesh, color: str | tuple[float, ...]) -> None:
     target = tl.Medium.from_color(color, 1.0).transmittance(1.0)
-    first = renderer.render(tl.showcase(mesh, size=SIZE), SIZE)
+    first = renderer.render(tl.showcase(mesh, size=SIZE, stage="none"), SIZE)
     medium = medium_for_average_color(first, color)
-    frame = renderer.render(tl.showcase(mesh, medium, SIZE), SIZE)
+    frame = renderer.render(tl.showcase(mesh, medium, SIZE, stage="none"), SIZE)
     seen = frame.transmittance[frame.coverage & frame.valid].mean(axis=0, dtype=np.float64)
     # 1e-3 cannot be seen; what is left is the float32 of the picture, some 1e-7 per unit of optical depth.
     assert np.abs(seen - target).max() < 1e-5

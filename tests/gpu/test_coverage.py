@@ -71,7 +71,7 @@ def require_equal(renderer: tl.Renderer, scene: tl.Scene, method: tl.Method | No
         shade_everything(patch)
         expected = renderer.render(scene, SIZE, method, samples=samples)
     # What the frame before has left behind must not show.
-    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE), SIZE, method)
+    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE, stage="none"), SIZE, method)
     found = renderer.render(scene, SIZE, method, samples=samples)
     for name in ARRAYS:
         assert np.array_equal(getattr(found, name), getattr(expected, name), equal_nan=True), name
@@ -104,7 +104,7 @@ def test_with_nothing_in_view_the_environment_is_all(
 ) -> None:
     camera = tl.Camera.look_at((0, 0, 5), (0, 0, 10))
     scene = tl.Scene([tl.Object(MESHES[0], medium)], camera, environment=tl.Environment.constant((0.25, 0.5, 0.75)))
-    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE), SIZE, method)
+    renderer.render(tl.showcase(MESHES[0], MEDIA[1], SIZE, stage="none"), SIZE, method)
     frame = renderer.render(scene, SIZE, method)
     assert (frame.radiance == (0.25, 0.5, 0.75)).all()
     assert (frame.transmittance == 1.0).all()

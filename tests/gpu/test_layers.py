@@ -215,7 +215,7 @@ def test_a_glow_has_the_pattern_of_its_texture(renderer: tl.Renderer) -> None:
 
 def test_occlusion_dims_the_environment_and_no_lights(renderer: tl.Renderer) -> None:
     shade = tl.Texture(np.full((1, 1, 3), 0.25, dtype=np.float32))
-    hidden = tl.Object(BLOCK, WINE, at(99.0))
+    hidden = tl.Object(BLOCK, WINE, at(-99.0))
     sun = tl.DirectionalLight((0, 0, -1), (np.pi, np.pi, np.pi))
     found = {}
     for occlusion in (None, shade):

@@ -72,11 +72,13 @@ def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edg
     assert frame.valid.all()
     # Interior to both: no edge of a body, nor of the opaque object, within a pixel.
     inside = interior(references.hit_counts(scene, SIZE))
-    for name in ("thickness", "transmittance", "radiance"):
+    # Shadows are interpolated between texels: of a ball's path, with curvature 10 and 4 mm wide, 3e-5 at an extinction
+    # of 1.5.
+    for name, most in (("thickness", 1e-5), ("transmittance", 1e-5), ("radiance", 5e-5)):
         off = np.abs(getattr(frame, name) - getattr(truth, name))[inside]
         scale = max(1.0, float(np.abs(getattr(truth, name)).max()))
         assert np.median(off) <= 3e-7 * scale, name
-        assert np.quantile(off, 1 - opaque_edges) <= 1e-5 * scale, name
+        assert np.quantile(off, 1 - opaque_edges) <= most * scale, name
     mismatch = (frame.coverage != truth.coverage)[inside].mean()
     assert mismatch <= opaque_edges
     return frame

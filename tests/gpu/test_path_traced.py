@@ -96,9 +96,9 @@ def test_the_picture_is_that_of_the_reference(name: str, renderer: tl.Renderer) 
     difference = frame.radiance - truth.radiance
     variance = np.square(frame.standard_error, dtype=np.float64) + error**2
     require_normal(scores(difference, variance))
-    # Where neither has noise: the background, to float32 and the texels of its map.
+    # Where neither has noise: the background, to float32 and the texels of its map, and of maps of shadows.
     quiet = variance.max(axis=2) <= 1e-12
-    assert np.abs(difference[quiet]).max(initial=0.0) < 1e-5
+    assert np.abs(difference[quiet]).max(initial=0.0) < 1e-4
     assert frame.valid.all()
     assert np.median(np.abs(frame.thickness - truth.thickness)) < 1e-6 * scene.diagonal
     assert np.median(np.abs(frame.transmittance - truth.transmittance)) < 1e-5

@@ -306,7 +306,7 @@ def test_samples_average_transmittance_not_thickness(renderer: tl.Renderer) -> N
 
 @pytest.mark.parametrize("tone", ["none", "neutral", "agx"])
 def test_present_shows_the_picture_that_save_writes(renderer: tl.Renderer, tone: str) -> None:
-    scene = tl.showcase(BOX.tessellate(), size=SIZE)
+    scene = tl.showcase(BOX.tessellate(), size=SIZE, stage="none")
     with renderer.gpu.context.current() as gl:
         window = gl.framebuffer([gl.texture(SIZE, 4)])
     plan = renderer.draw(scene, window, exposure=0.5, tone=tone)
@@ -318,7 +318,7 @@ def test_present_shows_the_picture_that_save_writes(renderer: tl.Renderer, tone:
 
 
 def test_arrays_are_contiguous_and_the_callers_own(renderer: tl.Renderer) -> None:
-    scene = tl.showcase(BOX.tessellate(), size=SIZE)
+    scene = tl.showcase(BOX.tessellate(), size=SIZE, stage="none")
     frame = renderer.render(scene, SIZE)
     kept = frame.thickness.copy()
     for name, dtype in (

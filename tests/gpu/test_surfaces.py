@@ -278,7 +278,7 @@ def test_wine_in_a_glass_is_left_at_the_outside_of_the_glass(renderer: tl.Render
         np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
     )
     glass = tl.Medium(absorption=0.3, ior=1.5)
-    camera = tl.showcase(outer, glass, SIZE).camera
+    camera = tl.showcase(outer, glass, SIZE, stage="none").camera
     nested = tl.Scene([tl.Object(shell, glass), tl.Object(inner, glass)], camera, environment=SKY)
     whole = tl.Scene([tl.Object(outer, glass)], camera, environment=SKY)
     plan = renderer.plan(nested)

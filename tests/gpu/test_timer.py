@@ -54,7 +54,9 @@ def test_times_of_passes_are_those_of_all_samples(
 
     monkeypatch.setattr(PassTimer, "measure", counting)
     box = trimesh.creation.box((1, 1, 1))
-    scene = tl.showcase(tl.Mesh(box.vertices, box.faces), tl.Medium(absorption=(1, 2, 3), ior=1.5), size=(16, 12))
+    scene = tl.showcase(
+        tl.Mesh(box.vertices, box.faces), tl.Medium(absorption=(1, 2, 3), ior=1.5), size=(16, 12), stage="none"
+    )
     frame = renderer.render(scene, size=(16, 12), samples=samples)
     # Of several samples, one more is drawn: the ray through the pixel center, for thickness.
     assert set(measured.values()) == {1 if samples == 1 else samples + 1}

@@ -79,7 +79,7 @@ def sky() -> tl.Environment:
 
 
 def scenes() -> dict[str, tl.Scene]:
-    ball, lamp = showcase(BALL), tl.DirectionalLight((0.0, -1.0, -1.0), 3.0)
+    ball, lamp = showcase(BALL, stage="none"), tl.DirectionalLight((0.0, -1.0, -1.0), 3.0)
     uv = Mesh(BALL.vertices, BALL.faces, uv=BALL.vertices[:, :2])
     checks = Texture(np.indices((128, 128)).sum(axis=0)[..., None] % 2 * np.ones(3))
     painted = tl.Surface(roughness=0.3, color_texture=checks, normal_texture=Texture(np.full((50, 30, 3), 0.5)))
@@ -87,15 +87,15 @@ def scenes() -> dict[str, tl.Scene]:
     grown = tl.LinearDensity(1, 0.5, 1.5)
     return {
         "ball": ball,
-        "knot": showcase(tl.load_mesh(data.mesh_path("knot"))),
-        "glass": showcase(BALL, GLASS),
+        "knot": showcase(tl.load_mesh(data.mesh_path("knot")), stage="none"),
+        "glass": showcase(BALL, GLASS, stage="none"),
         "milk": showcase(BALL, MILK, environment=sky(), lights=[lamp]),
         "lamp": showcase(BALL, MILK, lights=[tl.PointLight((0.0, 0.05, 0.0), (1.0, 1.0, 1.0))]),
         "painted": tl.Scene([tl.Object(uv, GLASS, surface=painted)], ball.camera),
         "two": tl.Scene([tl.Object(BALL, GLASS), tl.Object(BALL, MILK, np.diag([0.5, 0.5, 0.5, 1.0]))], ball.camera),
         "union": tl.Scene([tl.Object(BALL, tl.Medium(a)) for a in (1.0, 2.0)], ball.camera, overlap="union"),
         "floor": tl.Scene([*ball.objects, floor], ball.camera, [lamp], sky()),
-        "glow": showcase(BALL, tl.Medium(absorption=(1.0, 2.0, 3.0), emission=1.0)),
+        "glow": showcase(BALL, tl.Medium(absorption=(1.0, 2.0, 3.0), emission=1.0), stage="none"),
         "grown": tl.Scene([tl.Object(BALL, tl.Medium(5.0), density=grown)], ball.camera),
         "leaf": tl.Scene([tl.Object(LEAF, GLASS, sheet_thickness=1e-3)], ball.camera),
     }
@@ -146,7 +146,7 @@ def test_normals_of_a_large_mesh_come_from_another_process(
 
 
 def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
-    scene, compiler, found = stand_in(showcase(BALL)), Compiler(), list[Compiled]()
+    scene, compiler, found = stand_in(showcase(BALL, stage="none")), Compiler(), list[Compiled]()
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
@@ -160,7 +160,7 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
 
 def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> None:
     near.set()
-    scene, compiler, found = stand_in(showcase(BALL, GLASS)), Compiler(), list[Compiled]()
+    scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(), list[Compiled]()
     compiler.device = "a card from the future"
     compiler.ask("", scene, [], found.append)
     while not found:

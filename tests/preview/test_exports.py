@@ -22,7 +22,7 @@ from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import showcase
 
 SIZE = (64, 40)
-SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), size=SIZE)
+SCENE = showcase(Box((-0.01, -0.01, -0.01), (0.01, 0.01, 0.01)).tessellate(), size=SIZE, stage="none")
 
 
 def told(share: float | None, detail: str = "") -> None:

@@ -180,7 +180,7 @@ def test_the_way_of_scattering_is_one_of_those_of_the_planner() -> None:
 def test_the_material_of_a_model_is_its_medium() -> None:
     mesh = tl.Mesh(np.eye(4, 3), [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
     medium = tl.Medium(absorption=(3, 2, 1), scattering=(0.5, 0, 0), anisotropy=0.2, ior=1.3)
-    material = material_of(showcase(mesh, medium))
+    material = material_of(showcase(mesh, medium, stage="none"))
     assert medium_of(material) == medium
 
 
@@ -191,7 +191,7 @@ def test_a_scene_brings_its_own_material_and_a_mesh_leaves_it() -> None:
 
 
 def test_the_model_is_framed_as_render_frames_it() -> None:
-    scene = showcase(tl.load_mesh(Path(tl.__file__).parents[1] / "meshes" / "leaf.ply"), size=(320, 200))
+    scene = showcase(tl.load_mesh(Path(tl.__file__).parents[1] / "meshes" / "leaf.ply"), size=(320, 200), stage="none")
     found = orbiting.camera_of(orbiting.framed(None, scene.objects, (320, 200)))
     np.testing.assert_allclose(found.pose, framing(scene.objects, (320, 200)).pose, atol=1e-12)
 

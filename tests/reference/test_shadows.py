@@ -343,3 +343,11 @@ def test_opaque_bodies_hide_the_sky_from_themselves() -> None:
 def test_light_transmittance_refuses(light: int, points: Any, match: str) -> None:
     with pytest.raises(tl.InputError, match=match):
         light_transmittance(scene(tl.Object(BALL, RED)), light, points)
+
+
+def test_surfaces_far_from_the_eye_do_not_shadow_themselves() -> None:
+    """Where points are rounded to 2e-9 m."""
+    camera = tl.Camera.orthographic((0.0, 0.0, 2e7), (0.0, 0.0, 0.0), height=2.0)
+    sun = tl.DirectionalLight((2.0, 1.0, -1.0), np.pi)
+    shown = tl.Scene([tl.Object(BOX), tl.Object(wall(-20.0))], camera, [sun], DARK)
+    np.testing.assert_allclose(seen(shown, (16, 16)), 0.6 / np.sqrt(6.0), rtol=1e-12)

@@ -29,7 +29,7 @@ def frame(scale: float = 1e-3, height: int = 40, width: int = 60) -> Frame:
     coverage = (thickness > 0) | ~valid
     shape = (height, width, 3)
     passed = np.exp(-thickness / scale / 5)[..., None] * np.ones(3)
-    plan = tl.plan(tl.showcase(tl.load_mesh(Path(tl.__file__).parents[1] / "meshes" / "bear.ply")))
+    plan = tl.plan(tl.showcase(tl.load_mesh(Path(tl.__file__).parents[1] / "meshes" / "bear.ply"), stage="none"))
     return Frame(passed, passed, np.zeros(shape), thickness, coverage, valid, plan)
 
 

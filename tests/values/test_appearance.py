@@ -88,7 +88,7 @@ def test_what_no_medium_can_do_is_refused(thickness: list[float], color: object,
 def test_a_mesh_that_is_invalid_everywhere_says_so() -> None:
     color, flag = np.zeros((1, 2, 3)), np.array([[True, True]])
     thickness = np.ones((1, 2), dtype=np.float32)
-    plan = tl.plan(tl.showcase(Sphere().tessellate(8)))
+    plan = tl.plan(tl.showcase(Sphere().tessellate(8), stage="none"))
     with pytest.raises(tl.InputError, match="all 2 pixels that the mesh covers are marked invalid; close its holes"):
         thickness_samples(tl.Frame(color, color, color, thickness, flag, ~flag, plan))
 
@@ -126,5 +126,7 @@ def test_of_a_frame_only_covered_and_valid_pixels_count() -> None:
     thickness = np.array([[1.0, 2.0], [-1e-9, 9.0]], dtype=np.float32)
     covered, valid = np.array([[True, False], [True, True]]), np.array([[True, True], [True, False]])
     color = np.zeros((2, 2, 3))
-    frame = tl.Frame(color, color, color, thickness, covered, valid, tl.plan(tl.showcase(Sphere().tessellate(8))))
+    frame = tl.Frame(
+        color, color, color, thickness, covered, valid, tl.plan(tl.showcase(Sphere().tessellate(8), stage="none"))
+    )
     assert thickness_samples(frame).tolist() == [1.0, 0.0]

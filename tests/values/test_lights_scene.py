@@ -338,9 +338,9 @@ def test_a_scene_knows_its_bodies_and_bounds() -> None:
 def test_the_showcase_frames_the_mesh_in_a_medium_of_its_size() -> None:
     for scale in (1e-3, 1.0, 1e3):
         mesh = tl.Mesh(BOX.vertices * scale, BOX.faces)
-        scene = tl.showcase(mesh)
+        scene = tl.showcase(mesh, stage="none")
         medium = scene.objects[0].medium
         assert medium is not None
         assert medium.transmittance(0.15 * mesh.diagonal) == pytest.approx((0.18, 0.62, 0.35), rel=1e-14)
-        assert scene.camera.forward == pytest.approx(tl.showcase(BOX).camera.forward, abs=1e-12)
-    assert tl.showcase(BOX, GLASS).objects[0].medium is GLASS
+        assert scene.camera.forward == pytest.approx(tl.showcase(BOX, stage="none").camera.forward, abs=1e-12)
+    assert tl.showcase(BOX, GLASS, stage="none").objects[0].medium is GLASS

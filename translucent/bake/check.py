@@ -117,7 +117,7 @@ def check_map(
     RenderError
         If embreex is missing.
     """
-    scene = showcase(body or mesh, medium, size, camera)
+    scene = showcase(body or mesh, medium, size, camera, stage="none")
     renderer = CpuRenderer()
     true = renderer.render(scene, size, plan(scene, None, renderer.capabilities), 1)
     renderer.close()

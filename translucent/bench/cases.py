@@ -77,7 +77,7 @@ class Case:
 
 
 def _shown(make: Callable[[], Mesh], size: Size) -> Scene:
-    return showcase(make(), size=size)
+    return showcase(make(), size=size, stage="none")
 
 
 def _glass(make: Callable[[], Mesh], surface: Surface, size: Size) -> Scene:
@@ -124,7 +124,7 @@ def _toolkit(name: str) -> Mesh:
 
 def _far(make: Callable[[], Mesh], size: Size) -> Scene:
     """The picture of a body from `FAR` diameters away, through a lens that shows it as large as ever."""
-    near = showcase(make(), size=size)
+    near = showcase(make(), size=size, stage="none")
     center, eye = near.objects[0].mesh.center, near.camera.pose[:3, 3]
     away = (eye - center) / np.linalg.norm(eye - center)
     fov = 2 * np.degrees(np.arctan(0.55 / FAR / min(1.0, size[0] / size[1])))
@@ -136,13 +136,13 @@ def _two_media(size: Size) -> Scene:
     glass = Medium.from_color((0.82, 0.9, 0.86), distance=0.01)
     wine = Medium.from_color((0.6, 0.05, 0.12), distance=0.02)
     objects = [Object(_toolkit("goblet"), glass), Object(_toolkit("wine"), wine)]
-    return Scene(objects, framing(objects, size), environment=showcase(objects[0].mesh).environment)
+    return Scene(objects, framing(objects, size), environment=showcase(objects[0].mesh, stage="none").environment)
 
 
 def _sheet(size: Size) -> Scene:
     green = Medium.from_color((0.25, 0.6, 0.12), distance=4e-4)
     leaf = Object(_toolkit("leaf"), dataclasses.replace(green, ior=1.4), sheet_thickness=4e-4)
-    return Scene([leaf], framing([leaf], size), environment=showcase(leaf.mesh).environment)
+    return Scene([leaf], framing([leaf], size), environment=showcase(leaf.mesh, stage="none").environment)
 
 
 def _emission(size: Size) -> Scene:

@@ -174,7 +174,7 @@ def _thinned(ladder: Ladder) -> Ladder:
 
 
 def _torus(segments: int, size: Size) -> Callable[[], tuple[Scene, Size]]:
-    return lambda: (showcase(lying_torus(segments), size=size), size)
+    return lambda: (showcase(lying_torus(segments), size=size, stage="none"), size)
 
 
 def _plates(layers: int) -> Callable[[], tuple[Scene, Size]]:

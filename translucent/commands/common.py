@@ -30,6 +30,9 @@ INTERFACE_NAMES = ("traced", "screen", "front")
 #: Names of the ways of showing light that is scattered many times, as in `translucent.planning.scattering.SCATTERINGS`.
 SCATTERING_NAMES = ("diffusion", "layer", "single")
 
+#: Names of stages, the default one first, as in `translucent.scene.stages.STAGES`, likewise.
+STAGE_NAMES = ("studio", "light-table", "night", "daylight")
+
 #: Index of refraction of what `scattering_medium_options` choose: that of soap, wax, skin and milk is 1.33 to 1.5.
 SCATTERING_IOR = 1.4
 
@@ -305,9 +308,7 @@ def look_options(command: F) -> F:
     command = click.option(
         "--tone",
         type=click.Choice(TONE_NAMES),
-        default="none",
-        show_default=True,
-        help="Tone curve of a .png: clamped, Khronos PBR Neutral, or AgX.",
+        help="Tone curve of a .png: clamped, Khronos PBR Neutral, or AgX. Default: neutral on a stage, else none.",
     )(command)
     command = click.option("--exposure", type=float, default=0.0, metavar="STOPS", help="Makes a .png brighter.")(
         command
@@ -319,7 +320,18 @@ def look_options(command: F) -> F:
         "--environment",
         metavar="E",
         help="Lights the model and is mirrored: light-table, studio, checkerboard, a color, or a .hdr, .exr or .png of "
-        "all directions; studio,90 turns it by degrees. Default: light-table.",
+        "all directions; studio,90 turns it by degrees. Default: the stage's, or else light-table.",
+    )(command)
+
+
+def stage_option(command: F) -> F:
+    """Option for what the model stands on and before."""
+    return click.option(
+        "--stage",
+        metavar="S",
+        help=f"What the model stands on, and is lit by: {', '.join(STAGE_NAMES)}, or none, before the environment "
+        f"alone. Default: {STAGE_NAMES[0]}; none with --environment or --background, and for a glTF file with a "
+        "camera, lights or a ground of its own.",
     )(command)
 
 

@@ -18,6 +18,7 @@ from translucent.commands.common import (
     read_scattering,
     scattering_medium_options,
     scattering_options,
+    stage_option,
     unit_option,
 )
 from translucent.commands.console import echo
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 @scattering_medium_options
 @unit_option
 @outside_option
+@stage_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
 @paths_option
 @interface_options
@@ -52,6 +54,7 @@ def explain(
     mean_free_path: str | None,
     unit: str,
     allow_outside: bool,
+    stage: str | None,
     method_name: str | None,
     paths: int | None,
     interfaces_name: str | None,
@@ -70,7 +73,7 @@ def explain(
 
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(None, preset_name)
-    scene = read_scene(model, unit, medium, roughness=roughness, allow_outside=allow_outside)
+    scene = read_scene(model, unit, medium, roughness=roughness, stage=stage, allow_outside=allow_outside)
     method = read_method(method_name, None, paths)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)
     scattering = read_scattering(scattering_name, diffusion_resolution)
@@ -99,7 +102,7 @@ def _summary(model: str, scene: Scene) -> dict[str, Any]:
                 "transform": item.matrix.tolist(),
                 "extinction": None if item.medium is None else item.medium.extinction.tolist(),
             }
-            for item in scene.objects
+            for item in scene.shown
         ],
         "lights": len(scene.lights),
         "left_out": list(getattr(scene, "left_out", ())),
@@ -126,12 +129,12 @@ def _tell_mesh(mesh: Mesh) -> None:
 
 
 def _tell_scene(model: str, scene: Scene) -> None:
-    low, high = scene.bounds
+    low, high = scene.shown_bounds
     echo(
-        f"{model}: {len(scene.objects)} objects, {len(scene.bodies)} of them translucent, {len(scene.lights)} lights, "
+        f"{model}: {len(scene.shown)} objects, {len(scene.bodies)} of them translucent, {len(scene.lights)} lights, "
         f"{' x '.join(f'{v:.4g}' for v in high - low)} m"
     )
-    for item in scene.objects:
+    for item in scene.shown:
         kind, size = _kind(item), " x ".join(f"{v:.4g}" for v in item.bounds[1] - item.bounds[0])
         # Only what bounds a solid has to be closed.
         state = f"; {item.mesh.diagnosis}" if kind == "body" else ""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from translucent.scene.camera import Camera
     from translucent.scene.environment import Environment
     from translucent.scene.scene import Object, Scene
+    from translucent.scene.stages import Stage
 
 #: Default field of view in degrees, and up vector, of a camera that options define.
 DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
@@ -53,32 +54,81 @@ def read_scene(
     size: tuple[int, int] = (1280, 720),
     environment: Environment | None = None,
     roughness: float | None = None,
+    stage: str | None = "none",
     *,
     allow_outside: bool = False,
 ) -> Scene:
-    """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show."""
-    from translucent.gltf.load import load_scene
-    from translucent.scene.showcase import filled, showcase, with_roughness
+    """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show.
+
+    A stage of None is the default one, where it suits what the model and the options bring with them.
+    """
+    from translucent.scene.showcase import framing, with_roughness
+    from translucent.scene.staging import staged, upright
 
     options = options or CameraOptions()
     if options.camera is not None and options.defining:
         raise InputError(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
-    if not is_scene_file(model):
-        if options.camera is not None:
-            raise InputError(f"--camera {options.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
-        scene = showcase(read_mesh(model, unit, allow_outside), medium, size, environment=environment)
+    if is_scene_file(model):
+        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, allow_outside)
     else:
-        scene = load_scene(
-            model, unit, None if options.defining else options.camera or 0, size, allow_outside=allow_outside
-        )
-        if medium is not None:
-            scene = filled(scene, medium)
-        if environment is not None:
-            scene = dataclasses.replace(scene, environment=environment)
+        scene, chosen = _mesh_scene(model, unit, medium, options, size, environment, stage, allow_outside)
     scene = with_roughness(scene, roughness)
-    return dataclasses.replace(scene, camera=_defined_camera(scene, options, size)) if options.defining else scene
+    if options.defining:
+        scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, size, chosen))
+    if chosen is None:
+        return scene
+    scene = upright(scene, read_vector("--up", options.up or DEFAULT_UP))
+    if options.eye is None and not getattr(scene, "has_camera", False):
+        fov = DEFAULT_FOV if options.fov is None else options.fov
+        scene = dataclasses.replace(scene, camera=framing(scene.objects, size, fov_y=fov, stage=chosen))
+    return staged(scene, chosen, environment)
+
+
+def _mesh_scene(
+    model: str,
+    unit: str,
+    medium: Medium | None,
+    options: CameraOptions,
+    size: tuple[int, int],
+    environment: Environment | None,
+    stage: str | None,
+    allow_outside: bool,
+) -> tuple[Scene, Stage | None]:
+    from translucent.scene.showcase import default_medium, showcase
+    from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
+
+    if options.camera is not None:
+        raise InputError(f"--camera {options.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
+    chosen = stage_named(stage or (DEFAULT_STAGE if environment is None else NO_STAGE))
+    mesh = read_mesh(model, unit, allow_outside)
+    filling = medium or default_medium(mesh, chosen)
+    return showcase(mesh, filling, size, environment=environment, stage=NO_STAGE), chosen
+
+
+def _file_scene(
+    model: str,
+    unit: str,
+    medium: Medium | None,
+    options: CameraOptions,
+    size: tuple[int, int],
+    environment: Environment | None,
+    stage: str | None,
+    allow_outside: bool,
+) -> tuple[Scene, Stage | None]:
+    from translucent.gltf.load import load_scene
+    from translucent.scene.showcase import filled
+    from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
+    from translucent.scene.staging import has_ground
+
+    camera = None if options.defining else options.camera or 0
+    scene = load_scene(model, unit, camera, size, allow_outside=allow_outside)
+    if medium is not None:
+        scene = filled(scene, medium)
+    bare = not (scene.has_camera or scene.lights or has_ground(scene)) and environment is None
+    chosen = stage_named(stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
+    return scene if environment is None else dataclasses.replace(scene, environment=environment), chosen
 
 
 def require_translucent(model: str, scene: Scene) -> None:
@@ -125,8 +175,8 @@ def mesh_file(model: str, unit: str) -> str:
     return model
 
 
-def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int]) -> Camera:
-    """Camera that the options define, or that frames all objects as they say."""
+def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int], stage: Stage | None) -> Camera:
+    """Camera that the options define, or that frames all objects as they say; on a stage, that is for later."""
     from translucent.scene.camera import Camera
     from translucent.scene.showcase import framing
 
@@ -134,7 +184,7 @@ def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int])
     if options.eye is None:
         if options.target is not None:
             raise InputError("--target", "--eye is missing", "give both, or neither")
-        return framing(scene.objects, size, fov_y=fov, up=up)
+        return framing(scene.objects, size, fov_y=fov, up=up) if stage is None else scene.camera
     target = scene.bounds.mean(axis=0) if options.target is None else read_vector("--target", options.target)
     return Camera.look_at(read_vector("--eye", options.eye), target, up, fov_y=fov)
 

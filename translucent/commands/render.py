@@ -24,6 +24,7 @@ from translucent.commands.common import (
     refuse_overwriting,
     scattering_medium_options,
     scattering_options,
+    stage_option,
     unit_option,
 )
 from translucent.commands.console import echo
@@ -66,6 +67,7 @@ from translucent.errors import InputError
 @click.option("--target", metavar="X,Y,Z", help="What the camera looks at. Default: the model's center.")
 @click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
 @click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
+@stage_option
 @look_options
 @method_option
 @paths_option
@@ -79,7 +81,11 @@ from translucent.errors import InputError
     type=click.Choice(["pyrender"]),
     help="Let another renderer draw the opaque objects of a glTF file.",
 )
-@click.option("--transparent", is_flag=True, help="Leave out the environment behind: a picture with alpha.")
+@click.option(
+    "--transparent",
+    is_flag=True,
+    help="Leave out what is behind: a picture with alpha, and of the stage no more than shadows (a shadow catcher).",
+)
 @picture_options
 @overwrite_option
 @click.option("--backend", metavar="B", help="egl, window, osmesa or cpu. Default: what works here.")
@@ -101,10 +107,11 @@ def render(
     target: str | None,
     up: str | None,
     fov: float | None,
+    stage: str | None,
     environment: str | None,
     background: str | None,
     exposure: float,
-    tone: str,
+    tone: str | None,
     roughness: float | None,
     method_name: str | None,
     paths: int | None,
@@ -126,10 +133,12 @@ def render(
 ) -> None:
     """Render MODEL, a file or one of the toolkit's own meshes, to a picture with its physical quantities.
 
-    A .glb or .gltf file is rendered as the scene that it is, with the media of its materials; --color, --preset or
-    --scattering-color replaces them. All other files are one mesh.
+    The model stands on a ground with its shadow; see --stage. A .glb or .gltf file is rendered as the scene that it is,
+    with the media of its materials; --color, --preset or --scattering-color replaces them. All other files are one
+    mesh.
     """
     import translucent as tl
+    from translucent.scene.stages import NO_STAGE, STAGED_TONE
     from translucent.scene.turntable import framed_all_around
 
     if transparent and (opaque_with is not None or output.suffix.lower() == ".mp4"):
@@ -139,11 +148,13 @@ def render(
     if interfaces is not None and not interfaces.finds_exits and opaque_with is not None:
         found = "--opaque-with, whose interfaces are those of the screen"
         raise InputError(f"--interfaces {interfaces.name}", found, "leave out one of the two")
+    if stage not in (None, NO_STAGE) and opaque_with is not None:
+        raise InputError(f"--stage {stage}", "--opaque-with, which throws no such shadows", "leave out one of the two")
     scattering = read_scattering(scattering_name, diffusion_resolution)
     photons = read_caustics(caustics)
     if photons is not None and opaque_with is not None:
         raise InputError("--caustics", "--opaque-with, which draws what light lands on", "leave out one of the two")
-    pictures = Pictures(output, exposure, tone, turntable, fps, aov)
+    pictures = Pictures(output, exposure, tone or "none", turntable, fps, aov)
     pictures.check()
     refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
@@ -152,7 +163,10 @@ def render(
     method = read_method(method_name, thickness, paths)
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
-    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, allow_outside=allow_outside)
+    stage = NO_STAGE if opaque_with is not None else stage
+    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, allow_outside=allow_outside)
+    if tone is None and len(scene.shown) < len(scene.objects):
+        pictures = pictures._replace(tone=STAGED_TONE)
     require_translucent(model, scene)
     if turntable is not None and camera is None and eye is None:
         scene = framed_all_around(scene, pixels)

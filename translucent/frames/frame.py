@@ -26,7 +26,7 @@ ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage",
 LAYER_ARRAYS = ("layers", "truncated")
 
 #: Additional arrays of frames without a background, and of bodies with interfaces.
-MATTE_ARRAYS = ("alpha", "normals")
+MATTE_ARRAYS = ("alpha", "passed", "normals")
 
 #: Additional array of frames of random paths.
 NOISE_ARRAYS = ("standard_error",)
@@ -63,6 +63,9 @@ class Frame:
     alpha : (h, w) float, optional
         Of a frame rendered without the environment behind: share of what is behind that it hides, the mean of the
         channels. The radiance is then that of the frame alone: an associated (premultiplied) color.
+    passed : (h, w, 3) float, optional
+        Of such a frame: share of what is behind that passes, by channel, so that ``radiance + passed * behind`` is the
+        picture before anything, colored shadows on a shadow catcher included. 1 - alpha is its mean.
     normals : (h, w, 3) float, optional
         Unit normals, in world axes, of the interfaces where rays enter bodies; 0 where there is none. Only of frames
         whose plan has interfaces.
@@ -82,6 +85,7 @@ class Frame:
     layers: npt.NDArray[np.int32] | None = None
     truncated: npt.NDArray[np.int32] | None = None
     alpha: npt.NDArray[Any] | None = None
+    passed: npt.NDArray[Any] | None = None
     normals: npt.NDArray[Any] | None = None
     standard_error: npt.NDArray[Any] | None = None
 
@@ -119,8 +123,10 @@ class Frame:
     def to_srgb8(self, exposure: float = 0.0, tone: str = "none") -> npt.NDArray[np.uint8]:
         """(h, w, 3) uint8: radiance, `exposure` stops brighter, through a tone curve and sRGB-encoded.
 
-        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them. Where it shines
-        more than it hides, alpha is raised to what the brightest channel needs.
+        A frame with `alpha` gives (h, w, 4) with colors that are not multiplied by it, as PNG has them, for programs
+        that mix encoded colors, as browsers do. One alpha cannot tint what is behind: before white the picture is
+        right, with the colors of glass and of shadows; before black it is where nothing tints, and a tint shines
+        elsewhere.
 
         Parameters
         ----------
@@ -138,9 +144,14 @@ class Frame:
         linear = np.asarray(self.radiance, dtype=np.float64) * exposure_scale(check_exposure(exposure))
         if self.alpha is None:
             return np.rint(linear_to_srgb(curve(linear)) * 255.0).astype(np.uint8)
-        alpha = np.maximum(self.alpha, np.minimum(linear.max(axis=-1), 1.0))[..., None]
-        color = linear_to_srgb(curve(np.divide(linear, alpha, out=np.zeros_like(linear), where=alpha > 0)))
-        return np.rint(np.concatenate([color, alpha], axis=-1) * 255.0).astype(np.uint8)
+        passed = self.alpha[..., None] * -1.0 + 1.0 if self.passed is None else self.passed
+        # The same before a black and a white page (Smith & Blinn 1996); pages are white as they are.
+        own = curve(linear)
+        before_black, before_white = linear_to_srgb(own), linear_to_srgb(np.minimum(own + passed, 1.0))
+        alpha = 1.0 - (before_white - before_black).min(axis=-1, keepdims=True)
+        mixed = before_white - (1.0 - alpha)
+        color = np.divide(mixed, alpha, out=np.zeros_like(mixed), where=alpha > 0)
+        return np.rint(np.concatenate([np.clip(color, 0.0, 1.0), alpha], axis=-1) * 255.0).astype(np.uint8)
 
     def save(self, path: str | Path, exposure: float = 0.0, tone: str = "none") -> None:
         """Write the frame: ``.png`` (sRGB picture), ``.exr`` (float picture and quantities) or ``.npz`` (all arrays).

@@ -85,7 +85,7 @@ def _channels(arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
     if "alpha" in arrays:
         channels = {name: values for name, values in channels.items() if name != "RGB"}
         channels["RGBA"] = np.concatenate([arrays["radiance"], arrays["alpha"][..., None]], axis=-1)
-    for name in ("transmittance", "optical_depth", "standard_error"):
+    for name in ("passed", "transmittance", "optical_depth", "standard_error"):
         if name in arrays:
             channels |= _split(name, "RGB", arrays)
     channels["thickness.Z"] = arrays["thickness"]

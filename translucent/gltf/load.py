@@ -55,9 +55,12 @@ class GltfScene(Scene):
     ----------
     left_out : tuple of str
         What the file asks for and the scene does not hold, one line per kind with the names that have it.
+    has_camera : bool
+        Whether the camera is one of the file's, rather than one that frames all objects.
     """
 
     left_out: tuple[str, ...] = ()
+    has_camera: bool = False
 
 
 def load_scene(
@@ -107,7 +110,7 @@ def load_scene(
     with np.errstate(under="ignore"):
         transforms = scene_transforms(file, left_out)
         objects = scene_objects(file, transforms, metres, left_out)
-        view = scene_camera(file, transforms, camera, metres, left_out) or framing(objects, size)
+        own = scene_camera(file, transforms, camera, metres, left_out)
         lights = scene_lights(file, transforms, metres, left_out)
     for key in ("animations", "skins"):
         if file.items(key):
@@ -117,7 +120,8 @@ def load_scene(
     # Surfaces mirror what is around them: that should be more than a gradient.
     polished = any(item.surface is not None for item in objects)
     environment = Environment.studio() if polished else LIGHT_TABLE
-    return GltfScene(objects, view, lights, environment, left_out=lost)
+    view = own or framing(objects, size)
+    return GltfScene(objects, view, lights, environment, left_out=lost, has_camera=own is not None)
 
 
 def _read(path: str | Path, allow_outside: bool) -> GltfFile:

@@ -101,6 +101,7 @@ CONSTANTS: dict[str, str] = {
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "RECORD_SIZE": "8",  # bodies that a ray can be in
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",
+    "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a share of the scene
     "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene
     "TOUCHING": "1e-6",  # axial depth between surfaces that count as one interface
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",

@@ -64,12 +64,15 @@ class FrameJob(SceneView):
         Takes the share of the frame's paths that have ended, now and then.
     corner : (int, int)
         Left and bottom of the picture in its targets.
+    path_only : bool
+        The accumulator has paths of one medium alone, and no counts.
     covered : Part
         Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
         the bottom, as geometry is drawn.
     """
 
     corner: tuple[int, int] = (0, 0)
+    path_only = False
 
     def __init__(
         self,

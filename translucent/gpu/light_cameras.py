@@ -71,9 +71,9 @@ def cameras_towards(points: Array, light: Light, center: Array, radius: float) -
         direction = np.asarray(light.direction)
         eye = center - 2.0 * radius * direction
         pose = Camera.orthographic(eye, center, up=_any_up(direction)).pose
-        across = (points - center) @ pose[:3, :2]
-        middle = 0.5 * (across.min(axis=0) + across.max(axis=0))
-        extent = float(np.ptp(across, axis=0).max()) or radius
+        across = pose[:3, :2].T @ points.T
+        low, high = (bound - pose[:3, :2].T @ center for bound in (across.min(axis=1), across.max(axis=1)))
+        middle, extent = 0.5 * (low + high), float((high - low).max()) or radius
         eye = eye + pose[:3, :2] @ middle
         return [Camera.orthographic(eye, eye + direction, up=_any_up(direction), height=extent * _MARGIN)]
     position = np.asarray(light.position)

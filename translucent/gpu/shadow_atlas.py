@@ -198,7 +198,7 @@ class ShadowAtlas:
     views : ShadowViews, optional
         Places of the maps.
     spectral : bool
-        The maps are optical depths (RGBA32F), since media differ, and not paths (RG32F).
+        The maps are optical depths (RGBA32F), since media differ, and not paths (R32F).
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
@@ -262,7 +262,7 @@ class ShadowAtlas:
     def _made(self, extent: tuple[int, int], spectral: bool) -> tuple[moderngl.Framebuffer, ...]:
         gl = self._gl
         try:
-            sums, ends = (gl.texture(extent, count, dtype="f4") for count in (4 if spectral else 2, 1))
+            sums, ends = (gl.texture(extent, count, dtype="f4") for count in (4 if spectral else 1, 1))
             depth = gl.depth_renderbuffer(extent)
         except moderngl.Error as error:
             raise RenderError(

@@ -55,9 +55,9 @@ def load(model: Model, allow_outside: bool = False) -> Loaded:
     if Path(model.path).suffix.lower() in SUFFIXES:
         scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
     elif model.path in mesh_names() and not Path(model.path).exists():
-        scene = showcase(load_mesh(mesh_path(model.path)))
+        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
     else:
-        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside))
+        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
     for item in scene.objects:
         _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
         if item.has_interface or item.surface is not None:

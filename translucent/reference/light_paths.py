@@ -13,7 +13,7 @@ from translucent.reference.boxes import Lines
 from translucent.reference.hits import Hits
 from translucent.reference.intervals import Intervals, body_intervals, merge, sum_signs
 from translucent.reference.rays import Rays
-from translucent.reference.sheets import scene_crossings
+from translucent.reference.sheets import SHEET_ON_OPAQUE, scene_crossings
 from translucent.reference.tracer import Tracer
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.lights import MAX_RADIANCE, DirectionalLight, PositionalLight
@@ -22,6 +22,9 @@ from translucent.scene.scene import Light, Scene
 #: Distance, as a share of the scene's size, within which opaque surfaces do not shadow a light or a lit point: it lies
 #: on them. Light on a closed opaque body shines outwards all the same, since the other side of the body stops the rest.
 CONTACT = 1e-9
+
+#: Rounding errors of a point's largest coordinate that are in contact, too: the way meets its surface at an angle.
+ROUNDED = 64.0
 
 #: Number of paths that are followed at a time: the working arrays stay below 500 MB.
 PATHS = 1 << 15
@@ -109,7 +112,7 @@ class LightPaths:
         with np.errstate(over="ignore", under="ignore"):
             depths = segments.extinction * segments.length[:, None]
             depth = np.stack([np.bincount(segments.pixel, depths[:, c], len(points)) for c in range(3)], axis=-1)
-        return np.where(self._shadowed(hits, length)[:, None], 0.0, optics.transmittance(depth)), sound
+        return np.where(self._shadowed(hits, length, points)[:, None], 0.0, optics.transmittance(depth)), sound
 
     def _hits(self, index: int, rays: Rays, length: Array) -> Hits:
         """Surfaces of an object behind the origins and ahead up to the end of each path; of an open one on the whole
@@ -117,7 +120,9 @@ class LightPaths:
         """
         traced = self.tracer.objects[index]
         open_body = traced.body.medium is not None and not traced.body.mesh.diagnosis.solid
-        end = np.full(len(rays), np.inf) if open_body else length
+        # A sheet that lies where the path ends is on it, whichever comes first by rounding.
+        beyond = 0.0 if self.sheets[index] is None else SHEET_ON_OPAQUE * self.scene.diagonal
+        end = np.full(len(rays), np.inf) if open_body else length + beyond
         return traced.hits(Lines(rays.origins, rays.directions, np.full(len(rays), -np.inf), end))
 
     def _intervals(self, hits: list[Hits], length: Array) -> tuple[Intervals, Mask]:
@@ -134,13 +139,15 @@ class LightPaths:
         nothing = body_intervals(hits[0].where(slice(0)), np.zeros_like(length, dtype=np.int64), length)
         return merge([nothing, *parts]), sound
 
-    def _shadowed(self, hits: list[Hits], length: Array) -> Mask:
-        """(k,): whether an opaque surface blocks the path."""
+    def _shadowed(self, hits: list[Hits], length: Array, points: Array) -> Mask:
+        """(k,): whether an opaque surface blocks the path to a point (k, 3)."""
         shadowed = np.zeros(len(length), dtype=bool)
-        margin = CONTACT * self.tracer.radius
+        # Far from the eye, points are rounded to more than the contact.
+        margin = CONTACT * self.tracer.radius + ROUNDED * np.finfo(np.float64).eps * np.abs(points).max(axis=1)
         for body, line in zip(self.scene.objects, hits, strict=True):
             if body.medium is None:
-                between = (line.distance > margin) & (line.distance < length[line.pixel] - margin)
+                near = margin[line.pixel]
+                between = (line.distance > near) & (line.distance < length[line.pixel] - near)
                 shadowed[line.pixel[between]] = True
         return shadowed
 

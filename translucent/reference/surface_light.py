@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
@@ -70,7 +71,7 @@ class SurfaceLight:
         return passed
 
 
-def light_transmittance(scene: Scene, light: int, points: Array) -> Array:
+def light_transmittance(scene: Scene, light: int, points: npt.ArrayLike) -> Array:
     """Transmittance of the straight ways from a light to points: exp(-sum sigma_t d), 0 behind opaque surfaces.
 
     What dims the light that reaches opaque objects. Interfaces neither bend nor dim it, and layers (`Surface.opacity`)

@@ -59,6 +59,9 @@ class Object(Frozen):
     surface : Surface, optional
         What the interface does to light. Default: polished, and nothing to be seen of it if the medium's ior is 1; an
         opaque object reflects diffusely.
+    shadow_catcher : bool
+        Whether an opaque object is a ground for the others, of any size. Rendered with ``transparent`` it stands for
+        what the frame is put over, and no more is seen of it than the shadows on it.
     """
 
     mesh: Mesh
@@ -69,6 +72,7 @@ class Object(Frozen):
     color: ColorLike = OPAQUE_COLOR
     density: Density | None = None
     surface: Surface | None = None
+    shadow_catcher: bool = False
 
     def __post_init__(self) -> None:
         _require_type("mesh of an object", self.mesh, Mesh, "use tl.load_mesh or tl.Mesh")
@@ -101,6 +105,8 @@ class Object(Frozen):
             if self.medium is None or self.sheet_thickness is not None:
                 what = "opaque" if self.medium is None else "a sheet, which has no inside"
                 raise InputError(f"density of {self.mesh.name!r}", f"it is {what}", "give it a medium to fill, or none")
+        if self.shadow_catcher and self.medium is not None:
+            raise InputError(f"shadow_catcher {self.mesh.name!r}", "a medium fills it", "give it no medium")
         if self.surface is not None:
             self._check_surface(self.surface)
 
@@ -328,10 +334,21 @@ class Scene(Frozen):
         ]
         return replace(self, objects=objects, ambient=(0.0, 0.0, 0.0))
 
+    @cached_property
+    def shown(self) -> tuple[Object, ...]:
+        """Objects that a picture is of: without shadow catchers, unless there is nothing else."""
+        return tuple(item for item in self.objects if not item.shadow_catcher) or tuple(self.objects)
+
+    @cached_property
+    def shown_bounds(self) -> Array:
+        """(2, 3): smallest and largest world coordinates of what is shown."""
+        boxes = np.stack([body.bounds for body in self.shown])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
     @property
     def diagonal(self) -> float:
-        """Length of the diagonal of the bounds in metres."""
-        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+        """Length of the diagonal of what is shown in metres: the scale of the scene, however large its ground is."""
+        return float(np.linalg.norm(self.shown_bounds[1] - self.shown_bounds[0]))
 
 
 def object_names(items: Iterable[Object]) -> str:

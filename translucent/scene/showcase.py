@@ -1,4 +1,4 @@
-"""Default scenes: a mesh, framed, in a medium that suits its size, before a bright backdrop."""
+"""Default scenes: a mesh, framed, in a medium that suits its size, on a stage."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.geometry.grouping import used_vertices
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, Stage, stage_named
+from translucent.scene.staging import stage_lights, staged, with_shadows, world_vertices
 from translucent.scene.surface import Surface
 from translucent.suggestions import close_names, did_you_mean
 
@@ -24,8 +25,14 @@ from translucent.suggestions import close_names, did_you_mean
 DEFAULT_COLOR = (0.18, 0.62, 0.35)
 DEFAULT_REACH = 0.15
 
+#: Index of refraction of the default medium where there is something to mirror, and without a stage 1.
+STAGED_IOR = 1.5
+
 #: The default environment: white above and light gray below.
 LIGHT_TABLE = Environment.gradient((0.55, 0.56, 0.58), (1.15, 1.15, 1.15))
+
+#: How much larger than the objects a picture of them on a stage is framed, beside its margin.
+ROOM = 1.1
 
 #: Names of environments for `named_environment`, besides colors and pictures.
 ENVIRONMENT_NAMES = ("light-table", "studio", "checkerboard")
@@ -40,6 +47,7 @@ def showcase(
     camera: Camera | None = None,
     environment: Environment | None = None,
     lights: Sequence[Light] = (),
+    stage: str | None = None,
 ) -> Scene:
     """Scene that shows one mesh well, with defaults for everything else.
 
@@ -47,18 +55,36 @@ def showcase(
     ----------
     mesh : Mesh
     medium : Medium, optional
-        Default: jade green after 15 % of the mesh's diagonal, whatever its size.
+        Default: jade green after 15 % of the mesh's diagonal, whatever its size; on a stage, with the ior of glass.
     size : (width, height)
-        Size of the picture in pixels, which the framing depends on.
+        Size of the picture in pixels, which the framing and the stage depend on.
     camera : Camera, optional
         Default: from the front right and above, the whole mesh in view.
     environment : Environment, optional
-        Default: a light table, white above and light gray below. Lights show best before a dark one.
+        Default: the stage's; without one, a light table, white above and light gray below. Lights show best before a
+        dark one.
     lights : sequence of PointLight, SpotLight or DirectionalLight
-        What shines into the medium, if it scatters.
+        What shines, in place of the stage's lights.
+    stage : str, optional
+        One of `translucent.scene.stages.STAGES`, or ``none``: what the mesh stands on and before. +Y is up. The
+        ground is the last of the objects. Default: ``studio``, or none with an environment or lights of your own.
+
+    Raises
+    ------
+    InputError
+        If there is no such stage.
     """
-    shown = Object(mesh, medium=medium or Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0)))
-    return Scene([shown], camera or framing([shown], size), lights, environment or LIGHT_TABLE)
+    own = environment is not None or len(lights) > 0
+    chosen = stage_named(stage or (NO_STAGE if own else DEFAULT_STAGE))
+    shown = Object(mesh, medium=medium or default_medium(mesh, chosen))
+    scene = Scene([shown], camera or framing([shown], size, stage=chosen), lights, environment or LIGHT_TABLE)
+    return scene if chosen is None else staged(scene, chosen, environment)
+
+
+def default_medium(mesh: Mesh, stage: Stage | None) -> Medium:
+    """Jade green medium that suits the size of a mesh, with an interface on a stage, where there is much to mirror."""
+    ior = 1.0 if stage is None else STAGED_IOR
+    return Medium.from_color(DEFAULT_COLOR, DEFAULT_REACH * (mesh.diagonal or 1.0), ior=ior)
 
 
 def named_environment(name: str, rotation: float = 0.0) -> Environment:
@@ -95,14 +121,19 @@ def named_environment(name: str, rotation: float = 0.0) -> Environment:
 
 
 def framing(
-    objects: Sequence[Object], size: tuple[int, int], fov_y: float = 30.0, up: npt.ArrayLike = (0.0, 1.0, 0.0)
+    objects: Sequence[Object],
+    size: tuple[int, int],
+    fov_y: float = 30.0,
+    up: npt.ArrayLike = (0.0, 1.0, 0.0),
+    stage: Stage | None = None,
 ) -> Camera:
-    """Camera of `Camera.framing` that sees all of these objects."""
-    corners = [
-        item.mesh.vertices[used_vertices(item.mesh.faces)] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
-        for item in objects
-    ]
-    return Camera.framing(np.concatenate(corners), size, fov_y=fov_y, up=up)
+    """Camera of `Camera.framing` that sees all of these objects, on a stage with room for their shadows."""
+    points = np.concatenate([world_vertices(item) for item in objects])
+    if stage is None:
+        return Camera.framing(points, size, fov_y=fov_y, up=up)
+    points = with_shadows(points, stage_lights(stage))
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
 
 
 def with_roughness(scene: AnyScene, roughness: float | None) -> AnyScene:

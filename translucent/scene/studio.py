@@ -57,6 +57,22 @@ FLOOR_NEAR, FLOOR_FAR = (0.31, 0.25, 0.20), (0.60, 0.55, 0.49)
 WALL, CEILING = (0.50, 0.51, 0.53), (0.13, 0.135, 0.15)
 
 
+#: Radiance of the room of the dark studio, which has all panels but the backdrop.
+DARK = (0.006, 0.006, 0.007)
+
+
+@lru_cache(maxsize=1)
+def dark_studio_map() -> EnvironmentMap:
+    """Environment map of a studio with dark walls, in which soft boxes alone are mirrored; made once."""
+    return EnvironmentMap.from_formula(dark_studio_radiance, STUDIO_HEIGHT)
+
+
+def dark_studio_radiance(directions: npt.ArrayLike) -> Array:
+    """Radiance (..., 3) from unit vectors (..., 3): soft boxes and strips in the dark."""
+    towards = np.asarray(directions, dtype=np.float64)
+    return _with_panels(np.broadcast_to(np.asarray(DARK), towards.shape).copy(), towards, PANELS[1:])
+
+
 @lru_cache(maxsize=1)
 def studio_map() -> EnvironmentMap:
     """Environment map of the studio; made once."""
@@ -66,8 +82,11 @@ def studio_map() -> EnvironmentMap:
 def studio_radiance(directions: npt.ArrayLike) -> Array:
     """Radiance (..., 3) from unit vectors (..., 3): a room, and the panels that hang in it."""
     towards = np.asarray(directions, dtype=np.float64)
-    radiance = _room(towards[..., 1])
-    for panel in PANELS:
+    return _with_panels(_room(towards[..., 1]), towards, PANELS)
+
+
+def _with_panels(radiance: Array, towards: Array, panels: tuple[Panel, ...]) -> Array:
+    for panel in panels:
         share, brightness = _panel(towards, panel)
         radiance += share * (np.asarray(panel.radiance) * brightness - radiance)
     return radiance

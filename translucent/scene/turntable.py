@@ -12,6 +12,7 @@ from translucent.errors import InputError
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
+from translucent.scene.staging import moved, with_shadows
 
 #: Slices of a model, and points around each, that enclose it as it turns.
 CUTS, POINTS_AROUND = 32, 48
@@ -21,7 +22,7 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
     """Scenes of a turntable from `count` sides: the camera orbits the center of the objects once, about +Y.
 
     Seen from above it goes counterclockwise. Environment and background go with it, so that the model seems to turn
-    before them; lights stay with the model.
+    before them; lights stay with the model. On a stage, with a shadow catcher, ground and lights go with the camera.
 
     Raises
     ------
@@ -30,16 +31,17 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
     """
     if not isinstance(count, int) or count < 2:
         raise InputError(f"turntable of {count!r} pictures", "not a whole number above 1", "give for example 36")
-    center = scene.bounds.mean(axis=0)
+    center = scene.shown_bounds.mean(axis=0)
     for i in range(count):
         angle = 360.0 * i / count
-        pose = _about(center, angle) @ scene.camera.pose
-        camera = dataclasses.replace(scene.camera, pose=pose)
-        yield dataclasses.replace(scene, camera=camera, environment=_turned(scene.environment, angle))
+        turn = _about(center, angle)
+        camera = dataclasses.replace(scene.camera, pose=turn @ scene.camera.pose)
+        view = dataclasses.replace(scene, camera=camera, environment=_turned(scene.environment, angle))
+        yield _with_stage_turned(view, turn) if on_stage(scene) else view
 
 
 def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
-    """Scene with its camera far enough away to see all objects from every side of a `turntable`.
+    """Scene with its camera far enough away to see what is shown from every side of a `turntable`.
 
     An orthographic camera stays where it is.
     """
@@ -47,18 +49,20 @@ def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
     if camera.fov_y is None:
         return scene
     points = swept_points(scene)
+    if on_stage(scene):
+        points = with_shadows(points, scene.lights)
     return dataclasses.replace(
         scene, camera=Camera.framing(points, size, direction=camera.forward, fov_y=camera.fov_y, up=camera.up)
     )
 
 
 def swept_points(scene: Scene) -> Array:
-    """(n, 3): points that enclose the objects as they turn about +Y through the center of their bounds."""
-    center = scene.bounds.mean(axis=0)
+    """(n, 3): points that enclose what is shown as they turn about +Y through the center of their bounds."""
+    center = scene.shown_bounds.mean(axis=0)
     offsets = np.concatenate(
         [
             item.mesh.vertices[np.unique(item.mesh.faces)] @ item.matrix[:3, :3].T + (item.matrix[:3, 3] - center)
-            for item in scene.objects
+            for item in scene.shown
         ]
     )
     radius, height = np.hypot(offsets[:, 0], offsets[:, 2]), offsets[:, 1]
@@ -86,6 +90,20 @@ def _about(center: Array, angle: float) -> Array:
     matrix[:3, :3] = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]]
     matrix[:3, 3] = center - matrix[:3, :3] @ center
     return matrix
+
+
+def on_stage(scene: Scene) -> bool:
+    """Whether a scene has a shadow catcher."""
+    return any(item.shadow_catcher for item in scene.objects)
+
+
+def _with_stage_turned(scene: Scene, turn: Array) -> Scene:
+    """Scene with its shadow catchers and lights turned."""
+    objects = [
+        dataclasses.replace(item, transform=turn @ item.matrix) if item.shadow_catcher else item
+        for item in scene.objects
+    ]
+    return dataclasses.replace(scene, objects=objects, lights=[moved(light, turn) for light in scene.lights])
 
 
 def _turned(environment: Environment, angle: float) -> Environment:

@@ -100,7 +100,7 @@ def check_scatter(one: Baked, values: Floats, size: tuple[int, int] = (320, 320)
         Of the picture in pixels.
     """
     baked = one.result
-    camera = showcase(one.body, baked.medium, size).camera
+    camera = showcase(one.body, baked.medium, size, stage="none").camera
     face, distance = first_hits(baked.mesh, camera, size)
     hit = face >= 0
     with np.errstate(invalid="ignore"):

@@ -31,7 +31,7 @@ RED = Medium(absorption=(2.0, 0.2, 0.2))
 
 def _holes(checks: Checks) -> None:
     ball = Sphere().tessellate(48)
-    scene = showcase(ball, GLASS, SIZE)
+    scene = showcase(ball, GLASS, SIZE, stage="none")
     towards = ball.vertices[ball.faces].mean(axis=1) @ (scene.camera.pose[:3, 3] - ball.center)
     facing = np.argsort(-towards)
     for count, what in ((1, "a missing face"), (40, "a hole of 40 faces")):
@@ -46,8 +46,8 @@ def _holes(checks: Checks) -> None:
 def _inverted(checks: Checks) -> None:
     ball = Sphere().tessellate(48)
     turned = Mesh(ball.vertices, ball.faces[:, ::-1], name="inverted")
-    checks.picture("all faces turned: thickness", showcase(turned, GLASS, SIZE))
-    scene = showcase(ball, GLASS, (192, 192))
+    checks.picture("all faces turned: thickness", showcase(turned, GLASS, SIZE, stage="none"))
+    scene = showcase(ball, GLASS, (192, 192), stage="none")
     towards = ball.vertices[ball.faces].mean(axis=1) @ (scene.camera.pose[:3, 3] - ball.center)
     faces = ball.faces.copy()
     faces[towards.argmax()] = faces[towards.argmax()][::-1]
@@ -62,11 +62,11 @@ def _doubled(checks: Checks) -> None:
     box = Box((-1, -1, -1), (1, 1, 1)).tessellate()
     twice = Mesh(box.vertices, np.concatenate([box.faces, box.faces]), name="twice")
     checks.holds(f"{twice.diagnosis.duplicate_faces.count} repeated faces found", bool(twice.diagnosis.duplicate_faces))
-    doubled = showcase(twice, GLASS, SIZE)
+    doubled = showcase(twice, GLASS, SIZE, stage="none")
     checks.holds("and told by the plan", checks.renderer.plan(doubled).says(NoteKind.DUPLICATED_FACES))
     left, right = Box((-1, -1, -1), (0, 1, 1)).tessellate(), Box((0, -1, -1), (1, 1, 1)).tessellate()
     for method in (SignedDepth(), FragmentLists(), DepthPeeling()):
-        scene = Scene([Object(left, GLASS), Object(right, RED)], showcase(box, size=SIZE).camera)
+        scene = Scene([Object(left, GLASS), Object(right, RED)], showcase(box, size=SIZE, stage="none").camera)
         frame, truth = checks.render(scene, SIZE, method), reference.render(scene, SIZE)
         found = checks.compared(frame, truth, scene)
         checks.error(f"two bodies share a face, {type(method).__name__}", found.p999 / scene.diagonal)
@@ -84,7 +84,7 @@ def _slivers(checks: Checks) -> None:
         [np.delete(ball.faces, 100, axis=0), [(a, count, c), (count, b, c), (a, b, count), (a, a, b)]]
     )
     sliver = Mesh(vertices, faces, name="slivers")
-    checks.picture("zero-area faces and an unused vertex", showcase(sliver, GLASS, SIZE))
+    checks.picture("zero-area faces and an unused vertex", showcase(sliver, GLASS, SIZE, stage="none"))
     needle = Mesh(ball.vertices * (1.0, 1.0, 1e-4), ball.faces, name="needles")
     camera = Camera.look_at((0.0, 3.0, 2.0), (0, 0, 0), fov_y=45)
     checks.picture("needles", Scene([Object(needle, GLASS)], camera))
@@ -103,9 +103,9 @@ def _overlaps(checks: Checks) -> None:
         frame, truth = checks.picture(policy, scene), reference.render(scene, SIZE)
         depth = checks.compared(frame, truth, scene, "transmittance")
         checks.error(f"{policy}, transmittance", depth.p999)
-    checks.picture("nested shells", showcase(nested_shells(3, 48), GLASS, SIZE))
+    checks.picture("nested shells", showcase(nested_shells(3, 48), GLASS, SIZE, stage="none"))
     crossing = joined([(ball.vertices, ball.faces) for ball in (one, other)], "crossing")
-    checks.picture("a mesh that passes through itself", showcase(crossing, GLASS, SIZE))
+    checks.picture("a mesh that passes through itself", showcase(crossing, GLASS, SIZE, stage="none"))
 
 
 def _layers(checks: Checks) -> None:

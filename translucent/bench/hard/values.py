@@ -65,14 +65,15 @@ def _depths(checks: Checks) -> None:
     checks.holds("T at 1e4 is 0", optics.transmittance(1e4) == 0)
     ball = Sphere().tessellate(32)
     for extinction, what in ((5e3, "1e4"), (1e30, "1e30")):
-        frame = checks.render(showcase(ball, Medium(absorption=(extinction,) * 3), SIZE))
+        frame = checks.render(showcase(ball, Medium(absorption=(extinction,) * 3), SIZE, stage="none"))
         middle = frame.transmittance[SIZE[1] // 2, SIZE[0] // 2]
         checks.holds(f"a body of depth {what} is black, nothing is NaN", (middle == 0).all())
         checks.holds("and finite", np.isfinite(frame.radiance).all() and np.isfinite(frame.optical_depth).all())
-    thin = checks.render(showcase(ball, Medium(absorption=(1e-30,) * 3, emission=(1e-3,) * 3), SIZE))
+    thin = checks.render(showcase(ball, Medium(absorption=(1e-30,) * 3, emission=(1e-3,) * 3), SIZE, stage="none"))
     glow = thin.thickness.astype(np.float64) * 1e-3 + 0.0
     emitted = (
-        thin.radiance[..., 0] - checks.render(showcase(ball, Medium(absorption=(1e-30,) * 3), SIZE)).radiance[..., 0]
+        thin.radiance[..., 0]
+        - checks.render(showcase(ball, Medium(absorption=(1e-30,) * 3), SIZE, stage="none")).radiance[..., 0]
     )
     # The two pictures differ by the emission, each rounded to float32 near 1.
     checks.holds("emission without extinction is q d", np.abs(emitted - glow).max() <= 4 * np.finfo(np.float32).eps)
@@ -108,7 +109,7 @@ def _densities(checks: Checks) -> None:
     checks.refused("a negative density", lambda: DensityGrid([[[-1.0]]]), "densit")
     ball = Sphere().tessellate(32)
     medium = Medium(absorption=(1.0, 0.5, 0.2))
-    plain = showcase(ball, medium, SIZE)
+    plain = showcase(ball, medium, SIZE, stage="none")
     truth = reference.render(plain, SIZE)
 
     def filled(values: object) -> Scene:

@@ -52,7 +52,7 @@ def _far(checks: Checks) -> None:
 
 def _slab(checks: Checks) -> None:
     thin = 1e-4
-    scene = showcase(Box.slab(thickness=thin).tessellate(), GLASS, SIZE)
+    scene = showcase(Box.slab(thickness=thin).tessellate(), GLASS, SIZE, stage="none")
     frame, truth = checks.render(scene), reference.render(scene, SIZE)
     checks.error("of its own thickness", checks.compared(frame, truth, scene).p999 / thin)
     checks.holds("no pixel marked", frame.valid.all())
@@ -72,7 +72,7 @@ def _units(checks: Checks) -> None:
     for unit in (1e-6, 1e6):
         medium = Medium(absorption=np.array((0.5, 1.0, 2.0)) / unit)
         scaled = Mesh(mesh.vertices * unit, mesh.faces, name="torus")
-        checks.picture(f"{unit:g} m", showcase(scaled, medium, SIZE))
+        checks.picture(f"{unit:g} m", showcase(scaled, medium, SIZE, stage="none"))
 
 
 def _angles(checks: Checks) -> None:

@@ -101,11 +101,14 @@ class FinishMaps:
         passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
         finish = surface.metallic, surface.roughness, surface.ior, hole_below
         set_uniform(program, "opaque_finish", finish)
-        if "opaque_emissive" in program:  # not where what it reflects is asked for alone
-            set_uniform(program, "opaque_emissive", tuple(np.asarray(surface.emissive)))
-        if "opaque_passed_share" in program:  # not where an object only glows
-            set_uniform(program, "opaque_passed", (*passed, surface.double_sided))
-            set_uniform(program, "opaque_passed_share", surface.diffuse_transmission)
+        values = {
+            "opaque_emissive": tuple(np.asarray(surface.emissive)),
+            "opaque_passed": (*passed, surface.double_sided),
+            "opaque_passed_share": surface.diffuse_transmission,
+        }
+        for name, value in values.items():
+            if name in program:  # not all are where an object only glows, or only its depth is needed
+                set_uniform(program, name, value)
 
 
 def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:

@@ -26,10 +26,11 @@ from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.gpu.placement import AxialRange, PlacedScene
 from translucent.gpu.resources import Resources
 from translucent.gpu.shadow_atlas import ShadowView, ShadowViews
-from translucent.gpu.shadow_cameras import ShadowThrowers
+from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
+from translucent.planning.methods import Method
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.paths import straight_scene
 from translucent.planning.plan import plan
@@ -71,6 +72,7 @@ class MapJob(FrameJob):
     ) -> None:
         self._view = view
         self.corner = view.corner
+        self.path_only = not resources.shadows.spectral
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
         super().__init__(gl, scene, plan, targets, resources, placed=placed)
@@ -103,6 +105,7 @@ class ShadowMapsPass:
         self._resolve = TransmittancePass(gl)
         self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
         self._targets: dict[int, Targets] = {}
+        self._plans: dict[bool, tuple[object, Scene, RenderPlan]] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Render the maps, if objects or lights have changed, and write the uniforms."""
@@ -134,12 +137,13 @@ class ShadowMapsPass:
             job.plan.shadows.size,
             limit,
         )
+        # Where all bodies are drawn as sheets, these throw the shadows, too.
+        method = job.plan.method if job.plan.method.makes_sheets else None
         dark = _darkened(scene, job.plan.opaque_to_shadows)
-        everything = self._planned(dark, opaque=True)
+        everything = self._planned(dark, method, opaque=True)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
-        spectral = everything[1].spectral or not in_place or dark is not scene
-        atlas.make(views, spectral=spectral)
+        atlas.make(views, spectral=everything[1].spectral or not in_place or dark is not scene)
         center = media_center(scene)
         found_plans = {(True, dark is scene): everything}
         for view in views:
@@ -148,9 +152,9 @@ class ShadowMapsPass:
             # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
             clear = dark is scene or view in views.sky
             if (key := (view.ends, clear)) not in found_plans:
-                found_plans[key] = self._planned(scene if clear else dark, opaque=view.ends)
+                found_plans[key] = self._planned(scene if clear else dark, method, opaque=view.ends)
             seen, chosen = found_plans[key]
-            chosen = replace(chosen, spectral=spectral)
+            chosen = chosen if dark is scene else replace(chosen, spectral=True)
             before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
             if in_place:
                 self._add_up(MapJob(self._gl, *before, view, center))
@@ -160,11 +164,18 @@ class ShadowMapsPass:
             self._targets.pop(size).release()
         job.uniforms.bind()
 
-    def _planned(self, scene: Scene, *, opaque: bool) -> tuple[Scene, RenderPlan]:
+    def _planned(self, scene: Scene, method: Method | None, *, opaque: bool) -> tuple[Scene, RenderPlan]:
         """The scene without interfaces, with or without opaque objects, and its plan."""
-        objects = [item for item in scene.objects if opaque or item.medium is not None]
-        seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
-        return seen, plan(seen, None, Capabilities(shader_storage=self._gl.version_code >= _SHADER_STORAGE))
+        # Layers throw no shadow; but a plan needs bodies, and alone they are clear sheets.
+        bodies = [item for item in scene.bodies if not item.covers] or scene.bodies
+        objects = [item for item in scene.objects if (opaque and item.medium is None) or item in bodies]
+        # Lights move more often than objects change.
+        key = tuple(map(weakref.ref, objects)), scene.overlap, method
+        if self._plans.get(opaque, (None,))[0] != key:
+            seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
+            storage = self._gl.version_code >= _SHADER_STORAGE
+            self._plans[opaque] = key, seen, plan(seen, method, Capabilities(shader_storage=storage))
+        return self._plans[opaque][1:]
 
     def _add_up(self, light: MapJob) -> None:
         """Draw one map where it is."""
@@ -244,9 +255,11 @@ def _seen(job: FrameJob) -> object:
             item.sheet_thickness,
             item.medium is None and item.surface,
             None if item.density is None else weakref.ref(item.density),
+            item.medium is None and holds_eye(item, scene),
         )
         for item in scene.objects
     )
     lights = tuple(light_key(light) for light in scene.lights)
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
-    return objects, lights, sky, scene.overlap, job.plan.shadows.size, job.plan.opaque_to_shadows
+    sheets = job.plan.method if job.plan.method.makes_sheets else None
+    return objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows

@@ -19,5 +19,5 @@ class SignedDepthPass:
         """Draw the bodies."""
         job.begin_adding(spec.target)
         job.bind_opaque(0)
-        switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.features.has_opaque}
+        switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.features.has_opaque, "PATH_ONLY": job.path_only}
         job.draw(self._variants.program(WITH_NORMAL=0, WITH_POSITION=0, **switches), spec.objects)

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import moderngl
+from dataclasses import replace
+from typing import Any
 
+import moderngl
+import numpy as np
+
+from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
@@ -14,6 +19,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center, surface_table
 from translucent.media.given_back import LayeredMedium
+from translucent.planning.mirrors import Mirror, mirror_of
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
 
@@ -44,6 +50,9 @@ _UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
 
 #: Share of a ray's light below which it is not followed, with two forks or fewer.
 FAINTEST_SHARE = 1.2e-2
+
+#: Room around the mirror images of bodies that rough coats blur, in heights of the picture.
+MIRROR_ROOM = 0.06
 
 #: Samples of a pixel below which microfacets would be mere noise.
 FEW_SAMPLES = 4
@@ -93,15 +102,34 @@ class TracedInterfacesPass:
             "object_nodes": hierarchies.object_nodes,
             "objects_frame": frame,
         }
-        for name, value in values.items():
-            if name in program:
-                set_uniform(program, name, value)
+        _set(program, values)
         self._variants.draw_covered(job, program, framebuffer, top_first=True)
+        if job.features.has_opaque and (mirror := mirror_of(job.scene)) is not None:
+            self._draw_mirrored(job, mirror, framebuffer, values)
         gl.enable_only(blending)
         for table in tables:
             table.release()
 
-    def _program(self, job: FrameJob) -> moderngl.Program:
+    def _draw_mirrored(
+        self, job: FrameJob, mirror: Mirror, framebuffer: moderngl.Framebuffer, values: dict[str, Any]
+    ) -> None:
+        """Add what bodies change in the mirror image of the ground."""
+        surface = mirror.ground.surface
+        assert surface is not None
+        program = self._program(job, mirror=True)
+        height = mirror.height - float(mirror.normal @ media_center(job.scene))
+        finish = surface.roughness, surface.ior
+        _set(program, {**values, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
+        twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
+        width, rows = job.targets.size
+        edges = extents(twins, job.scene.camera, (width, rows))
+        seen = edges[:, 2] > edges[:, 0]
+        edges[seen] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
+        job.gl.enable_only(moderngl.BLEND)
+        job.gl.blend_func = moderngl.ONE, moderngl.ONE
+        self._variants.draw_part(part_of(edges, (0.0, 0.0), (width, rows)).flipped(rows), program, framebuffer)
+
+    def _program(self, job: FrameJob, *, mirror: bool = False) -> moderngl.Program:
         scene, environment = job.scene, job.scene.environment
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         seen_map = environment.seen.kind == "image"
@@ -114,7 +142,8 @@ class TracedInterfacesPass:
             EMISSION=job.features.emits and not job.features.scatters,
             LAYERED=any(isinstance(body.medium, LayeredMedium) for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
-            MICROFACETS=any(surface.roughness > 0 for surface in surfaces),
+            MICROFACETS=mirror or any(surface.roughness > 0 for surface in surfaces),
+            MIRROR=mirror,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             **shadow_switches(job.features.has_shadow_maps, job.resources),
@@ -153,6 +182,12 @@ class TracedInterfacesPass:
             textures["seen_map"] = environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
+
+
+def _set(program: moderngl.Program, values: dict[str, Any]) -> None:
+    for name, value in values.items():
+        if name in program:
+            set_uniform(program, name, value)
 
 
 def faintest_share(forks: int) -> float:

@@ -81,6 +81,10 @@ class Variants:
         part = job.covered.flipped(job.targets.size[1]) if top_first else job.covered
         self._draw_parts(program, framebuffer, (part if rows is None else part.rows(*rows),))
 
+    def draw_part(self, part: Part, program: moderngl.Program, framebuffer: moderngl.Framebuffer) -> None:
+        """Run one of the programs for the pixels of a part, whose rows are counted as they are written."""
+        self._draw_parts(program, framebuffer, (part,))
+
     def draw_rest(
         self, job: FrameJob, program: moderngl.Program, framebuffer: moderngl.Framebuffer, *, top_first: bool = False
     ) -> None:

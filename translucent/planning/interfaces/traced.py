@@ -9,6 +9,7 @@ from translucent.planning.interfaces.base import DRAW_COST, ONE_DRAWN, Interface
 from translucent.planning.interfaces.places import picture_cuts, with_interfaces
 from translucent.planning.interfaces.words import effects_of, owners
 from translucent.planning.methods.base import check_count
+from translucent.planning.mirrors import mirror_of
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene, object_names
@@ -76,6 +77,8 @@ class TracedInterfaces(Interfaces):
         traced = f"{effects}; rays are traced from there on, through at most {self._count}"
         if self.forks:
             traced += f", {self._times} as the weaker of reflected and refracted light"
+        if (mirror := mirror_of(scene)) is not None:
+            traced += f"; {mirror.ground.mesh.name!r} mirrors what stands on it, once"
         return (
             PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
             PassSpec(PassName.TRACED, traced, cost=TRACE_COST),

@@ -1,0 +1,64 @@
+"""Grounds that mirror what stands on them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from translucent.arrays import Array
+from translucent.scene.scene import Object, Scene
+
+#: Roughness above which a coat mirrors no more than a haze.
+MOST_ROUGHNESS = 0.4
+
+#: Largest distance of a ground's vertices from its plane, as a share of its size.
+FLAT = 1e-6
+
+
+class Mirror(NamedTuple):
+    """Flat ground with a smooth coat.
+
+    Attributes
+    ----------
+    ground : Object
+    normal : (3,)
+        Unit vector to its outer side.
+    height : float
+        Of the ground along it, in metres from the world's origin.
+    """
+
+    ground: Object
+    normal: Array
+    height: float
+
+    @property
+    def matrix(self) -> Array:
+        """(4, 4): reflection at the plane."""
+        matrix = np.eye(4)
+        matrix[:3, :3] -= 2.0 * np.outer(self.normal, self.normal)
+        matrix[:3, 3] = 2.0 * self.height * self.normal
+        return matrix
+
+
+def mirror_of(scene: Scene) -> Mirror | None:
+    """Ground of a scene that mirrors its bodies, if it has one: the first flat shadow catcher with a smooth coat."""
+    for item in scene.objects:
+        surface = item.surface
+        if not item.shadow_catcher or surface is None or surface.ior == 1.0 or surface.metallic > 0:
+            continue
+        if (
+            surface.roughness > MOST_ROUGHNESS
+            or surface.roughness_texture is not None
+            or surface.normal_texture is not None
+        ):
+            continue
+        corners = (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3])[item.mesh.faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+        normal *= -1.0 if item.mirrored else 1.0
+        if not (length := float(np.linalg.norm(normal))) > 0:
+            continue
+        heights = (corners - corners[0, 0]).reshape(-1, 3) @ (normal / length)
+        if np.abs(heights).max() <= FLAT * np.abs(corners - corners[0, 0]).max():
+            return Mirror(item, normal / length, float(corners[0, 0] @ normal / length))
+    return None
