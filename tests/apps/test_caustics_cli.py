@@ -49,7 +49,7 @@ def test_photons_are_counted_in_the_plan(run: Run, model: Path, tmp_path: Path) 
     ("options", "message"),
     [
         (
-            ("goblet", "--preset", "crystal", "--caustics"),
+            ("goblet", "--preset", "crystal", "--stage", "none", "--caustics"),
             "error: caustics; the scene has no lights; add a tl.PointLight",
         ),
         (("goblet", "--caustics=0"), "error: Caustics photons 0; not a whole number in 1 to"),

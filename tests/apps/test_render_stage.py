@@ -66,7 +66,7 @@ def test_environments_take_the_place_of_the_stage(run: Run, tmp_path: Path, opti
     assert "shadow_maps" not in out
     code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", *SMALL)
     assert code == 0
-    assert "32 directions of the environment" in out
+    assert "128 directions of the environment" in out
 
 
 def test_transparent_pictures_keep_the_shadow(run: Run, tmp_path: Path) -> None:

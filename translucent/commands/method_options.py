@@ -61,7 +61,7 @@ def shadow_options(command: F) -> F:
         "--environment-shadows",
         type=int,
         metavar="N",
-        help="Directions of the environment that throw shadows onto opaque objects, 0 to 256. Default: 32 on a stage, "
+        help="Directions of the environment that throw shadows onto opaque objects, 0 to 256. Default: 128 on a stage, "
         "else none.",
     )(command)
     told = "Texels along a side of each light's map of shadows, 64 to 8192. Default: 1024. More make edges sharper."

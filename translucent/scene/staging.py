@@ -32,7 +32,7 @@ REACH = 60.0
 BRIGHT, DARK, FALLOFF_SIZE = 0.8, 9.0, 64
 
 #: Directions of the environment that throw shadows onto the ground.
-ENVIRONMENT_SHADOWS = 32
+ENVIRONMENT_SHADOWS = 128
 
 #: Share of the length of shadows that the default camera makes room for.
 SHADOW_SEEN = 0.7

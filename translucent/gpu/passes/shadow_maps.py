@@ -143,8 +143,7 @@ class ShadowMapsPass:
         everything = self._planned(dark, method, opaque=True)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
-        spectral = everything[1].spectral or not in_place or dark is not scene
-        atlas.make(views, spectral=spectral)
+        atlas.make(views, spectral=everything[1].spectral or not in_place or dark is not scene)
         center = media_center(scene)
         found_plans = {(True, dark is scene): everything}
         for view in views:
@@ -155,7 +154,7 @@ class ShadowMapsPass:
             if (key := (view.ends, clear)) not in found_plans:
                 found_plans[key] = self._planned(scene if clear else dark, method, opaque=view.ends)
             seen, chosen = found_plans[key]
-            chosen = replace(chosen, spectral=spectral)
+            chosen = chosen if dark is scene else replace(chosen, spectral=True)
             before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
             if in_place:
                 self._add_up(MapJob(self._gl, *before, view, center))
