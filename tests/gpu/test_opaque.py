@@ -66,8 +66,10 @@ def thin(method: Any) -> tl.ThinLayer | None:
     return method if isinstance(method, tl.ThinLayer) else None
 
 
-def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edges: float = 0.02) -> tl.Frame:
-    """Equal to the reference but at most at the edges of opaque objects, which are not in the counts of layers."""
+def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edges: float = 0.03) -> tl.Frame:
+    """Equal to the reference but at most at the edges of opaque objects and of shadows on them, which are not in the counts of
+    layers.
+    """
     frame, truth = renderer.render(scene, SIZE, method), references.render(scene, SIZE, thin(method))
     assert frame.valid.all()
     # Interior to both: no edge of a body, nor of the opaque object, within a pixel.

@@ -69,7 +69,8 @@ def test_an_object_without_a_surface_is_drawn_as_ever(renderer: tl.Renderer) -> 
     both = picture(renderer, shiny, plain, camera=camera, lights=light, environment=sky)
     covered = renderer.render(tl.Scene([plain, HIDDEN], camera), SIZE).radiance[..., 0] < 0.9
     assert covered.sum() > 30
-    assert (alone[covered] == both[covered]).all()
+    # To the last bits of a map of shadows, which fits what there is.
+    np.testing.assert_allclose(both[covered], alone[covered], rtol=1e-6)
     assert (alone != both).any()
 
 

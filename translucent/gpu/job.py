@@ -65,6 +65,8 @@ class FrameJob(SceneView):
         Takes the share of the frame's paths that have ended, now and then.
     corner : (int, int)
         Left and bottom of the picture in its targets.
+    for_map : bool
+        The frame is a map of shadows.
     path_only : bool
         The accumulator has paths of one medium alone, and no counts.
     covered : Part
@@ -73,7 +75,7 @@ class FrameJob(SceneView):
     """
 
     corner: tuple[int, int] = (0, 0)
-    path_only = False
+    for_map = path_only = False
 
     def __init__(
         self,

@@ -60,6 +60,8 @@ class MapJob(FrameJob):
         Of the media.
     """
 
+    for_map = True
+
     def __init__(
         self,
         gl: moderngl.Context,

@@ -20,10 +20,11 @@ class SignedDepthPass:
         """Draw the bodies."""
         job.begin_adding(spec.target)
         job.bind_opaque(0)
-        switches = {"WITH_NORMAL": False, "WITH_POSITION": False, "OPAQUE": job.features.has_opaque}
-        program = (
-            self._paths.program(**switches)
-            if job.path_only
-            else self._variants.program(SPECTRAL=job.plan.spectral, **switches)
-        )
-        job.draw(program, spec.objects)
+        opaque, switches = job.features.has_opaque, {"WITH_NORMAL": False, "WITH_POSITION": False}
+        variants = self._paths if job.path_only else self._variants
+        if not job.path_only:
+            switches["SPECTRAL"] = job.plan.spectral
+        if job.for_map:
+            # Nothing has to be compiled when an opaque object gets into the way of a light, or out of it.
+            variants.program(OPAQUE=not opaque, **switches)
+        job.draw(variants.program(OPAQUE=opaque, **switches), spec.objects)
