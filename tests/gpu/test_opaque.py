@@ -67,9 +67,7 @@ def thin(method: Any) -> tl.ThinLayer | None:
 
 
 def assert_equal(renderer: tl.Renderer, scene: tl.Scene, method: Any, opaque_edges: float = 0.03) -> tl.Frame:
-    """Equal to the reference but at most at the edges of opaque objects and of shadows on them, which are not in the counts of
-    layers.
-    """
+    """Equal to the reference but at most at edges of opaque objects and of shadows, which no counts of layers tell."""
     frame, truth = renderer.render(scene, SIZE, method), references.render(scene, SIZE, thin(method))
     assert frame.valid.all()
     # Interior to both: no edge of a body, nor of the opaque object, within a pixel.

@@ -132,19 +132,17 @@ class ShadowMapsPass:
         lights, sky = (
             [ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene))
         )
-        limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
-        views = ShadowViews.of(
-            [(found.cameras(), not found.open_ways) for found in lights],
-            [(found.cameras(), not found.open_ways) for found in sky],
-            job.plan.shadows.size,
-            limit,
-        )
         # Where all bodies are drawn as sheets, these throw the shadows, too.
         method = job.plan.method if job.plan.method.makes_sheets else None
         dark = _darkened(scene, job.plan.opaque_to_shadows)
         everything = self._planned(dark, method, opaque=True)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
+        views = ShadowViews.of(
+            *([(found.cameras(), not (found.open_ways and in_place)) for found in group] for group in (lights, sky)),
+            job.plan.shadows.size,
+            int(self._gl.info["GL_MAX_TEXTURE_SIZE"]),
+        )
         atlas.make(views, spectral=everything[1].spectral or not in_place or dark is not scene)
         center = media_center(scene)
         found_plans = {(True, dark is scene): everything}

@@ -29,8 +29,12 @@ class ThinLayerPass:
         switches = {"SPECTRAL": job.plan.spectral, "OPAQUE": job.features.has_opaque}
         holed = tuple(i for i in spec.objects if job.scene.objects[i].has_holes)
         if whole := tuple(i for i in spec.objects if i not in holed):
-            program = self._variants.program(WITH_NORMAL=1, WITH_POSITION=0, HOLES=0, VERTEX_COLORS=0, **switches)
-            job.draw(program, whole)
+            plain = {"WITH_NORMAL": 1, "WITH_POSITION": 0, "HOLES": 0, "VERTEX_COLORS": 0}
+            if job.for_map:
+                self._variants.program(
+                    **plain, **switches | {"OPAQUE": not switches["OPAQUE"]}
+                )  # as in SignedDepthPass
+            job.draw(self._variants.program(**plain, **switches), whole)
         for i in holed:
             body = job.scene.objects[i]
             assert body.surface is not None
