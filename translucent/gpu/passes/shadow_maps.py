@@ -138,11 +138,11 @@ class ShadowMapsPass:
         everything = self._planned(dark, method, opaque=True)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
-        views = ShadowViews.of(
-            *([(found.cameras(), not (found.open_ways and in_place)) for found in group] for group in (lights, sky)),
-            job.plan.shadows.size,
-            int(self._gl.info["GL_MAX_TEXTURE_SIZE"]),
+        limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
+        seen_by, seen_from_sky = (
+            [(found.cameras(), not (found.open_ways and in_place)) for found in group] for group in (lights, sky)
         )
+        views = ShadowViews.of(seen_by, seen_from_sky, job.plan.shadows.size, limit)
         atlas.make(views, spectral=everything[1].spectral or not in_place or dark is not scene)
         center = media_center(scene)
         found_plans = {(True, dark is scene): everything}
