@@ -55,7 +55,7 @@ void main() {
     vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
     vec3 towards_eye = surface_right.w == 1.0 ? -from_eye : -ray_forward.xyz;
     vec3 across = cross(way_along(texel, ivec2(1, 0), point), way_along(texel, ivec2(0, 1), point));
-    // What is one pixel wide faces the eye.
+    // What has no neighbors faces the eye.
     vec3 normal = normalize(dot(across, across) > 0.0 ? across : towards_eye);
     normal = dot(normal, towards_eye) < 0.0 ? -normal : normal;
 #if EVEN_LIGHT

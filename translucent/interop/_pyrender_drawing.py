@@ -115,7 +115,9 @@ def drawn_in(context: GpuContext, scene: Any, size: tuple[int, int], flags: int)
             with _as_render_error():
                 _draw(OpaqueRenderer(size, framebuffer.glo), scene, flags)
             clipping = Clipping.of(scene)
-            yield TextureBackdrop(color, depth, clipping.near, clipping.far, clipping.orthographic, GAMMA, ambient_of(scene))
+            yield TextureBackdrop(
+                color, depth, clipping.near, clipping.far, clipping.orthographic, GAMMA, ambient_of(scene)
+            )
         finally:
             for resource in (framebuffer, color, depth):
                 resource.release()

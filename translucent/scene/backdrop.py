@@ -19,6 +19,8 @@ from translucent.scene.lights import MAX_RADIANCE
 class Backdrop(Frozen):
     """Picture of everything opaque in a frame: rays through the media end at its depth, and its radiance is seen there.
 
+    Bodies throw the shadows of the scene's lights onto it, as onto opaque objects.
+
     The camera is that of the scene, and each pixel belongs to the ray through its center. Row 0 is the top row.
 
     Parameters
@@ -31,9 +33,9 @@ class Backdrop(Frozen):
     coverage : array_like (h, w) of bool, optional
         Where the picture is; elsewhere the environment of the scene is seen. Default: everywhere.
     ambient : str, float or (3,), optional
-        Radiance that lit the picture evenly from all around. The lights of the scene are taken for those that lit it, too:
-        bodies throw shadows onto it, which leave that share of its radiance that reaches a surface of all this light.
-        Default: the environment of the scene.
+        Radiance that lit the picture evenly from all around; default: the environment of the scene. With the lights of
+        the scene it is taken for all the light that the picture shows: bodies throw shadows onto it, which leave the
+        share of its radiance that reaches it of this light.
 
     Raises
     ------

@@ -13,9 +13,9 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
+from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.scene.backdrop import Backdrop
-from translucent.media.colors import ColorLike
 
 #: Depth of infinitely far pixels: behind everything, and yet seen.
 _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
