@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import re
 import uuid
 from collections.abc import Iterator
 
@@ -11,8 +10,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import shader_path
-from translucent.errors import RenderError
-from translucent.gpu.shaders import preprocess
+from translucent.gpu.shaders import gather, preprocess
 
 FOLDER = shader_path("README.md").parent
 STAGES = {".vert": 0x8B31, ".frag": 0x8B30}
@@ -53,19 +51,11 @@ def compiler(renderer: tl.Renderer) -> Iterator[Compiler]:
         yield Compiler()
 
 
-def switches_of(name: str) -> list[str]:
-    try:
-        preprocess(name)
-    except RenderError as error:
-        return re.findall(r"'(\w+)'", str(error).split("asks for")[1])
-    return []
-
-
 @pytest.mark.parametrize("name", SHADERS)
 @pytest.mark.parametrize("on", [False, True], ids=["plain", "all"])
 def test_no_warning(renderer: tl.Renderer, compiler: Compiler, name: str, on: bool) -> None:
     settled = SETTLED | SETTLED_IN.get(name, {})
-    switches = {switch: settled.get(switch, int(on)) for switch in switches_of(name)}
+    switches = {switch: settled.get(switch, int(on)) for switch in gather(name).switches}
     version = 430 if "std430" in preprocess(name, switches).text else 330
     if version == 430 and not renderer.gpu.capabilities.shader_storage:
         pytest.skip("this OpenGL has no shader storage buffers")
