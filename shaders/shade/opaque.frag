@@ -12,8 +12,8 @@
 #include "shade/shadows.glsl"
 #if SURFACE
 #include "shade/opaque_surface.glsl"
-#elif LIGHT_MAP
-uniform sampler2D light_irradiance;
+#else
+#include "shade/diffuse_light.glsl"
 #endif
 
 in float axial;
@@ -35,30 +35,11 @@ layout(location = 1) out vec4 radiance;
 #endif
 
 #if !SURFACE && !DEPTH_ONLY
-vec3 environment_irradiance(vec3 normal) {
-#if LIGHT_MAP
-    return light_scale * textureLod(light_irradiance, equirectangular_uv(normal, light_turn), 0.0).rgb;
-#else
-    // A backdrop fixed to the picture lights like the mean of its squares.
-    float share = light_kind == ENVIRONMENT_GRADIENT ? gradient_irradiance_share(normal) : 0.5;
-    return light_scale * PI * mix(light_first.rgb, light_second.rgb, share);
-#endif
-}
-
-vec3 irradiance_from(int light, vec3 normal) {
-    vec4 position = light_position[light];
-    vec3 towards = position.xyz - position.w * from_eye;
-    float distance_m = max(length(towards), 1e-18);
-    float facing = max(dot(towards / distance_m, normal), 0.0);
-    facing *= cone_attenuation(-towards / distance_m, light_cone[light]);
-    vec3 power = light_power[light].rgb * (position.w == 0.0 ? facing : facing / distance_m / distance_m);
-    return facing > 0.0 ? power * light_reaching(light, from_center, normal) : vec3(0.0);
-}
-
 vec3 diffuse_radiance(vec3 normal) {
     vec3 irradiance = environment_irradiance(normal) * environment_reaching(from_center, normal);
     for (int light = 0; light < light_count; ++light) {
-        irradiance += irradiance_from(light, normal);
+        vec3 sent = lamp_irradiance(light, from_eye, normal);
+        if (sent != vec3(0.0)) { irradiance += sent * light_reaching(light, from_center, normal); }
     }
     return color.rgb / PI * irradiance;
 }

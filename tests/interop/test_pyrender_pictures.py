@@ -14,6 +14,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.gpu.constants import CONSTANTS
 from translucent.interop.pyrender import backdrop_from_pyrender, render, render_scene, scene_from_pyrender, to_pyrender
+from translucent.planning.passes import PassName
 from translucent.reference.hits import line_hits, world_normals
 from translucent.reference.opaque import nearest_opaque
 
@@ -59,17 +60,42 @@ def test_one_context_and_arrays_give_the_same_picture(renderer: tl.Renderer, stu
 
 @pytest.mark.parametrize("flags", ["NONE", "SHADOWS_DIRECTIONAL"])
 @pytest.mark.parametrize("shared", [True, False])
-def test_beside_media_the_picture_is_that_of_pyrender(
+def test_beside_media_the_picture_is_that_of_pyrender_with_their_shadows(
     pyrender: ModuleType, renderer: tl.Renderer, studio: Any, shared: bool, flags: str
 ) -> None:
     scene, chosen = studio.scene(), getattr(pyrender.RenderFlags, flags)
     colors, _ = own_picture(pyrender, scene, "ball", chosen)
     frame = render(scene, {"ball": GREEN}, SIZE, renderer=renderer, shared=shared, flags=chosen)
-    beside = ~frame.coverage
-    assert beside.sum() > 1000
-    assert len(np.unique(colors[beside])) > 20
+    left = _left_of_light(scene, studio)
+    dimmed = (left != 1.0).any(axis=-1)
+    beside, alike = ~frame.coverage, tl.interior(dimmed.astype(np.int32))
+    lit, shadowed = beside & alike & ~dimmed, beside & alike & dimmed
+    assert lit.sum() > 1000
+    assert shadowed.sum() > 100
+    assert len(np.unique(colors[lit])) > 20
     encoded = np.rint(255.0 * frame.radiance.astype(np.float64) ** (1 / 2.2))
-    np.testing.assert_array_equal(encoded[beside], colors[beside])
+    np.testing.assert_array_equal(encoded[lit], colors[lit])
+    found = frame.radiance[shadowed] / (colors[shadowed] / 255.0) ** 2.2
+    assert left[shadowed].min() < 0.7
+    error = np.abs(found - left[shadowed])
+    # At outlines of shadows maps are off, and nobody tells where other things' shadows are in pyrender's picture.
+    assert np.quantile(error, 0.85) < 1e-4
+
+
+def _left_of_light(scene: Any, studio: Any) -> Array:
+    """(h, w, 3): share of pyrender's light that the ball leaves, where the float64 reference sees diffuse things."""
+    ours = scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
+    around = tl.Environment.constant(np.asarray(scene.ambient_light, dtype=np.float64))
+    radiance = [
+        tl.reference.render(
+            dataclasses.replace(
+                ours, environment=around, objects=[ball, tl.Object(studio.floor), tl.Object(studio.box)]
+            ),
+            SIZE,
+        ).radiance.astype(np.float64)
+        for ball in (ours.objects[0], tl.Object(studio.ball, tl.Medium()))
+    ]
+    return radiance[0] / radiance[1]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -227,7 +253,7 @@ def test_any_method_works_over_the_picture(renderer: tl.Renderer, studio: Any) -
     expected = render(scene, {"ball": GREEN}, SIZE, renderer=renderer)
     for method in (tl.DepthPeeling(), tl.BackFaceDepth()):
         frame = render(scene, {"ball": GREEN}, SIZE, method, renderer=renderer)
-        assert frame.plan.passes[0].name == "backdrop"
+        assert frame.plan.has(PassName.BACKDROP)
         np.testing.assert_allclose(frame.radiance, expected.radiance, atol=1e-4)
 
 
@@ -244,7 +270,7 @@ def test_opaque_objects_of_the_toolkit_drawn_by_pyrender(renderer: tl.Renderer, 
         scene = tl.Scene(objects, camera, lights, environment)
         drawn, own = render_scene(scene, SIZE, renderer=renderer), renderer.render(scene, SIZE)
         assert drawn.provenance["opaque"] == "pyrender 0.1.45 through arrays"
-        assert drawn.plan.passes[0].name == "backdrop"
+        assert [step.name for step in drawn.plan.passes[:2]] == ["shadow_maps", "backdrop"]
         # The environment is seen where nothing is in front, itself and not a picture of it.
         sky = np.isinf(_ahead(renderer, scene))
         off = np.stack([np.roll(sky, shift, axis) for shift in (-1, 1) for axis in (0, 1)]).all(axis=0) & sky
@@ -290,13 +316,14 @@ def test_at_edges_the_environment_is_seen_in_part(pyrender: ModuleType) -> None:
     # One pixel of three is covered by half, by a surface that is encoded as 0.8.
     colors = np.array([[[0, 0, 0, 0], [102, 102, 102, 128], [204, 204, 204, 255]]], dtype=np.uint8)
     environment = tl.Environment.constant((3.0, 2.0, 1.0))
-    picture = Picture(colors, np.array([[np.inf, 2.0, 2.0]]))
+    picture = Picture(colors, np.array([[np.inf, 2.0, 2.0]]), (0.5, 0.5, 0.5))
     backdrop = picture.before(environment, tl.Camera(np.eye(4)))
     share, surface = 128 / 255, (102 / 128) ** 2.2
     np.testing.assert_allclose(backdrop.radiance[0, 1], share * surface + (1 - share) * np.array([3.0, 2.0, 1.0]), 1e-6)
     np.testing.assert_allclose(backdrop.radiance[0, 2], 0.8**2.2, rtol=1e-6)
     assert backdrop.coverage is not None
     assert backdrop.coverage.tolist() == [[False, True, True]]
+    assert backdrop.ambient == (0.5, 0.5, 0.5)
 
 
 def test_far_from_the_origin_pyrender_draws_as_well(renderer: tl.Renderer, studio: Any) -> None:

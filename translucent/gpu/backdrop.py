@@ -23,6 +23,8 @@ class TextureBackdrop:
         The depth is that of an orthographic camera: linear in metres.
     gamma : float
         1 for linear colors.
+    ambient : (float, float, float), optional
+        Linear radiance that lit the picture evenly from all around, as `Backdrop.ambient`.
     """
 
     color: moderngl.Texture
@@ -31,6 +33,7 @@ class TextureBackdrop:
     far: float
     orthographic: bool
     gamma: float
+    ambient: tuple[float, float, float] | None = None
 
     @property
     def size(self) -> tuple[int, int]:

@@ -39,6 +39,11 @@ class FrameFeatures:
         return self.plan.has(PassName.SHADOW_MAPS)
 
     @property
+    def shadows_backdrop(self) -> bool:
+        """Whether bodies throw shadows onto a picture that is drawn elsewhere."""
+        return self.has_shadow_maps and self.plan.has(PassName.BACKDROP)
+
+    @property
     def has_surfaces(self) -> bool:
         """Whether any body has an interface that changes light."""
         return self.plan.has(PassName.SURFACES, PassName.TRACED)

@@ -209,6 +209,6 @@ def _contents(
         LIGHTS: light_uniforms(scene, shine),
         ENVIRONMENT: environment_uniforms(scene.environment),
     }
-    if features.has_surfaces or features.path_traced or features.has_caustics:
+    if features.has_surfaces or features.path_traced or features.has_caustics or features.shadows_backdrop:
         contents[SURFACES] = surface_uniforms(placed, size)
     return contents

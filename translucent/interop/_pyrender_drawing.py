@@ -19,7 +19,7 @@ from OpenGL.error import Error as OpenGLError
 from translucent.errors import RenderError
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import GpuContext
-from translucent.interop._pyrender_pictures import GAMMA, Clipping, Picture
+from translucent.interop._pyrender_pictures import GAMMA, Clipping, Picture, ambient_of
 
 Flags = pyrender.RenderFlags
 
@@ -115,7 +115,9 @@ def drawn_in(context: GpuContext, scene: Any, size: tuple[int, int], flags: int)
             with _as_render_error():
                 _draw(OpaqueRenderer(size, framebuffer.glo), scene, flags)
             clipping = Clipping.of(scene)
-            yield TextureBackdrop(color, depth, clipping.near, clipping.far, clipping.orthographic, GAMMA)
+            yield TextureBackdrop(
+                color, depth, clipping.near, clipping.far, clipping.orthographic, GAMMA, ambient_of(scene)
+            )
         finally:
             for resource in (framebuffer, color, depth):
                 resource.release()
@@ -151,7 +153,7 @@ def drawn_apart(scene: Any, size: tuple[int, int], flags: int) -> Picture:
                 colors, depth = offscreen.render(scene, flags)
             finally:
                 offscreen.delete()
-    return Picture(colors, Clipping.of(scene).metres(depth))
+    return Picture(colors, Clipping.of(scene).metres(depth), ambient_of(scene))
 
 
 def _offscreen(size: tuple[int, int]) -> Any:

@@ -48,16 +48,25 @@ class Clipping:
         return np.asarray(metres)
 
 
+def ambient_of(scene: Any) -> tuple[float, float, float]:
+    """Radiance of the light from all around with which pyrender draws a scene."""
+    red, green, blue = map(float, scene.ambient_light[:3])
+    return red, green, blue
+
+
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Picture drawn by pyrender, row 0 at the top: `colors` (h, w, 4) uint8, encoded, and `depth` (h, w) in metres."""
+    """Picture drawn by pyrender, row 0 at the top: `colors` (h, w, 4) uint8, encoded, and `depth` (h, w) in metres; and
+    the light from all around that it was drawn with.
+    """
 
     colors: npt.NDArray[np.uint8]
     depth: npt.NDArray[np.float64]
+    ambient: tuple[float, float, float]
 
     def backdrop(self) -> Backdrop:
         """The picture with its background."""
-        return Backdrop((self.colors[..., :3] / 255.0) ** GAMMA, self.depth)
+        return Backdrop((self.colors[..., :3] / 255.0) ** GAMMA, self.depth, ambient=self.ambient)
 
     def before(self, environment: Environment, camera: Camera) -> Backdrop:
         """The picture before an environment, where it was drawn on a background without opacity."""
@@ -68,4 +77,4 @@ class Picture:
         positions = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1) / height
         behind = environment.radiance(camera.rays((width, height))[1], positions)
         radiance = opacity * encoded**GAMMA + (1.0 - opacity) * behind
-        return Backdrop(radiance, self.depth, coverage=opacity[..., 0] > 0.0)
+        return Backdrop(radiance, self.depth, coverage=opacity[..., 0] > 0.0, ambient=self.ambient)

@@ -127,7 +127,9 @@ def render(
         True: pyrender draws in the OpenGL context of the renderer, and nothing is read back. False: in one of its own,
         and arrays are copied. None: shared where that works. ``frame.provenance["opaque"]`` says which, and why.
     flags : int
-        `pyrender.RenderFlags` for shadows, culling and wireframes. Media cast no shadows.
+        `pyrender.RenderFlags` for shadows, culling and wireframes. Media cast colored shadows in any case: what
+        pyrender draws is multiplied by the share of its lights and `ambient_light` that they leave, in pyrender's own
+        shadows, too.
 
     Returns
     -------

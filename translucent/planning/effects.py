@@ -42,7 +42,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: Interfaces
         text = f"surfaces of opaque objects: {object_names(finished)} reflect diffusely, in one color each"
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
     effects += layer_effects(scene, interfaces=surfaces)
-    effects += _shadow_effects(scene)
+    effects += shadow_effects(scene) if scene.opaque else []
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
         text = f'priorities: overlap="{scene.overlap}" does not use them'
         effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
@@ -73,10 +73,8 @@ def with_given_back_told(plan: RenderPlan, scene: Scene, back: GivenBack) -> Ren
     return replace(plan, given_back=back, unmodelled=(*plan.unmodelled, *notes))
 
 
-def _shadow_effects(scene: Scene) -> list[Note]:
-    """Notes on shadows on opaque objects that are not rendered."""
-    if not scene.opaque:
-        return []
+def shadow_effects(scene: Scene) -> list[Note]:
+    """Notes on shadows on opaque objects that are not rendered, where there are some, or a picture of them."""
     notes = []
     if not scene.environment_shadows and scene.environment.mean.any():
         text = "shadows of the environment: its light reaches opaque objects through everything"

@@ -10,7 +10,7 @@ from translucent.planning.assembly import COSTS, assembled, with_unlit_marked
 from translucent.planning.bodies import scatters, solids_of
 from translucent.planning.caustic_plan import with_caustics
 from translucent.planning.caustics import Caustics, check_caustics
-from translucent.planning.effects import unmodelled_effects, with_ambient_told, with_given_back_told
+from translucent.planning.effects import shadow_effects, unmodelled_effects, with_ambient_told, with_given_back_told
 from translucent.planning.interface_choice import USUAL_DEPTH, check_interfaces, chosen_interfaces, with_fallback_told
 from translucent.planning.interfaces import Interfaces, ScreenInterfaces, TracedInterfaces
 from translucent.planning.interfaces.places import with_interfaces
@@ -207,12 +207,14 @@ def plan_over_backdrop(
         scene, method, capabilities, interfaces=interfaces or ScreenInterfaces(), scattering=scattering, shadows=shadows
     )
     reason = "opaque objects come as a picture drawn elsewhere: rays through the media end at its depth"
+    picture = PassSpec(PassName.BACKDROP, reason, cost=COSTS["resolve"])
     return dataclasses.replace(
         chosen,
-        passes=(PassSpec(PassName.BACKDROP, reason, cost=COSTS["resolve"]), *chosen.passes),
+        passes=(*shadow_passes(scene, over_backdrop=True), picture, *chosen.passes),
         unmodelled=(
             *chosen.unmodelled,
-            Note(NoteKind.SHADOWS, "shadows between the media and what is drawn elsewhere"),
+            *shadow_effects(scene),
+            Note(NoteKind.SHADOWS, "shadows of what is drawn elsewhere on the media"),
         ),
     )
 

@@ -51,17 +51,18 @@ def check_shadows(shadows: object) -> None:
         raise InputError(f"shadows {shadows!r}", "not a choice of shadows", "give for example tl.ShadowMaps(size=2048)")
 
 
-def shadow_passes(scene: Scene) -> tuple[PassSpec, ...]:
-    """The pass that renders maps of shadows; none without opaque objects and light on them."""
+def shadow_passes(scene: Scene, *, over_backdrop: bool = False) -> tuple[PassSpec, ...]:
+    """The pass that renders maps of shadows; none without something opaque, such as a backdrop, and light on it."""
     opaque = indices(scene, lambda item: item.medium is None)
     views = len(scene.lights) + scene.environment_shadows
-    if not opaque or not views:
+    if not (opaque or over_backdrop) or not views:
         return ()
     lights = f"{len(scene.lights)} {'light' if len(scene.lights) == 1 else 'lights'}"
     sky = f"{scene.environment_shadows} directions of the environment"
     sources = " and ".join(what for what, there in ((lights, scene.lights), (sky, scene.environment_shadows)) if there)
+    receivers = "the picture drawn elsewhere" if over_backdrop else count_of(opaque, "opaque object", "opaque objects")
     reason = (
-        f"{sources} on {count_of(opaque, 'opaque object', 'opaque objects')}: signed depth from each, as far as the "
+        f"{sources} on {receivers}: signed depth from each, as far as the "
         "first opaque surface, tells the color of its shadow; kept until objects or lights change"
     )
     cost = views * (1.0 + SignedDepth.cost_for(spectral=media_differ(scene)))

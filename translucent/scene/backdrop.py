@@ -10,12 +10,16 @@ import numpy.typing as npt
 
 from translucent.errors import InputError
 from translucent.frozen import Frozen
+from translucent.media.colors import ColorLike
+from translucent.scene.environment import parse_radiance
 from translucent.scene.lights import MAX_RADIANCE
 
 
 @dataclass(frozen=True, eq=False)
 class Backdrop(Frozen):
     """Picture of everything opaque in a frame: rays through the media end at its depth, and its radiance is seen there.
+
+    Bodies throw the shadows of the scene's lights onto it, as onto opaque objects.
 
     The camera is that of the scene, and each pixel belongs to the ray through its center. Row 0 is the top row.
 
@@ -28,6 +32,10 @@ class Backdrop(Frozen):
         radiance is seen there, too.
     coverage : array_like (h, w) of bool, optional
         Where the picture is; elsewhere the environment of the scene is seen. Default: everywhere.
+    ambient : str, float or (3,), optional
+        Radiance that lit the picture evenly from all around; default: the environment of the scene. With the lights of
+        the scene it is taken for all the light that the picture shows: bodies throw shadows onto it, which leave the
+        share of its radiance that reaches it of this light.
 
     Raises
     ------
@@ -38,6 +46,7 @@ class Backdrop(Frozen):
     radiance: npt.NDArray[np.floating[Any]]
     depth: npt.NDArray[np.floating[Any]]
     coverage: npt.NDArray[np.bool_] | None = None
+    ambient: ColorLike | None = None
 
     def __post_init__(self) -> None:
         radiance, depth = _numbers("radiance", self.radiance, np.float32), _numbers("depth", self.depth, np.float64)
@@ -67,6 +76,9 @@ class Backdrop(Frozen):
                 found = f"coverage of shape {coverage.shape} and type {coverage.dtype}"
                 raise InputError("backdrop", found, f"give shape {depth.shape} and type bool")
             self._freeze("coverage", coverage)
+        if self.ambient is not None:
+            ambient = parse_radiance("ambient radiance of a backdrop", self.ambient)
+            object.__setattr__(self, "ambient", tuple(ambient.tolist()))
 
     def __repr__(self) -> str:
         return f"Backdrop({self.size[0]}x{self.size[1]}, {np.count_nonzero(np.isfinite(self.depth))} pixels end rays)"

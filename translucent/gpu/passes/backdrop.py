@@ -10,8 +10,10 @@ import numpy as np
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.opaque import shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
+from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.scene.backdrop import Backdrop
 
@@ -20,21 +22,31 @@ _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
 
 _COLOR, _DEPTH = range(2)
 
+#: Texture units of ``shaders/shade/backdrop_shadows.frag``.
+_SHADOW_UNITS = {
+    name: unit for unit, name in enumerate(("opaque_axial_depth", "light_irradiance", "shadow_sums", "shadow_ends"))
+}
+
 
 class BackdropPass:
-    """Copy of the job's backdrop into the target of opaque objects; see ``shaders/shade/backdrop.frag``."""
+    """Copy of the job's backdrop into the target of opaque objects, with the shadows of bodies on it; see
+    ``shaders/shade/backdrop.frag`` and ``shaders/shade/backdrop_shadows.frag``.
+    """
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(
             gl, "geometry/fullscreen.vert", "shade/backdrop.frag", backdrop_color=_COLOR, backdrop_depth=_DEPTH
         )
+        self._shadows = Variants(gl, "geometry/fullscreen.vert", "shade/backdrop_shadows.frag", **_SHADOW_UNITS)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Fill the target; it is the same for all samples of a pixel."""
+        """Fill the target; but for shadows of the environment, it is the same for all samples of a pixel."""
         if isinstance(job.backdrop, Backdrop):
             _upload(job, job.backdrop)
         elif job.backdrop is not None:
             self._draw(job, job.backdrop)
+        if job.backdrop is not None and job.features.shadows_backdrop:
+            self._shadow(job, job.backdrop.ambient)
 
     def _draw(self, job: FrameJob, backdrop: TextureBackdrop) -> None:
         job.targets.opaque().use()
@@ -51,6 +63,27 @@ class BackdropPass:
         set_uniform(program, "gamma", backdrop.gamma)
         set_uniform(program, "behind_all", _BEHIND_ALL)
         self._variants.draw_fullscreen(program)
+
+    def _shadow(self, job: FrameJob, ambient: ColorLike | None) -> None:
+        """Multiply the radiance by the share of its light that reaches it."""
+        axial_depth = job.targets.opaque().color_attachments[0]
+        job.targets.view("opaque", 1).use()  # what is read may not be attached
+        job.gl.enable_only(moderngl.BLEND)
+        job.gl.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+        environment = job.scene.environment
+        light_map = ambient is None and environment.kind == "image"
+        program = self._shadows.program(
+            LIGHT_MAP=light_map, EVEN_LIGHT=ambient is not None, **shadow_switches(True, job.resources)
+        )
+        axial_depth.use(_SHADOW_UNITS["opaque_axial_depth"])
+        job.resources.shadows.use(_SHADOW_UNITS)
+        if light_map:
+            irradiance = job.resources.environments.light(environment).irradiance
+            irradiance.use(_SHADOW_UNITS["light_irradiance"])
+        set_uniform(program, "behind_all", _BEHIND_ALL)
+        if ambient is not None:
+            set_uniform(program, "even_light", ambient)
+        self._shadows.draw_fullscreen(program)
 
 
 def _upload(job: FrameJob, backdrop: Backdrop) -> None:
