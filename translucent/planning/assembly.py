@@ -63,6 +63,7 @@ def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, ca
     unmodelled = (
         *unmodelled_effects(scene, scattering=lit, interfaces=interfaces),
         *_touching(scene, method, interfaces),
+        *(_through_bodies(scene) if found else ()),
     )
     used = interfaces if found else None
     return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled, interfaces=used)
@@ -113,6 +114,13 @@ def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Not
         return ()
     text = f"{touching}; {type(method).__name__} does not find it, and takes the interface between them for the last"
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
+
+
+def _through_bodies(scene: Scene) -> tuple[Note, ...]:
+    """Note on light on interfaces that bodies on its way do not dim: maps of shadows end at what is opaque."""
+    if not scene.lights or not any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in scene.bodies):
+        return ()
+    return (Note(NoteKind.SHADOWS, "shadows on bodies: lights reach their highlights and paint through bodies"),)
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
