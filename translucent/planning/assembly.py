@@ -117,10 +117,15 @@ def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Not
 
 
 def _through_bodies(scene: Scene) -> tuple[Note, ...]:
-    """Note on light on interfaces that bodies on its way do not dim: maps of shadows end at what is opaque."""
-    if not scene.lights or not any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in scene.bodies):
-        return ()
-    return (Note(NoteKind.SHADOWS, "shadows on bodies: lights reach their highlights and paint through bodies"),)
+    """Notes on shadows on interfaces that are not rendered: maps have what is on the way to opaque objects alone."""
+    notes = []
+    dense = (body for body in scene.bodies if not body.covers and body.medium and (body.medium.extinction > 0).any())
+    if scene.lights and any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in dense):
+        notes.append("lights reach their highlights and paint through bodies")
+    painted = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
+    if scene.environment_shadows and any(painted):
+        notes.append("light of the environment reaches their paint through everything")
+    return tuple(Note(NoteKind.SHADOWS, f"shadows on bodies: {text}") for text in notes)
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
