@@ -70,8 +70,18 @@ def test_no_light_reaches_a_ball_behind_a_wall(shown: Any, light: str, part: str
     np.testing.assert_allclose(shown(scene(light, part, wall(BESIDE))), alone, rtol=1e-4, atol=1e-5 * alone.max())
 
 
+def test_nor_does_it_reach_paint_on_paths(renderer: tl.Renderer) -> None:
+    ball = tl.Object(BALL, tl.Medium(absorption=100), surface=PARTS["paint"])
+    alone, behind = (
+        renderer.render(tl.Scene([ball, *others], CAMERA, [LIGHTS["sun"]], DARK), SIZE, tl.PathTraced(2)).radiance
+        for others in ((), (wall(BEHIND),))
+    )
+    assert alone.max() > 0.05
+    assert behind.max() <= 1e-6 * alone.max()
+
+
 @pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("light", ["sun", "lamp"])
 def test_a_shadow_on_a_body_is_the_reference_s(shown: Any, light: str, part: str) -> None:
     """On flat faces, where a pixel's normals make no highlight rougher, and but for a texel at its edge."""
     drawn = scene(light, part, wall(HALF), mesh=CUBE)
