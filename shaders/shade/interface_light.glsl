@@ -63,7 +63,7 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     return towards;
 }
 
-// Microfacets that mirror the lights; nothing shadows them.
+// Microfacets that mirror the lights, where nothing opaque blocks them.
 vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
@@ -75,18 +75,18 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
         vec3 half_way = normalize(towards - ray);
         float mirrored = fresnel_dielectric(max(dot(half_way, towards), 0.0), ior)
             * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
-        sum += mirrored * cos_light * irradiance;
+        sum += mirrored * cos_light * light_unblocked(light, point, normal) * irradiance;
     }
     return sum;
 }
 
-// unoccluded: share of the environment's light.
+// On interfaces, where opaque objects block lights. unoccluded: share of the environment's light.
 vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
     vec3 sum = unoccluded * environment_irradiance(normal);
     for (int light = 0; light < light_count; ++light) {
         vec3 irradiance;
-        vec3 towards = towards_light(light, point, irradiance);
-        sum += max(dot(normal, towards), 0.0) * irradiance;
+        float facing = dot(normal, towards_light(light, point, irradiance));
+        if (facing > 0.0) { sum += facing * irradiance * light_unblocked(light, point, normal); }
     }
     return sum;
 }

@@ -1,5 +1,5 @@
-// Light that reaches a point of an opaque surface through everything on the straight way: a lookup in maps of paths to the
-// first opaque surface on each ray of a light. Transmittance is interpolated between four texels, each of which counts only if the surface, made
+// Light that reaches a point of an opaque surface through everything on the straight way, or an interface past what is opaque: a
+// lookup in maps of paths to the first opaque surface on each ray of a light. Transmittance is interpolated between four texels, each of which counts only if the surface, made
 // flat, is not behind what is opaque there (receiver plane, Isidoro 2006): so no surface shadows itself, however it is inclined.
 // Needs <constants>. Points count from the center of the media; normals are unit vectors.
 
@@ -52,8 +52,9 @@ vec3 texel_transmittance(ivec2 at, float advance) {
     return exp(-clamp(optical_depth * advance, 0.0, MAX_OPTICAL_DEPTH));
 }
 
-// Transmittance of the way to a point; 1 beyond the map, where nothing is that throws a shadow.
-vec3 light_through(ShadowView view, vec3 point, vec3 normal) {
+// Transmittance of the way to a point; 1 beyond the map, where nothing is that throws a shadow. If not dimmed, the share that
+// nothing opaque blocks.
+vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed) {
     vec4 here = vec4(point, 1.0);
     vec3 seen = vec3(dot(view.right, here), dot(view.up, here), dot(view.ahead, here));
     float spread = view.perspective ? seen.z : 1.0;
@@ -79,18 +80,32 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal) {
         ivec2 at = ivec2(view.corner + texel);
         if (view.ends && ahead + clamp(rise, -steepest, steepest) > texelFetch(shadow_ends, at, 0).r + SHADOW_MARGIN * texel_metres) { continue; }
         vec2 weights = mix(1.0 - share, share, aside);
-        sum += weights.x * weights.y * texel_transmittance(at, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0);
+        vec3 passed = dimmed ? texel_transmittance(at, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0) : vec3(1.0);
+        sum += weights.x * weights.y * passed;
     }
     return sum;
 }
 
-vec3 light_reaching(int light, vec3 point, vec3 normal) {
-    int first = int(shadow_lights[light].x), count = int(shadow_lights[light].y);
-    if (count == 0) { return vec3(1.0); }
-    if (count == 1) { return light_through(shadow_view(first), point, normal); }
+// The map of a light that has any in which a point is seen.
+ShadowView light_view(int light, vec3 point) {
+    int first = int(shadow_lights[light].x);
+    if (int(shadow_lights[light].y) == 1) { return shadow_view(first); }
     // All six look from the light; the first along +x.
     vec3 from_light = vec3(shadow_views[4 * first + 2].w, shadow_views[4 * (first + 2) + 2].w, shadow_views[4 * (first + 4) + 2].w) + point;
-    return light_through(shadow_view(first + shadow_cube_face(from_light)), point, normal);
+    return shadow_view(first + shadow_cube_face(from_light));
+}
+
+vec3 light_reaching(int light, vec3 point, vec3 normal) {
+    if (int(shadow_lights[light].y) == 0) { return vec3(1.0); }
+    return light_through(light_view(light, point), point, normal, true);
+}
+
+// Share of a light that opaque objects let pass to an interface. What media keep of it is not known: the maps have the
+// paths to the first opaque surface, and not to where an interface is.
+float light_unblocked(int light, vec3 point, vec3 normal) {
+    if (int(shadow_lights[light].y) == 0) { return 1.0; }
+    ShadowView view = light_view(light, point);
+    return view.ends ? light_through(view, point, normal, false).r : 1.0;
 }
 
 // Share of the light of the environment that reaches a surface.
@@ -102,11 +117,12 @@ vec3 environment_reaching(vec3 point, vec3 normal) {
     }
     for (int i = sky_first; i < sky_count; i += sky_step) {
         vec3 light = sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
-        if (light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal); }
+        if (light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal, true); }
     }
     return mix(vec3(1.0), float(sky_step) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }
 #else
+float light_unblocked(int light, vec3 point, vec3 normal) { return 1.0; }
 vec3 light_reaching(int light, vec3 point, vec3 normal) { return vec3(1.0); }
 vec3 environment_reaching(vec3 point, vec3 normal) { return vec3(1.0); }
 #endif

@@ -68,13 +68,14 @@ vec3 environment_seen(Path path, vec2 pixel) {
 #endif
 }
 
-// Irradiance that nothing shadows, as paint has it.
-vec3 open_irradiance(vec3 point, vec3 normal) {
+// Irradiance on paint, where opaque objects block lights.
+vec3 unblocked_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal);
 #if LAMPS
     for (int light = 0; light < light_count; ++light) {
         Lamp lamp = lamp_at(light, point);
-        sum += max(dot(normal, lamp.towards), 0.0) * lamp.irradiance;
+        float facing = dot(normal, lamp.towards);
+        if (facing > 0.0) { sum += facing * lamp.irradiance * light_unblocked(light, point, normal); }
     }
 #endif
     return sum;
@@ -263,8 +264,8 @@ void meet(inout Path path, Place place, TracedBody body, int before, int after, 
         chance /= chance + dot(path.share, back);
         // Paint is lit by all that passes, whatever the path does.
         path.light += path.share * on * (1.0 - body.transmission)
-            * (body.transmission < 1.0 ? body.color * (1.0 - body.passed_share) * open_irradiance(point, normal)
-            + body.passed * open_irradiance(point, -normal) : vec3(0.0)) / PI;
+            * (body.transmission < 1.0 ? body.color * (1.0 - body.passed_share) * unblocked_irradiance(point, normal)
+            + body.passed * unblocked_irradiance(point, -normal) : vec3(0.0)) / PI;
         passes = shares.x < chance;
         way = passes ? path.direction : way;
         path.share *= passes ? on / chance : back / (1.0 - chance);
@@ -274,8 +275,8 @@ void meet(inout Path path, Place place, TracedBody body, int before, int after, 
     }
     if (passes) {
         if (body.transmission < 1.0 && painted.r > 0.0) {
-            vec3 front = body.color * (1.0 - body.passed_share) * open_irradiance(point, normal);
-            path.light += path.share * (1.0 - body.transmission) * (front + body.passed * open_irradiance(point, -normal)) / PI;
+            vec3 front = body.color * (1.0 - body.passed_share) * unblocked_irradiance(point, normal);
+            path.light += path.share * (1.0 - body.transmission) * (front + body.passed * unblocked_irradiance(point, -normal)) / PI;
         }
         path.share *= passing;
         path.record = place.record;

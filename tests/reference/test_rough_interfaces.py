@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.reference.dielectrics import BLACK, UP_AND_DOWN, Array, oblique, slab
 from translucent.formulas import interface, optics
+from translucent.geometry.solids import Box
 from translucent.media.medium import Medium
 from translucent.reference import microfacets, refracted_light
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
@@ -143,6 +145,12 @@ def test_highlights_of_lights_in_rough_interfaces() -> None:
     )
     found, _ = refracted_light(scene, (1, 1), paths=2)
     np.testing.assert_allclose(found.radiance[0], expected, rtol=1e-10)
+    # What is between the light and the interface, and not between that and the eye, dims and blocks it.
+    between = Box((8.0, 20.0, -4.0), (12.0, 20.3, 0.0)).tessellate()
+    way = 0.3 * float(np.linalg.norm(light.direction)) / -light.direction[1]
+    for medium, share in ((Medium(absorption=(1, 2, 3)), np.exp(-way * np.array([1, 2, 3]))), (None, np.zeros(3))):
+        found, _ = refracted_light(replace(scene, objects=[body, Object(between, medium)]), (1, 1), paths=2)
+        np.testing.assert_allclose(found.radiance[0], share * expected, rtol=1e-10)
 
 
 def test_noise_falls_with_the_number_of_paths_and_is_told() -> None:

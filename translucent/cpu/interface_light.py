@@ -10,7 +10,6 @@ from translucent.cpu.vectors import dot, unit
 from translucent.formulas import optics
 from translucent.formulas.interface import ggx_distribution, ggx_visibility, slab_reflectance
 from translucent.reference.interfaces import Optics
-from translucent.reference.opaque import seen_from
 from translucent.reference.rays import Rays
 from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.lights import PositionalLight
@@ -23,7 +22,7 @@ class InterfaceLight:
     ----------
     own : Optics
     light : SurfaceLight
-        On paint.
+        On paint, and mirrored in rough interfaces.
     """
 
     def __init__(self, own: Optics, light: SurfaceLight) -> None:
@@ -64,15 +63,14 @@ class InterfaceLight:
             found[painted] += share[painted] / np.pi * light
 
     def _add_highlights(self, found: Array, rays: Rays, met: Meetings, rough: Integers) -> None:
-        """Add single reflections of lights without shadows."""
+        """Add single reflections of lights, as far as their light reaches the interfaces straight on."""
         points, normals, to_eye = rays.origins[rough], met.normals[rough], -rays.directions[rough]
         cos_view = np.clip(dot(normals, to_eye), 0.0, 1.0)
-        for light in self.scene.lights:
-            own = seen_from(light, self.scene.camera.eye)
-            if isinstance(own, PositionalLight):
-                to_light = unit(np.asarray(own.position) - points)
+        for light in self.light.paths.lights:
+            if isinstance(light, PositionalLight):
+                to_light = unit(np.asarray(light.position) - points)
             else:
-                to_light = np.broadcast_to(-np.asarray(own.direction), points.shape)
+                to_light = np.broadcast_to(-np.asarray(light.direction), points.shape)
             half = unit(to_eye + to_light)
             cos_half, cos_light = (np.clip(dot(normals, way), 0.0, 1.0) for way in (half, to_light))
             cos_facet = np.clip(dot(half, to_eye), 0.0, 1.0)
@@ -80,7 +78,9 @@ class InterfaceLight:
             density = ggx_distribution(cos_half, met.alpha[rough])
             visible = ggx_visibility(cos_light, cos_view, met.alpha[rough])
             with np.errstate(under="ignore"):
-                found[rough] += share * (density * visible)[:, None] * own.irradiance_on(points, normals)
+                mirrored = share * (density * visible)[:, None] * light.irradiance_on(points, normals)
+                lit = np.flatnonzero(mirrored.any(axis=1))
+                found[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
 
     def _mirrored(self, item: Integers, cosine: Array, ior: Array) -> Array:
         """(k, 3): share of light that microfacets mirror, those of sheets from both sides."""

@@ -63,6 +63,7 @@ def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, ca
     unmodelled = (
         *unmodelled_effects(scene, scattering=lit, interfaces=interfaces),
         *_touching(scene, method, interfaces),
+        *(_through_bodies(scene) if found else ()),
     )
     used = interfaces if found else None
     return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled, interfaces=used)
@@ -113,6 +114,18 @@ def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Not
         return ()
     text = f"{touching}; {type(method).__name__} does not find it, and takes the interface between them for the last"
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
+
+
+def _through_bodies(scene: Scene) -> tuple[Note, ...]:
+    """Notes on shadows on interfaces that are not rendered: maps have what is on the way to opaque objects alone."""
+    notes = []
+    dense = (body for body in scene.bodies if not body.covers and body.medium and (body.medium.extinction > 0).any())
+    if scene.lights and any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in dense):
+        notes.append("lights reach their highlights and paint through bodies")
+    painted = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
+    if scene.environment_shadows and any(painted):
+        notes.append("light of the environment reaches their paint through everything")
+    return tuple(Note(NoteKind.SHADOWS, f"shadows on bodies: {text}") for text in notes)
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:

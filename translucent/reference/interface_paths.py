@@ -243,7 +243,7 @@ class InterfacePaths:
         legs = self._moved(legs.where(met), interfaces.distance, interfaces.here, self.own.tolerance)
         if not len(legs):
             return legs
-        outcome = Meetings(self.own, legs, interfaces, self.surface.on_interfaces, self.rng, self.straight).outcome()
+        outcome = Meetings(self.own, legs, interfaces, self.surface, self.rng, self.straight).outcome()
         self._add(legs, outcome.radiance)
         legs = self._one_branch(joined(outcome.branches))
         self.interfaces_met[legs.owner] += 1

@@ -19,8 +19,8 @@ from translucent.formulas.interface import (
 from translucent.reference.interfaces import Inside, Interfaces, Optics, interface_normals
 from translucent.reference.legs import Legs
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
-from translucent.reference.opaque import Irradiance, seen_from
 from translucent.reference.straight_light import StraightLight
+from translucent.reference.surface_light import SurfaceLight
 from translucent.scene.lights import PositionalLight
 
 #: Number of passages through a rough sheet after which light counts as lost.
@@ -52,13 +52,14 @@ class Meetings:
     legs : Legs
         With their origins moved to the interfaces.
     interfaces : Interfaces
-    irradiance : callable
-        On paint: `SurfaceLight.on_interfaces`.
+    light : SurfaceLight
+        On paint, and mirrored in rough interfaces.
     rng : Generator, optional
         Chooses between reflection and refraction; without it both are followed.
     lamps : StraightLight, optional
-        To add the light of `Scene.lights` that rough interfaces of solids turn into the legs, on either side,
-        attenuated and shadowed. Without it, and by sheets, it is reflected once, and nothing shadows it.
+        To add the light of `Scene.lights` that rough interfaces of solids turn into the legs, on either side, where
+        no interface on its way bends it. Without it, and by sheets, it is reflected once, and interfaces on its way do
+        not bend it.
     """
 
     def __init__(
@@ -66,11 +67,11 @@ class Meetings:
         own: Optics,
         legs: Legs,
         interfaces: Interfaces,
-        irradiance: Irradiance,
+        light: SurfaceLight,
         rng: np.random.Generator | None,
         lamps: StraightLight | None = None,
     ) -> None:
-        self.own, self.legs, self.interfaces, self.irradiance = own, legs, interfaces, irradiance
+        self.own, self.legs, self.interfaces, self.light = own, legs, interfaces, light
         self.rng, self.lamps = rng, lamps
         self.normals, self.faces = interface_normals(own, interfaces, legs.rays.directions)
         self.cosine = np.clip(-np.einsum("ki,ki->k", self.normals, legs.rays.directions), 0.0, 1.0)
@@ -231,17 +232,16 @@ class Meetings:
             return
         points, normals = self.legs.rays.origins[chosen], self.normals[chosen]
         through = self._table("diffuse_transmission")[chosen, None]
-        front, back = (self.irradiance(points, side * normals) for side in (1.0, -1.0))
+        front, back = (self.light.on_interfaces(points, side * normals) for side in (1.0, -1.0))
         behind = through * self._table("diffuse_transmission_color")[chosen] * back
         with np.errstate(under="ignore"):
             self.radiance[chosen] += share / np.pi * (self.color[chosen] * (1.0 - through) * front + behind)
 
     def _add_highlights(self, rough: Integers) -> None:
-        """Add highlights of `Scene.lights` in rough interfaces, by single reflection without shadows."""
-        scene, points, normals = self.own.scene, self.legs.rays.origins[rough], self.normals[rough]
+        """Add highlights of `Scene.lights` in rough interfaces, by single reflection of what reaches these."""
+        points, normals = self.legs.rays.origins[rough], self.normals[rough]
         to_eye = -self.legs.rays.directions[rough]
-        for light in scene.lights if rough.size else ():
-            light = seen_from(light, scene.camera.eye)
+        for light in self.light.paths.lights if rough.size else ():
             if isinstance(light, PositionalLight):
                 to_light = np.asarray(light.position) - points
                 to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), np.finfo(np.float64).tiny)
@@ -259,7 +259,9 @@ class Meetings:
             density = ggx_distribution(cos_half, self.alpha[rough])
             visible = ggx_visibility(cos_light, self.cosine[rough], self.alpha[rough])
             with np.errstate(under="ignore"):
-                self.radiance[rough] += share * (density * visible)[:, None] * light.irradiance_on(points, normals)
+                mirrored = share * (density * visible)[:, None] * light.irradiance_on(points, normals)
+                lit = np.flatnonzero(mirrored.any(axis=1))
+                self.radiance[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
 
 
 def _towards(directions: Array, side: Array) -> Array:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.reference.hits import Hits, world_normals
 from translucent.reference.rays import Rays
-from translucent.scene.lights import PositionalLight
-from translucent.scene.scene import Light, Object, Scene
+from translucent.scene.scene import Object, Scene
 
 #: Irradiance (k, 3) on surfaces at points (k, 3), in metres from the eye, with unit normals (k, 3).
 Irradiance = Callable[[Array, Array], Array]
@@ -83,8 +82,3 @@ def _lambert(body: Object, face: Integers, distance: Array, rays: Rays, irradian
     points = rays.origins + distance[:, None] * rays.directions
     with np.errstate(under="ignore"):
         return np.asarray(body.base_color / np.pi * irradiance(points, normals))
-
-
-def seen_from(light: Light, eye: Array) -> Light:
-    """Light with its position, if it has one, relative to the eye."""
-    return replace(light, position=np.subtract(light.position, eye)) if isinstance(light, PositionalLight) else light

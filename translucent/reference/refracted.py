@@ -120,9 +120,7 @@ class _Tree:
             legs, interfaces = self._fly(legs, 0.0 if level == 0 else self.own.tolerance)
             if not len(legs):
                 return
-            outcome = Meetings(
-                self.own, legs, interfaces, self.refracted.light.on_interfaces, self.refracted.rng
-            ).outcome()
+            outcome = Meetings(self.own, legs, interfaces, self.refracted.light, self.refracted.rng).outcome()
             self._add(legs, outcome.radiance)
             legs = joined(outcome.branches)
             lost = np.asarray((legs.throughput < FAINTEST).all(axis=1) | ~legs.rays.directions.any(axis=1))

@@ -86,8 +86,8 @@ def _mean(refracted: RefractedRays, rays: Rays, paths: int) -> tuple[RefractedLi
         found = refracted.see(rays.where(np.repeat(some, paths)))
         radiance, residual = (array.reshape(len(some), paths, 3) for array in (found.radiance, found.residual))
         valid = found.valid.reshape(len(some), paths).all(axis=1)
-        parts.append((radiance.mean(axis=1), residual.mean(axis=1), valid))
         with np.errstate(under="ignore"):
+            parts.append((radiance.mean(axis=1), residual.mean(axis=1), valid))
             spreads.append(radiance.std(axis=1, ddof=1))
     columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     return RefractedLight(*columns), np.concatenate(spreads) / np.sqrt(paths)

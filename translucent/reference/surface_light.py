@@ -9,7 +9,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.reference.light_paths import PATHS, LightPaths, way_of
 from translucent.reference.sheets import SHEET_ON_OPAQUE, sheet_thicknesses
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Light, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
 
@@ -34,6 +34,10 @@ class SurfaceLight:
     def on_interfaces(self, points: Array, normals: Array) -> Array:
         """Irradiance (k, 3) on layers, and on paint of interfaces; parameters as for `on_opaque`."""
         return self._irradiance(points, normals, self._before)
+
+    def to_interfaces(self, light: Light, points: Array) -> Array:
+        """(k, 3): transmittance of the ways from one of `LightPaths.lights` to points (k, 3) of interfaces."""
+        return self.passed(points, *way_of(light, points), self._before)
 
     def _irradiance(self, points: Array, normals: Array, before: float) -> Array:
         irradiance = self.scene.environment.irradiance_on(normals)

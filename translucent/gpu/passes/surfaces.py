@@ -32,15 +32,17 @@ _SAMPLERS = (
     "light_irradiance",
     "seen_map",
     "diffused_light",
+    "shadow_sums",
+    "shadow_ends",
 )
+_UNITS = {name: unit for unit, name in enumerate(_SAMPLERS)}
 
 
 class SurfacesPass:
     """Reflection, refraction, paint and diffuse light; see ``shaders/shade/surfaces.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
-        units = {name: unit for unit, name in enumerate(_SAMPLERS)}
-        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/surfaces.frag", **units)
+        self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/surfaces.frag", **_UNITS)
         self._no_interface = NoInterface(gl)
         self._reflectance = reflectance_table(gl)
 
@@ -57,14 +59,15 @@ class SurfacesPass:
         if not job.covered:
             return
         self._bind_paths(job)
+        job.resources.shadows.use(_UNITS)
         seen = job.scene.environment.seen
         seen_map = seen.kind == "image"
         if seen_map:
-            job.resources.environments.sharp(seen).use(_SAMPLERS.index("seen_map"))
+            job.resources.environments.sharp(seen).use(_UNITS["seen_map"])
         program = self._variants.program(
             ONE_INTERFACE=job.features.one_interface,
             OPAQUE=job.features.has_opaque,
-            **shadow_switches(False, job.resources),
+            **shadow_switches(job.features.has_shadow_maps, job.resources),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,
@@ -84,8 +87,8 @@ class SurfacesPass:
             texture.use(unit)
         if job.features.has_opaque:
             axial_depth, radiance = blurred_opaque(job)
-            axial_depth.use(_SAMPLERS.index("opaque_axial_depth"))
-            radiance.use(_SAMPLERS.index("opaque_radiance"))
+            axial_depth.use(_UNITS["opaque_axial_depth"])
+            radiance.use(_UNITS["opaque_radiance"])
 
     def _bind_finishes(self, job: FrameJob) -> moderngl.Texture:
         """Bind surfaces and lights; returns the texture of surfaces, which the caller releases."""
@@ -93,7 +96,7 @@ class SurfacesPass:
         maps = job.resources.environments.light(environment)
         table = surface_table(job.scene, job.features.sheets, job.diffused_rows)
         if job.diffused_light is not None:
-            job.diffused_light.texture.use(_SAMPLERS.index("diffused_light"))
+            job.diffused_light.texture.use(_UNITS["diffused_light"])
         finishes = job.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
         rest = (
             finishes,
@@ -102,6 +105,6 @@ class SurfacesPass:
             maps.levels,
             maps.irradiance,
         )
-        for unit, item in enumerate(rest, _SAMPLERS.index("surface_table")):
+        for unit, item in enumerate(rest, _UNITS["surface_table"]):
             item.use(unit)
         return finishes

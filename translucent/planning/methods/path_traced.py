@@ -98,7 +98,7 @@ class PathTraced(Method):
         if glowing := [body for body, surface in surfaces if surface.glows]:
             notes.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {object_names(glowing)}"))
         if scene.opaque:
-            text = "shadows and mirror images on opaque objects: light reaches them through everything"
+            text = "mirror images of things in opaque objects; shadows of the environment on them unless it has directions"
             notes.append(Note(NoteKind.SHADOWS, text))
         return tuple(notes)
 

@@ -1,0 +1,113 @@
+"""Shadows of lights on interfaces of bodies: opaque objects block highlights and paint, on the GPU and elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import trimesh
+
+import translucent as tl
+from translucent.geometry.solids import Box, Sphere
+from translucent.planning.notes import NoteKind
+
+SIZE = (48, 36)
+DARK = tl.Environment.constant((0, 0, 0))
+CAMERA = tl.Camera.look_at((0, 1.5, 7), (0, 0, 0), fov_y=30)
+LIGHTS = {
+    "sun": tl.DirectionalLight((1, -1.5, -1), (2, 2, 2)),
+    "lamp": tl.PointLight((-2, 3, 2), (20, 20, 20)),
+    "spot": tl.SpotLight((-2, 3, 2), (2, -3, -2), (20, 20, 20), 40, 45),
+}
+# So dark that nothing behind their face is seen.
+DENSE = tl.Medium(absorption=100, ior=1.5)
+PARTS = {"highlight": tl.Surface(roughness=0.5), "paint": tl.Surface(transmission=0.0)}
+BALL, CUBE = Sphere().tessellate(32), Box((-0.9, -0.9, -0.9), (0.9, 0.9, 0.9)).tessellate()
+BEHIND, HALF, BESIDE = (-1.0, 1.5, 1.0), (-2.2, 0.7, 1.0), (-3.6, -1.6, -2.6)
+
+
+def wall(place: tuple[float, float, float], medium: tl.Medium | None = None) -> tl.Object:
+    """A black block that stands across the ways of the lights, half as thick as it is far from them."""
+    block = Box((-1.1, -1.4, -0.1), (1.1, 1.4, 0.1)).tessellate()
+    turn = trimesh.geometry.align_vectors((0, 0, 1), (-1, 1.5, 1))
+    return tl.Object(block, medium, trimesh.transformations.translation_matrix(place) @ turn, color=(0, 0, 0))
+
+
+def scene(light: str, part: str, *others: tl.Object, mesh: tl.Mesh = BALL) -> tl.Scene:
+    return tl.Scene([tl.Object(mesh, DENSE, surface=PARTS[part]), *others], CAMERA, [LIGHTS[light]], DARK)
+
+
+@pytest.fixture(params=["front", "screen", "traced", "cpu"])
+def shown(request: pytest.FixtureRequest, renderer: tl.Renderer) -> Iterator[Any]:
+    """Radiance of a scene by all that shade interfaces."""
+    kinds = {
+        "front": tl.FrontInterface(),
+        "screen": tl.ScreenInterfaces(),
+        "traced": tl.TracedInterfaces(),
+        "cpu": None,
+    }
+
+    def radiance(drawn: tl.Scene, one: tl.Renderer) -> npt.NDArray[np.float32]:
+        return one.render(drawn, SIZE, samples=1, interfaces=kinds[request.param]).radiance
+
+    if request.param == "cpu":
+        with tl.Renderer(backend="cpu") as cpu:
+            yield lambda drawn: radiance(drawn, cpu)
+    else:
+        yield lambda drawn: radiance(drawn, renderer)
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("light", LIGHTS)
+def test_no_light_reaches_a_ball_behind_a_wall(shown: Any, light: str, part: str) -> None:
+    """And all of it reaches one beside it."""
+    alone = shown(scene(light, part))
+    assert alone.max() > 0.05
+    assert shown(scene(light, part, wall(BEHIND))).max() <= 1e-6 * alone.max()
+    np.testing.assert_allclose(shown(scene(light, part, wall(BESIDE))), alone, rtol=1e-4, atol=1e-5 * alone.max())
+
+
+def test_nor_does_it_reach_paint_on_paths(renderer: tl.Renderer) -> None:
+    ball = tl.Object(BALL, tl.Medium(absorption=100), surface=PARTS["paint"])
+    alone, behind = (
+        renderer.render(tl.Scene([ball, *others], CAMERA, [LIGHTS["sun"]], DARK), SIZE, tl.PathTraced(2)).radiance
+        for others in ((), (wall(BEHIND),))
+    )
+    assert alone.max() > 0.05
+    assert behind.max() <= 1e-6 * alone.max()
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("light", ["sun", "lamp"])
+def test_a_shadow_on_a_body_is_the_reference_s(shown: Any, light: str, part: str) -> None:
+    """On flat faces, where a pixel's normals make no highlight rougher, and but for a texel at its edge."""
+    drawn = scene(light, part, wall(HALF), mesh=CUBE)
+    truth = tl.reference.render(drawn, SIZE, refraction=True, paths=2).radiance
+    alone = shown(scene(light, part, mesh=CUBE))
+    least = 1e-3 * alone.max()
+    share = (truth > least).sum() / (alone > least).sum()
+    assert 0.1 < share < 0.9
+    error = (np.abs(shown(drawn) - truth).max(axis=-1) / truth.max())[alone.max(axis=-1) > least]
+    print(f"lit {share:.2f}, of {error.size} pixels median {np.median(error):.1e}, p95 {np.quantile(error, 0.95):.1e}")
+    assert np.quantile(error, 0.95) < 1e-5
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_other_bodies_dim_light_on_a_body_as_the_reference_has_it_or_the_plan_tells(
+    renderer: tl.Renderer, part: str
+) -> None:
+    drawn = scene("lamp", part, wall(BEHIND, tl.Medium(absorption=(1, 2, 4))), mesh=CUBE)
+    with tl.Renderer(backend="cpu") as cpu:
+        frame = cpu.render(drawn, SIZE, samples=1)
+    truth = tl.reference.render(drawn, SIZE, refraction=True, paths=2).radiance
+    # Light that leaves the cube again next to its edges is found by two random paths.
+    assert np.quantile(np.abs(frame.radiance - truth), 0.995) < 1e-6 * truth.max()
+    share = truth.max(axis=(0, 1)) / renderer.render(drawn, SIZE, samples=1).radiance.max(axis=(0, 1))
+    assert (share > 0.05).all()
+    assert (np.diff(share) < 0).all()
+    assert share[0] < 0.9
+    assert renderer.render(drawn, SIZE, samples=1).plan.says(NoteKind.SHADOWS)
+    assert not frame.plan.says(NoteKind.SHADOWS)
