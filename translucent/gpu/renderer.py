@@ -92,7 +92,9 @@ class GpuRenderer:
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities of this OpenGL for the planner."""
-        return Capabilities(shader_storage=self.context.gl.version_code >= SHADER_STORAGE)
+        return Capabilities(
+            shader_storage=self.context.gl.version_code >= SHADER_STORAGE, texture_units=self._resources.texture_units
+        )
 
     def render(
         self,

@@ -18,6 +18,8 @@ class Resources:
     """Caches of one context."""
 
     def __init__(self, gl: moderngl.Context) -> None:
+        #: Textures that one shader can read.
+        self.texture_units = int(gl.info["GL_MAX_TEXTURE_IMAGE_UNITS"])
         self.meshes = MeshCache(gl)
         self.grids = GridTexture(gl)
         self.environments = EnvironmentMaps(gl)

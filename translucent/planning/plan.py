@@ -30,7 +30,7 @@ from translucent.planning.paths import check_paths, straight_scene, with_paths
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering, SingleScattering
 from translucent.planning.scattering.choice import check_scattering, given_back, shown
-from translucent.planning.shadow_maps import ShadowMaps, check_shadows, shadow_passes
+from translucent.planning.shadow_maps import ShadowMaps, check_shadows, shadow_passes, shadows_left_out
 from translucent.planning.slots import require_clear_priorities
 from translucent.scene.scene import Scene, object_names
 
@@ -76,8 +76,17 @@ def plan(
         chosen = with_caustics(chosen, scene, caustics, method, capabilities or Capabilities())
     if chosen.traced:
         return chosen
-    passes = (*shadow_passes(scene), *chosen.passes)
-    return dataclasses.replace(chosen, passes=passes, shadows=shadows or ShadowMaps())
+    if not (found := shadow_passes(scene)):
+        return chosen
+    left_out: tuple[Note, ...] = ()
+    if chosen.has(PassName.TRACED, PassName.SURFACES, PassName.PATH_TRACE):
+        left_out = shadows_left_out((capabilities or Capabilities()).texture_units)
+    return dataclasses.replace(
+        chosen,
+        passes=(*found, *chosen.passes),
+        unmodelled=(*chosen.unmodelled, *left_out),
+        shadows=shadows or ShadowMaps(),
+    )
 
 
 def _plan(

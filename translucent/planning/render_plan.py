@@ -26,11 +26,14 @@ class Capabilities:
 
     scattering : bool
         Light that media scatter can be followed.
+    texture_units : int
+        Textures that one shader can read.
     """
 
     shader_storage: bool = True
     opengl: bool = True
     scattering: bool = True
+    texture_units: int = 32
 
 
 @dataclass(frozen=True)

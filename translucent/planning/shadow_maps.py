@@ -7,8 +7,12 @@ from dataclasses import dataclass
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ
 from translucent.planning.methods import SignedDepth
+from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.scene.scene import Scene
+
+#: Textures that shaders of interfaces read at most, with those of shadows. OpenGL promises 16.
+UNITS_WITH_SHADOWS = 20
 
 #: Sizes that make sense: below, shadows are blots; above, no texture holds them.
 LEAST_SIZE, MOST_SIZE = 64, 8192
@@ -49,6 +53,17 @@ def check_shadows(shadows: object) -> None:
     """Raise `InputError` for what is no choice of shadows."""
     if shadows is not None and not isinstance(shadows, ShadowMaps):
         raise InputError(f"shadows {shadows!r}", "not a choice of shadows", "give for example tl.ShadowMaps(size=2048)")
+
+
+def shadows_left_out(units: int) -> tuple[Note, ...]:
+    """Note where shaders of interfaces, and of random paths, cannot read as many textures as shadows take there."""
+    if units >= UNITS_WITH_SHADOWS:
+        return ()
+    text = (
+        f"shadows on interfaces, and on opaque objects that only they show: that takes {UNITS_WITH_SHADOWS} textures, "
+        f"and this OpenGL reads {units} in a shader"
+    )
+    return (Note(NoteKind.SHADOWS, text),)
 
 
 def shadow_passes(scene: Scene, *, over_backdrop: bool = False) -> tuple[PassSpec, ...]:

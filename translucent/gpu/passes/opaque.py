@@ -13,6 +13,7 @@ from translucent.gpu.scene_view import SceneView
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table, texture_units
 from translucent.planning.passes import PassSpec
+from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
 from translucent.scene.surface import Surface
 
 _MAPS = ("light_irradiance", "light_map", "light_levels", "reflectance_table", "shadow_sums", "shadow_ends")
@@ -76,6 +77,12 @@ class OpaquePass:
 def shadow_switches(used: bool, resources: Resources) -> dict[str, bool]:
     """Switches of ``shaders/shade/shadows.glsl``."""
     return {"SHADOW_MAPS": used, "SHADOW_SPECTRAL": used and resources.shadows.spectral}
+
+
+def interface_shadow_switches(job: FrameJob) -> dict[str, bool]:
+    """The same for shaders of interfaces and of random paths, which read many textures besides."""
+    enough = job.resources.texture_units >= UNITS_WITH_SHADOWS
+    return shadow_switches(job.features.has_shadow_maps and enough, job.resources)
 
 
 class FinishMaps:

@@ -14,7 +14,7 @@ from translucent.errors import RenderError
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.opaque import shadow_switches
+from translucent.gpu.passes.opaque import interface_shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed, record_at_eye
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
@@ -258,7 +258,7 @@ class PathTracer:
             ROUGH=any(body.surface is not None and body.surface.roughness > 0 for body in scene.bodies),
             DISPERSION=False,
             OPAQUE=job.features.has_opaque,
-            **shadow_switches(job.features.has_shadow_maps, job.resources),
+            **interface_shadow_switches(job),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
         )

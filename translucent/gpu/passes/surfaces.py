@@ -7,7 +7,7 @@ import moderngl
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
-from translucent.gpu.passes.opaque import blurred_opaque, shadow_switches
+from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import surface_table
@@ -67,7 +67,7 @@ class SurfacesPass:
         program = self._variants.program(
             ONE_INTERFACE=job.features.one_interface,
             OPAQUE=job.features.has_opaque,
-            **shadow_switches(job.features.has_shadow_maps, job.resources),
+            **interface_shadow_switches(job),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,

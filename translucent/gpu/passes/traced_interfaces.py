@@ -13,7 +13,7 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
-from translucent.gpu.passes.opaque import blurred_opaque, shadow_switches
+from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
@@ -146,7 +146,7 @@ class TracedInterfacesPass:
             MIRROR=mirror,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
-            **shadow_switches(job.features.has_shadow_maps, job.resources),
+            **interface_shadow_switches(job),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,

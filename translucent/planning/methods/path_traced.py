@@ -98,7 +98,9 @@ class PathTraced(Method):
         if glowing := [body for body, surface in surfaces if surface.glows]:
             notes.append(Note(NoteKind.GLOW, f"light of surfaces that glow: {object_names(glowing)}"))
         if scene.opaque:
-            text = "mirror images of things in opaque objects; shadows of the environment on them unless it has directions"
+            text = (
+                "mirror images of things in opaque objects; shadows of the environment on them unless it has directions"
+            )
             notes.append(Note(NoteKind.SHADOWS, text))
         return tuple(notes)
 
