@@ -89,6 +89,17 @@ def test_what_else_throws_shadows_does_so_as_in_the_reference(renderer: tl.Rende
     assert np.quantile(error, 0.95) < 1e-4
 
 
+def test_layers_throw_no_shadow_and_change_none(renderer: tl.Renderer) -> None:
+    clear = tl.Surface(opacity=0.5)
+    layer = moved(CUBE, (1.5, 0, 0), tl.Medium(), sheet_thickness=1e-3, surface=clear)
+    ball, floor = SCENES["ball"]["objects"]
+    shown = replace(scene("ball", "sun"), objects=[layer, ball, floor])
+    frame, alone = renderer.render(shown, SIZE), renderer.render(scene("ball", "sun"), SIZE)
+    beside = ~renderer.render(replace(shown, objects=[layer, floor]), SIZE).coverage
+    assert np.quantile(np.abs(frame.radiance - alone.radiance)[beside], 0.99) < 1e-4
+    assert alone.radiance[beside & ~alone.coverage].min() < 0.7 * alone.radiance.max()
+
+
 @pytest.mark.parametrize("mesh", ["bear", "knot", "shell", "goblet", "bangle", "soap"])
 @pytest.mark.parametrize("light", ["sun", "lamp"])
 def test_each_texel_has_the_transmittance_of_its_ray(renderer: tl.Renderer, mesh: str, light: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -119,7 +119,7 @@ class ShadowMapsPass:
         center = media_center(scene)
         # Of several samples of a pixel, each looks into its share of the directions.
         turns = (job.sample % job.samples, job.samples)
-        extinction = bounded_extinction(scene.bodies[0].medium, scene.diagonal)
+        extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
         job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
         irradiance = shadow_directions(scene.environment, max(scene.environment_shadows, 1))[1]
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
@@ -166,8 +166,7 @@ class ShadowMapsPass:
 
     def _planned(self, scene: Scene, method: Method | None, *, opaque: bool) -> tuple[Scene, RenderPlan]:
         """The scene without interfaces, with or without opaque objects, and its plan."""
-        # Layers throw no shadow; but a plan needs bodies, and alone they are clear sheets.
-        bodies = [item for item in scene.bodies if not item.covers] or scene.bodies
+        bodies = _throwing(scene)
         objects = [item for item in scene.objects if (opaque and item.medium is None) or item in bodies]
         # Lights move more often than objects change.
         key = tuple(map(weakref.ref, objects)), scene.overlap, method
@@ -233,6 +232,11 @@ def _darkened(scene: Scene, opaque: frozenset[int]) -> Scene:
         )
 
     return replace(scene, objects=[dense(body) if i in opaque else body for i, body in enumerate(scene.objects)])
+
+
+def _throwing(scene: Scene) -> Sequence[Object]:
+    """Bodies that throw shadows. Layers throw none; but a plan needs bodies, and alone they are clear sheets."""
+    return [item for item in scene.bodies if not item.covers] or scene.bodies
 
 
 def _sky_lights(scene: Scene) -> list[Light]:
