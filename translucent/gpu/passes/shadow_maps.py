@@ -121,7 +121,8 @@ class ShadowMapsPass:
         turns = (job.sample % job.samples, job.samples)
         extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
         job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
-        irradiance = shadow_directions(scene.environment, max(scene.environment_shadows, 1))[1]
+        count = scene.environment_shadows
+        irradiance = shadow_directions(scene.environment, count)[1] if count else np.zeros((0, 3))
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
         job.uniforms.bind()
 
