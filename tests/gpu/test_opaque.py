@@ -12,7 +12,7 @@ from tests import references
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
 
-SIZE = (160, 120)
+SIZE = (112, 84)
 BODY = Box(low=(-1, -1, -1), high=(1, 1, 1)).tessellate()
 WALL = Box.slab((6.0, 6.0), 0.2).tessellate()
 BALL = Sphere().tessellate(48)
