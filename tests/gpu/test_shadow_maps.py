@@ -286,6 +286,20 @@ def test_maps_are_rendered_when_something_changes(renderer: tl.Renderer, monkeyp
         assert len(rendered) == count
 
 
+def test_a_layer_that_becomes_a_sheet_throws_its_shadow(renderer: tl.Renderer) -> None:
+    """Nothing but the surface tells one from the other."""
+    _, floor = SCENES["ball"]["objects"]
+    sheet = moved(CUBE, (0, 0.5, 0), LEAF, sheet_thickness=0.1)
+    ball = tl.Object(BALL, LEAF)
+    shown = replace(scene("ball", "sun"), objects=[sheet, ball, floor])
+    with tl.Renderer() as fresh:
+        expected = fresh.render(shown, SIZE).radiance
+    layer = replace(sheet, surface=tl.Surface(opacity=0.5))
+    before = renderer.render(replace(shown, objects=[layer, ball, floor]), SIZE).radiance
+    assert (before != expected).any()
+    np.testing.assert_array_equal(renderer.render(shown, SIZE).radiance, expected)
+
+
 def test_maps_that_do_not_fit_are_smaller(renderer: tl.Renderer) -> None:
     """As for many lights in the middle of a room, each of which takes six maps."""
     cameras = [CAMERA] * 6

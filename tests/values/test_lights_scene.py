@@ -344,3 +344,10 @@ def test_the_showcase_frames_the_mesh_in_a_medium_of_its_size() -> None:
         assert medium.transmittance(0.15 * mesh.diagonal) == pytest.approx((0.18, 0.62, 0.35), rel=1e-14)
         assert scene.camera.forward == pytest.approx(tl.showcase(BOX, stage="none").camera.forward, abs=1e-12)
     assert tl.showcase(BOX, GLASS, stage="none").objects[0].medium is GLASS
+
+
+@pytest.mark.parametrize("length", [1e300, 1e-300, 5e-324])
+def test_directions_of_any_length_are_directions(length: float) -> None:
+    lights = tl.DirectionalLight((length, 0, length), 1), tl.SpotLight((0, 0, 0), (length, 0, length), 1)
+    for light in lights:
+        np.testing.assert_allclose(light.direction, np.array((1, 0, 1)) / np.sqrt(2), rtol=1e-15)

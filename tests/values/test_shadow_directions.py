@@ -120,7 +120,7 @@ def test_black_environments_have_directions_without_light():
     assert not irradiance.any()
 
 
-@pytest.mark.parametrize("number", [-1, 257, 0.5, "many", None])
+@pytest.mark.parametrize("number", [-1, 257, 0.5, "many", None, True])
 def test_scenes_refuse_other_numbers_of_directions(number):
     ball = tl.Object(tl.Mesh(np.eye(3), [[0, 1, 2]]))
     camera = tl.Camera.look_at((0, 0, 3), (0, 0, 0))

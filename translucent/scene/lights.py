@@ -172,6 +172,8 @@ class DirectionalLight(Frozen):
 
 def _unit(value: npt.ArrayLike) -> Array:
     direction = _vector("light direction", value)
+    if (largest := float(np.abs(direction).max())) > 0 and not 1e-100 < largest < 1e100:
+        direction = direction / largest  # squares would overflow, or vanish
     if not (length := float(np.linalg.norm(direction))) > 0:
         raise InputError("light direction", "its length is 0", "give the direction in which the light travels")
     # What has unit length keeps it to the last bit, so that copies of a light have the same direction.

@@ -265,7 +265,8 @@ class Scene(Frozen):
                 f"overlap {self.overlap!r}", "not a known policy", f"use one of {', '.join(get_args(Overlap))}"
             )
         if (
-            not isinstance(self.environment_shadows, int)
+            isinstance(self.environment_shadows, bool)
+            or not isinstance(self.environment_shadows, int)
             or not 0 <= self.environment_shadows <= MOST_ENVIRONMENT_SHADOWS
         ):
             raise InputError(

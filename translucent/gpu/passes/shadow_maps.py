@@ -258,6 +258,7 @@ def _seen(job: FrameJob) -> object:
             None if item.medium is None else np.asarray(item.medium.extinction).tobytes(),
             item.priority,
             item.sheet_thickness,
+            item.covers,
             item.medium is None and item.surface,
             None if item.density is None else weakref.ref(item.density),
             item.medium is None and holds_eye(item, scene),
