@@ -57,7 +57,11 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
 @pytest.mark.parametrize(
     ("one", "options", "message"),
     [
-        (scene(lights=()), {}, "caustics; the scene has no lights; add a tl.PointLight or tl.DirectionalLight"),
+        (
+            scene(lights=()),
+            {},
+            "caustics; the scene has no lights; add a tl.PointLight, tl.SpotLight or tl.DirectionalLight",
+        ),
         (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
         (scene(body()), {}, "caustics; no opaque object that light could land on; add a ground"),
         (scene(), {"method": tl.PathTraced()}, "leave out one of the two"),

@@ -213,3 +213,8 @@ def test_several_bodies_are_framed_for_a_stage():
     objects = [placed(medium=GLASS), placed(move=(0, 2, 0), medium=GLASS)]
     wide, close = framing(objects, SIZE, stage=stage_named("studio")), framing(objects, SIZE)
     assert np.linalg.norm(wide.eye) > np.linalg.norm(close.eye)
+
+
+def test_a_scene_on_a_stage_gets_no_second_one() -> None:
+    with pytest.raises(tl.InputError, match="it has a ground that catches shadows; make it without one"):
+        tl.staged(showcase(BOX, GLASS, SIZE), "night")

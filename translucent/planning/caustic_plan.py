@@ -68,7 +68,7 @@ def _check(scene: Scene, method: Method | None, capabilities: Capabilities) -> N
 def _check_ways(scene: Scene) -> None:
     """Refuse a scene in which no photon could land."""
     if not scene.lights:
-        do = "add a tl.PointLight or tl.DirectionalLight; light of the environment makes no caustics"
+        do = "add a tl.PointLight, tl.SpotLight or tl.DirectionalLight; light of the environment makes no caustics"
         raise InputError("caustics", "the scene has no lights", do)
     if not any(_turns_light(body) for body in scene.objects):
         found = f"no interface of {object_names(scene.bodies)} bends or mirrors light"

@@ -63,11 +63,14 @@ def staged(scene: AnyScene, stage: str | Stage = DEFAULT_STAGE, environment: Env
     Raises
     ------
     InputError
-        If there is no such stage.
+        If there is no such stage, or the scene stands on one.
     """
     chosen = stage_named(stage) if isinstance(stage, str) else stage
     if chosen is None:
         return scene
+    if len(scene.shown) < len(scene.objects):
+        do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
+        raise InputError("a stage for a scene", "it has a ground that catches shadows", do)
     axes = view_axes(scene.camera)
     ground = Object(ground_mesh(scene, axes), surface=_finish(chosen), shadow_catcher=True)
     lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in chosen.keys))
