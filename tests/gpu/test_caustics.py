@@ -253,7 +253,7 @@ def test_nothing_is_seen_of_the_other_side_of_a_ground(renderer: tl.Renderer) ->
 
 
 def test_a_mirror_of_glass_turns_a_beam_aside(renderer: tl.Renderer, landed: Landed) -> None:
-    """What passes a sheet goes straight, and is left to straight light."""
+    """Light that passes a sheet goes straight, and is left to straight light."""
     half = np.sqrt(0.5)
     corners = [(-half, half, -1), (half, -half, -1), (half, -half, 1), (-half, half, 1)]
     pane = tl.Object(

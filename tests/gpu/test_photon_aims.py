@@ -1,4 +1,4 @@
-"""Where photons aim: at each body once, and by power."""
+"""Aims of photons: at each body once, and by power."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def towards(light: Any, points: Array) -> tuple[Array, Array]:
 
 
 def span(mesh: tl.Mesh, light: Any, points: Array, offset: Sequence[float] = (0, 0, 0)) -> tuple[Array, Array]:
-    """Where the ways from points to a light enter and leave a convex mesh, (k,), (k,): cut by each of its planes."""
+    """Distances (k,), (k,) at which ways from points to a light enter and leave a convex mesh, cut by its planes."""
     way, distance = towards(light, points)
     corner, normal = mesh.vertices[mesh.faces[:, 0]] + offset, mesh.face_normals
     begin, end = np.zeros(len(points)), distance.copy()
@@ -346,7 +346,7 @@ def test_light_transmittance_refuses(light: int, points: Any, match: str) -> Non
 
 
 def test_surfaces_far_from_the_eye_do_not_shadow_themselves() -> None:
-    """Where points are rounded to 2e-9 m."""
+    """A place so far away that points are rounded to 2e-9 m."""
     camera = tl.Camera.orthographic((0.0, 0.0, 2e7), (0.0, 0.0, 0.0), height=2.0)
     sun = tl.DirectionalLight((2.0, 1.0, -1.0), np.pi)
     shown = tl.Scene([tl.Object(BOX), tl.Object(wall(-20.0))], camera, [sun], DARK)

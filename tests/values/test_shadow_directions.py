@@ -68,7 +68,7 @@ def test_all_light_is_counted(name, count):
 
 @pytest.mark.parametrize("name", ["constant", "studio", "sun", "colored"])
 def test_shadow_of_a_cap_converges(name):
-    """What opaque discs in random directions leave of the irradiance, against sums over all pixels of the sky."""
+    """Irradiance that opaque discs in random directions leave, against sums over all pixels of the sky."""
     environment, normals = ENVIRONMENTS[name], _unit(40)
     centers, cosines = _unit(30, 2), np.random.default_rng(3).uniform(0.2, 0.9, 30)
     ways = texel_directions(128, 256).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Where the photons of lights aim: rectangles around the bodies as each light sees them, none of which overlap."""
+"""Aims of the photons of lights: rectangles around the bodies as each light sees them, none of which overlap."""
 
 from __future__ import annotations
 
