@@ -1,4 +1,5 @@
 // Opaque objects: where they are, and what light they reflect. DEPTH_ONLY: no more than where they are.
+// PROJECTED_DEPTH: the depth buffer has the depth of the projection; else it is linear, whatever the near plane.
 // Plain ones reflect diffusely (Lambert 1760); SURFACE: as their surface says, lit by filtered maps of the environment.
 
 #include <constants>
@@ -52,7 +53,9 @@ void main() {
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture
     opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;
+#if !PROJECTED_DEPTH
     gl_FragDepth = clamp((opaque_axial_depth - opaque_range.x) * opaque_range.y, 0.0, 1.0);
+#endif
 #if !DEPTH_ONLY
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     vec3 ray = view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz);

@@ -7,7 +7,7 @@
 #include <Shadows>
 #include <SkyShadows>
 
-uniform sampler2D shadow_sums;  // path, or of several media optical depths, for each metre ahead
+uniform sampler2D shadow_sums;  // path, with exits less entries before the end; or of several media optical depths; for each metre ahead
 uniform sampler2D shadow_ends;  // metres ahead of the center where an opaque surface ends the ray
 
 // A map, and how a point projects into it: from -1 to 1, and metres ahead of the light.
@@ -42,12 +42,13 @@ int shadow_cube_face(vec3 from_light) {
     return 2 * axis + (from_light[axis] < 0.0 ? 1 : 0);
 }
 
-// Transmittance of a texel's ray, which advances so many metres for each metre ahead.
-vec3 texel_transmittance(ivec2 at, float advance) {
+// Transmittance of a texel's ray down to where it ends, which advances so many metres for each metre ahead.
+vec3 texel_transmittance(ivec2 at, float end, float advance) {
 #if SHADOW_SPECTRAL
     vec3 optical_depth = texelFetch(shadow_sums, at, 0).rgb;
 #else
-    vec3 optical_depth = texelFetch(shadow_sums, at, 0).r * shadow_extinction.rgb;
+    vec2 path_and_count = texelFetch(shadow_sums, at, 0).rg;
+    vec3 optical_depth = (path_and_count.r - path_and_count.g * end) * shadow_extinction.rgb;
 #endif
     return exp(-clamp(optical_depth * advance, 0.0, MAX_OPTICAL_DEPTH));
 }
@@ -78,9 +79,10 @@ vec3 light_through(ShadowView view, vec3 point, vec3 normal, bool dimmed) {
         float tilt = view.perspective ? dot(plane, vec3(there, 1.0)) : plane.z;
         float rise = spread * dot(plane.xy, place - there) / (abs(tilt) > 1e-6 ? tilt : 1e-6);
         ivec2 at = ivec2(view.corner + texel);
-        if (view.ends && ahead + clamp(rise, -steepest, steepest) > texelFetch(shadow_ends, at, 0).r + SHADOW_MARGIN * texel_metres) { continue; }
+        float end = view.ends ? texelFetch(shadow_ends, at, 0).r : 0.0;
+        if (view.ends && ahead + clamp(rise, -steepest, steepest) > end + SHADOW_MARGIN * texel_metres) { continue; }
         vec2 weights = mix(1.0 - share, share, aside);
-        vec3 passed = dimmed ? texel_transmittance(at, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0) : vec3(1.0);
+        vec3 passed = dimmed ? texel_transmittance(at, end, view.perspective ? length(vec3(there * spans, 1.0)) : 1.0) : vec3(1.0);
         sum += weights.x * weights.y * passed;
     }
     return sum;

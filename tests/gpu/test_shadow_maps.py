@@ -335,8 +335,8 @@ def test_grounds_are_not_in_the_way() -> None:
     shown = scene("ball", "sun")
     found = ShadowThrowers(SUN, shown, corners)
     assert found.grounds == (1,)
-    assert found.open_ways
+    assert not found.in_the_way
     below = ShadowThrowers(tl.DirectionalLight((0, 1, 0.2), (1, 1, 1)), shown, corners)
-    assert not below.open_ways
+    assert below.in_the_way == (1,)
     stone = replace(shown, objects=[*shown.objects, STONE])
-    assert not ShadowThrowers(SUN, stone, [outermost(item) for item in stone.objects]).open_ways
+    assert ShadowThrowers(SUN, stone, [outermost(item) for item in stone.objects]).in_the_way == (2,)

@@ -49,6 +49,8 @@ class FrameJob(SceneView):
         What a plan with the pass of that name needs.
     placed : PlacedScene, optional
         The scene before its camera, where axial depths are to count from elsewhere than from where media begin.
+    with_depth : bool
+        Projections give depth.
 
     Attributes
     ----------
@@ -68,14 +70,16 @@ class FrameJob(SceneView):
     for_map : bool
         The frame is a map of shadows.
     path_only : bool
-        The accumulator has paths of one medium alone, and no counts.
+        The accumulator has paths of one medium alone, and counts of those that an opaque surface ends at most.
+    projected_depth : bool
+        The accumulator has a depth buffer of opaque surfaces, against which passes can test.
     covered : Part
         Pixels that media may cover at the current sample points: beyond it no ray meets a medium. Rows count up from
         the bottom, as geometry is drawn.
     """
 
     corner: tuple[int, int] = (0, 0)
-    for_map = path_only = False
+    for_map = path_only = projected_depth = False
 
     def __init__(
         self,
@@ -86,6 +90,8 @@ class FrameJob(SceneView):
         resources: Resources,
         backdrop: Backdrop | TextureBackdrop | None = None,
         placed: PlacedScene | None = None,
+        *,
+        with_depth: bool = False,
     ) -> None:
         self.started = time.perf_counter()
         self.plan = plan
@@ -110,7 +116,7 @@ class FrameJob(SceneView):
         self._media = np.array([body.medium is not None for body in scene.objects])
         if self.features.marches and not self.features.scatters:
             self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))
-        self.place((0.0, 0.0))
+        self.place((0.0, 0.0), with_depth=with_depth)
 
     @cached_property
     def diffused_light(self) -> DiffusedLight | None:
@@ -122,11 +128,6 @@ class FrameJob(SceneView):
         """Fields of the objects in which light diffuses, for the table of surfaces."""
         light = self.diffused_light
         return {} if light is None else light.rows(media_center(self.scene))
-
-    @property
-    def shadow_maps(self) -> bool:
-        """Whether opaque objects look up what reaches them of lights."""
-        return self.features.has_shadow_maps
 
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""

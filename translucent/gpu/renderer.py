@@ -25,6 +25,7 @@ from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
+from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
@@ -35,9 +36,6 @@ from translucent.scene.scene import Scene
 
 #: Largest share of a pixel's light that may come along rays that went astray.
 MOST_LOST = 0.005
-
-#: First OpenGL version in which shaders write to buffers.
-SHADER_STORAGE = 430
 
 
 class GpuRenderer:

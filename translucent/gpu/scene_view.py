@@ -44,11 +44,6 @@ class SceneView:
         self.resources = resources
         self.uniforms = UniformBuffers(gl, placed, roles, contents)
 
-    @property
-    def shadow_maps(self) -> bool:
-        """Whether opaque objects look up what reaches them of lights."""
-        return False
-
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw objects with the current state; front faces are those where a ray enters."""
         for i in objects:

@@ -40,14 +40,19 @@ class ShadowView:
         Of its texels in the atlas.
     size : int
         Texels along a side.
-    ends : bool
-        Opaque objects are in the way of some rays.
+    opaque : tuple of int
+        Objects that may end rays.
     """
 
     camera: Camera
     corner: tuple[int, int]
     size: int
-    ends: bool
+    opaque: tuple[int, ...]
+
+    @property
+    def ends(self) -> bool:
+        """Whether opaque objects are in the way of some rays."""
+        return bool(self.opaque)
 
     def rows(self, center: Array) -> npt.NDArray[np.float64]:
         """(4, 4): from points, given from `center`, to right and up (at the edges of the map 1, in perspective after
@@ -66,8 +71,8 @@ class ShadowView:
         )
 
 
-#: Cameras of a light, and whether opaque objects are in its way.
-Seen: TypeAlias = tuple[Sequence[Camera], bool]
+#: Cameras of a light, and the opaque objects in its way.
+Seen: TypeAlias = tuple[Sequence[Camera], tuple[int, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +99,8 @@ class ShadowViews:
 
         Parameters
         ----------
-        lights, sky : sequence of (sequence of Camera, bool)
-            Of each light, and whether opaque objects are in its way.
+        lights, sky : sequence of (sequence of Camera, tuple of int)
+            Of each light, with the opaque objects in its way.
         size : int
         limit : int
             Largest width of a texture.
@@ -171,11 +176,11 @@ def _placed(
     lights: Sequence[Seen], sky: Sequence[Seen], side: int, small: int, columns: int
 ) -> tuple[tuple[tuple[ShadowView, ...], ...], tuple[ShadowView, ...]]:
     across, number, groups = columns // SKY_SHARE, 0, []
-    for cameras, ends in lights:
+    for cameras, opaque in lights:
         places = [divmod(number + i, across) for i in range(len(cameras))]
         groups.append(
             tuple(
-                ShadowView(camera, (x * side, y * side), side, ends)
+                ShadowView(camera, (x * side, y * side), side, opaque)
                 for camera, (y, x) in zip(cameras, places, strict=True)
             )
         )
@@ -183,8 +188,8 @@ def _placed(
     first = -(-number // across) * SKY_SHARE * columns
     places = [divmod(first + i, columns) for i in range(len(sky))]
     return tuple(groups), tuple(
-        ShadowView(cameras[0], (x * small, y * small), small, ends)
-        for (cameras, ends), (y, x) in zip(sky, places, strict=True)
+        ShadowView(cameras[0], (x * small, y * small), small, opaque)
+        for (cameras, opaque), (y, x) in zip(sky, places, strict=True)
     )
 
 
@@ -198,12 +203,14 @@ class ShadowAtlas:
     views : ShadowViews, optional
         Places of the maps.
     spectral : bool
-        The maps are optical depths (RGBA32F), since media differ, and not paths (R32F).
+        The maps are optical depths (RGBA32F), since media differ, and not paths: R32F, or with counts RG32F where
+        opaque objects end some.
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._framebuffers: tuple[moderngl.Framebuffer, ...] = ()
+        self._made_of: tuple[tuple[int, int], int] | None = None
         self.held: object = None
         self.views: ShadowViews | None = None
         self.spectral = False
@@ -217,9 +224,11 @@ class ShadowAtlas:
             If OpenGL has no room.
         """
         self.held = None
-        if not self._framebuffers or self._framebuffers[0].size != views.extent or self.spectral != spectral:
+        components = 4 if spectral else 2 if any(view.ends for view in views) else 1
+        if self._made_of != (views.extent, components):
             self.release()
-            self._framebuffers = self._made(views.extent, spectral)
+            self._framebuffers = self._made(views.extent, components)
+            self._made_of = views.extent, components
         self.views, self.spectral = views, spectral
         for framebuffer in (self.sums, self.ends):
             framebuffer.viewport = (0, 0, *views.extent)
@@ -236,6 +245,11 @@ class ShadowAtlas:
     def ends(self) -> moderngl.Framebuffer:
         """Framebuffer (R32F) of metres ahead of the center where opaque surfaces end rays; with a depth buffer."""
         return self._framebuffers[1]
+
+    @property
+    def tested(self) -> moderngl.Framebuffer:
+        """The framebuffer of sums with the depth buffer of opaque surfaces, which it leaves as it is."""
+        return self._framebuffers[3]
 
     @property
     def both(self) -> moderngl.Framebuffer:
@@ -257,12 +271,12 @@ class ShadowAtlas:
         ):
             if attachment is not None:
                 attachment.release()
-        self._framebuffers, self.held, self.views = (), None, None
+        self._framebuffers, self._made_of, self.held, self.views = (), None, None, None
 
-    def _made(self, extent: tuple[int, int], spectral: bool) -> tuple[moderngl.Framebuffer, ...]:
+    def _made(self, extent: tuple[int, int], components: int) -> tuple[moderngl.Framebuffer, ...]:
         gl = self._gl
         try:
-            sums, ends = (gl.texture(extent, count, dtype="f4") for count in (4 if spectral else 1, 1))
+            sums, ends = (gl.texture(extent, count, dtype="f4") for count in (components, 1))
             depth = gl.depth_renderbuffer(extent)
         except moderngl.Error as error:
             raise RenderError(
@@ -272,4 +286,6 @@ class ShadowAtlas:
             ) from error
         for texture in (sums, ends):
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
-        return gl.framebuffer([sums]), gl.framebuffer([ends], depth), gl.framebuffer([sums, ends])
+        tested = gl.framebuffer([sums], depth)
+        tested.depth_mask = False
+        return gl.framebuffer([sums]), gl.framebuffer([ends], depth), gl.framebuffer([sums, ends]), tested

@@ -40,8 +40,9 @@ class ShadowThrowers:
     ----------
     grounds : tuple of int
         Opaque objects that shadow neither themselves nor one another, large as they may be.
-    open_ways : bool
-        No opaque object is between the light and any other object.
+    in_the_way : tuple of int
+        Opaque objects that may be between the light and another object, or themselves: all but grounds before which
+        everything is.
     """
 
     def __init__(self, light: Light, scene: Scene, corners: Sequence[Array]) -> None:
@@ -53,7 +54,7 @@ class ShadowThrowers:
         self.grounds = tuple(grounds)
         everything = range(len(corners))
         opaque = (i for i, item in enumerate(scene.objects) if item.medium is None)
-        self.open_ways = all(i in grounds and self._lights(i, everything) for i in opaque)
+        self.in_the_way = tuple(i for i in opaque if i not in grounds or not self._lights(i, everything))
 
     def cameras(self) -> list[Camera]:
         """Cameras of the light that see all but the grounds; what they do not see is lit."""

@@ -9,6 +9,9 @@ import moderngl
 from translucent.errors import RenderError
 from translucent.gpu.ledger import before_making
 
+#: First OpenGL version in which shaders write to buffers.
+SHADER_STORAGE = 430
+
 
 class Storage:
     """Named buffers, made on first use, that only grow.

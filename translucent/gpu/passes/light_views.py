@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
-from translucent.gpu.constants import STORAGE_BINDINGS
+from translucent.gpu.constants import CONSTANTS, STORAGE_BINDINGS
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.light_cameras import light_cameras
@@ -18,7 +18,7 @@ from translucent.gpu.passes.variants import Variants, walk_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightLookup
-from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.passes import PassSpec
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light
 
@@ -132,7 +132,7 @@ class LightViewsPass:
         view.targets.nothing().use()
         gl.enable_only(moderngl.NOTHING)
         if view.scene.opaque:
-            view.targets.opaque().color_attachments[0].use(0)
+            view.targets.opaque_ends().color_attachments[0].use(0)
         program = self._lists.program(WITH_NORMAL=0, WITH_POSITION=0, OPAQUE=bool(view.scene.opaque), GRADIENT=1)
         set_uniform(program, "cell_offset", offset)
         view.draw(program, spec.objects)
@@ -140,14 +140,16 @@ class LightViewsPass:
 
     def _draw_opaque(self, view: LightView) -> None:
         opaque = tuple(i for i, item in enumerate(view.scene.objects) if item.medium is None)
-        self._opaque.run(view, PassSpec(PassName.OPAQUE, "shadows", opaque))
+        ends = view.targets.opaque_ends()
+        ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
+        self._opaque.draw_depth(view, opaque, ends)
 
     def _sort(self, view: LightView, features: FrameFeatures, offset: int) -> None:
         """Sort the lists of one view, and add up the optical depth along them."""
         view.uniforms.bind()
         if view.scene.opaque:
             self._draw_opaque(view)
-            view.targets.opaque().color_attachments[0].use(0)
+            view.targets.opaque_ends().color_attachments[0].use(0)
         view.targets.nothing().use()
         self._gl.enable_only(moderngl.NOTHING)
         switches = {

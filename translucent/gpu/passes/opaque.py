@@ -30,39 +30,46 @@ class OpaquePass:
         self._finished = Variants(gl, "geometry/interface.vert", "shade/opaque.frag", **FINISH_UNITS)
         self._maps = FinishMaps(gl)
 
-    def run(self, view: SceneView, spec: PassSpec) -> None:
+    def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
-        framebuffer = view.targets.opaque()
+        framebuffer = job.targets.opaque()
         framebuffer.use()
         _clear(framebuffer)
-        view.gl.enable_only(moderngl.DEPTH_TEST)
+        job.gl.enable_only(moderngl.DEPTH_TEST)
         # Surfaces at the very end of the range count, too; and of surfaces at one depth, those of the first object.
-        view.gl.depth_func = "<="
-        environment = view.scene.environment
+        job.gl.depth_func = "<="
+        environment = job.scene.environment
         light_map = environment.kind == "image"
-        if view.shadow_maps:
-            view.resources.shadows.use(FINISH_UNITS)
-        common = {"LIGHT_MAP": light_map, "DEPTH_ONLY": False, **shadow_switches(view.shadow_maps, view.resources)}
+        if job.features.has_shadow_maps:
+            job.resources.shadows.use(FINISH_UNITS)
+        common = {"LIGHT_MAP": light_map, "DEPTH_ONLY": False, "PROJECTED_DEPTH": False}
+        common |= shadow_switches(job.features.has_shadow_maps, job.resources)
         if light_map:
-            view.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
+            job.resources.environments.light(environment).irradiance.use(FINISH_UNITS["light_irradiance"])
         for i in spec.objects[::-1]:
-            if (surface := view.scene.objects[i].surface) is None:
+            if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(
                     WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **common
                 )
             else:
-                looks = look_switches(view.scene.objects[i])
+                looks = look_switches(job.scene.objects[i])
                 program = self._finished.program(SURFACE=1, **common, **looks)
-                self._maps.bind(view)
-                self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
-            view.draw(program, (i,))
-        view.gl.depth_func = "<"
+                self._maps.bind(job)
+                self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
+            job.draw(program, (i,))
+        job.gl.depth_func = "<"
 
-    def draw_depth(self, view: SceneView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer) -> None:
-        """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer."""
+    def draw_depth(
+        self, view: SceneView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer, *, projected: bool = False
+    ) -> None:
+        """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer.
+
+        That is linear, or, where passes that follow test against it, has the depth of the projection.
+        """
         framebuffer.use()
         view.gl.enable_only(moderngl.DEPTH_TEST)
-        common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "SHADOW_MAPS": False, "SHADOW_SPECTRAL": False}
+        common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "PROJECTED_DEPTH": projected}
+        common |= {"SHADOW_MAPS": False, "SHADOW_SPECTRAL": False}
         for i in objects:
             surface = view.scene.objects[i].surface
             if surface is None or not surface.alpha_cutoff:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -23,10 +23,11 @@ from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
-from translucent.gpu.placement import AxialRange, PlacedScene
+from translucent.gpu.placement import AxialRange, PlacedScene, depth_range
 from translucent.gpu.resources import Resources
 from translucent.gpu.shadow_atlas import ShadowView, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
+from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
@@ -40,11 +41,12 @@ from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
-#: First OpenGL version in which shaders write to buffers.
-_SHADER_STORAGE = 430
-
 #: Optical depth across a body whose light photons carry.
 _DENSE = 1e4
+
+#: Largest ratio of distances from a lamp that a projected depth buffer resolves: its step at the far end is
+#: 2^-24 far^2 / near, so at most 1e-6 of the distance.
+_FARTHEST = 16.0
 
 _BLACK = Environment.constant((0.0, 0.0, 0.0))
 
@@ -75,9 +77,10 @@ class MapJob(FrameJob):
         self._view = view
         self.corner = view.corner
         self.path_only = not resources.shadows.spectral
+        self.projected_depth = self.path_only and view.ends and _resolves(scene)
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
-        super().__init__(gl, scene, plan, targets, resources, placed=placed)
+        super().__init__(gl, scene, plan, targets, resources, placed=placed, with_depth=self.projected_depth)
 
     def at_place(self, framebuffer: moderngl.Framebuffer) -> moderngl.Framebuffer:
         """The framebuffer, with its viewport where the map is."""
@@ -86,7 +89,8 @@ class MapJob(FrameJob):
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:
         """Target in which thickness passes add up."""
-        return self.at_place(self.resources.shadows.sums)
+        shadows = self.resources.shadows
+        return self.at_place(shadows.tested if self.projected_depth else shadows.sums)
 
     def bind_opaque(self, unit: int) -> None:
         """Bind where rays end for the shader that reads texture `unit`, if there are any."""
@@ -107,7 +111,7 @@ class ShadowMapsPass:
         self._resolve = TransmittancePass(gl)
         self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
         self._targets: dict[int, Targets] = {}
-        self._plans: dict[bool, tuple[object, Scene, RenderPlan]] = {}
+        self._plans: dict[Hashable, tuple[Scene, RenderPlan]] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Render the maps, if objects or lights have changed, and write the uniforms."""
@@ -136,46 +140,50 @@ class ShadowMapsPass:
         # Where all bodies are drawn as sheets, these throw the shadows, too.
         method = job.plan.method if job.plan.method.makes_sheets else None
         dark = _darkened(scene, job.plan.opaque_to_shadows)
-        everything = self._planned(dark, method, opaque=True)
+        opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
+        everything = self._planned(dark, method, opaque)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
-        in_place = all(step.name in _IN_PLACE for step in everything[1].passes)
+        in_place = all(step.name in _IN_PLACE for step in everything[2].passes)
         limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
         seen_by, seen_from_sky = (
-            [(found.cameras(), not (found.open_ways and in_place)) for found in group] for group in (lights, sky)
+            [(found.cameras(), found.in_the_way if in_place else opaque) for found in group] for group in (lights, sky)
         )
         views = ShadowViews.of(seen_by, seen_from_sky, job.plan.shadows.size, limit)
-        atlas.make(views, spectral=everything[1].spectral or not in_place or dark is not scene)
+        atlas.make(views, spectral=everything[2].spectral or not in_place or dark is not scene)
         center = media_center(scene)
-        found_plans = {(True, dark is scene): everything}
+        used = {everything[0]}
         for view in views:
             if view.size not in self._targets:
                 self._targets[view.size] = Targets(self._gl, (view.size, view.size))
             # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
             clear = dark is scene or view in views.sky
-            if (key := (view.ends, clear)) not in found_plans:
-                found_plans[key] = self._planned(scene if clear else dark, method, opaque=view.ends)
-            seen, chosen = found_plans[key]
+            key, seen, chosen = self._planned(scene if clear else dark, method, view.opaque)
+            used.add(key)
             chosen = chosen if dark is scene else replace(chosen, spectral=True)
             before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
             if in_place:
                 self._add_up(MapJob(self._gl, *before, view, center))
             else:
                 self._copy(FrameJob(self._gl, *before), view, center)
+        for key in self._plans.keys() - used:
+            del self._plans[key]
         for size in self._targets.keys() - {view.size for view in views}:
             self._targets.pop(size).release()
         job.uniforms.bind()
 
-    def _planned(self, scene: Scene, method: Method | None, *, opaque: bool) -> tuple[Scene, RenderPlan]:
-        """The scene without interfaces, with or without opaque objects, and its plan."""
+    def _planned(
+        self, scene: Scene, method: Method | None, opaque: tuple[int, ...]
+    ) -> tuple[Hashable, Scene, RenderPlan]:
+        """The scene without interfaces, and no opaque objects but these, and its plan; with a key of them."""
         bodies = _throwing(scene)
-        objects = [item for item in scene.objects if (opaque and item.medium is None) or item in bodies]
+        objects = [item for i, item in enumerate(scene.objects) if i in opaque or item in bodies]
         # Lights move more often than objects change.
         key = tuple(map(weakref.ref, objects)), scene.overlap, method
-        if self._plans.get(opaque, (None,))[0] != key:
+        if key not in self._plans:
             seen = straight_scene(replace(scene, objects=objects, environment=_BLACK, environment_shadows=0))
-            storage = self._gl.version_code >= _SHADER_STORAGE
-            self._plans[opaque] = key, seen, plan(seen, method, Capabilities(shader_storage=storage))
-        return self._plans[opaque][1:]
+            storage = self._gl.version_code >= SHADER_STORAGE
+            self._plans[key] = seen, plan(seen, method, Capabilities(shader_storage=storage))
+        return key, *self._plans[key]
 
     def _add_up(self, light: MapJob) -> None:
         """Draw one map where it is."""
@@ -183,7 +191,8 @@ class ShadowMapsPass:
             stack.callback(light.release)
             for step in light.plan.passes:
                 if step.name is PassName.OPAQUE:
-                    self._opaque.draw_depth(light, step.objects, light.at_place(light.resources.shadows.ends))
+                    ends = light.at_place(light.resources.shadows.ends)
+                    self._opaque.draw_depth(light, step.objects, ends, projected=light.projected_depth)
                 elif step.name is not PassName.TRANSMITTANCE:
                     self._step(step.name)(light, step)
 
@@ -206,6 +215,14 @@ class ShadowMapsPass:
         if name not in self._made:
             self._made[name] = _STEPS[name](self._gl).run
         return self._made[name]
+
+
+def _resolves(scene: Scene) -> bool:
+    """Whether a depth buffer of 24 bits tells what is before what, and nothing is clipped that is before the camera."""
+    if scene.camera.fov_y is None:
+        return True
+    near, far = depth_range(scene.objects, scene.camera, scene.diagonal)
+    return far <= _FARTHEST * near
 
 
 #: Passes whose sums are read where they were added up.

@@ -20,11 +20,19 @@ class SignedDepthPass:
         """Draw the bodies."""
         job.begin_adding(spec.target)
         job.bind_opaque(0)
-        opaque, switches = job.features.has_opaque, {"WITH_NORMAL": False, "WITH_POSITION": False}
-        variants = self._paths if job.path_only else self._variants
-        if not job.path_only:
-            switches["SPECTRAL"] = job.plan.spectral
+        opaque, plain = job.features.has_opaque, {"WITH_NORMAL": False, "WITH_POSITION": False}
+        if job.path_only:
+            variants = self._paths
+            kinds = [{"OPAQUE": kind == 1, "PROJECTED_DEPTH": kind == 2} for kind in range(3)]
+            chosen = kinds[(2 if job.projected_depth else 1) if opaque else 0]
+        else:
+            variants = self._variants
+            kinds = [{"OPAQUE": kind, "SPECTRAL": job.plan.spectral} for kind in (False, True)]
+            chosen = kinds[opaque]
         if job.for_map:
             # Nothing has to be compiled when an opaque object gets into the way of a light, or out of it.
-            variants.program(OPAQUE=not opaque, **switches)
-        job.draw(variants.program(OPAQUE=opaque, **switches), spec.objects)
+            for kind in kinds:
+                variants.program(**plain, **kind)
+        if job.projected_depth:
+            job.gl.enable(moderngl.DEPTH_TEST)
+        job.draw(variants.program(**plain, **chosen), spec.objects)
