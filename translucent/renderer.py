@@ -197,7 +197,7 @@ class Renderer:
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional
-            Takes the share of random paths that have ended, 0 to 1, some times a second: they may take long.
+            Takes the share of the samples, or of random paths, that is done, 0 to 1; with OpenGL.
 
         Returns
         -------

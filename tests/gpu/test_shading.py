@@ -285,6 +285,14 @@ def test_doubled_faces_are_marked_and_cancelled_walls_are_empty(renderer: tl.Ren
     np.testing.assert_allclose(frame.thickness, 0, atol=1e-5)
 
 
+def test_samples_tell_their_share_one_by_one(renderer: tl.Renderer) -> None:
+    shares: list[float] = []
+    ball = tl.Object(Sphere().tessellate(12), tl.Medium(absorption=1.0, ior=1.5))
+    scene = tl.Scene([ball], tl.Camera.look_at((0, 0, 5), (0, 0, 0)))
+    renderer.render(scene, (8, 8), samples=4, progress=shares.append)
+    assert shares == [0.25, 0.5, 0.75, 1.0]
+
+
 def test_samples_average_transmittance_not_thickness(renderer: tl.Renderer) -> None:
     """An edge of an opaque box through a pixel: the mean of 0 and 1 is its share, exp(-mean) would be black."""
     medium = tl.Medium(absorption=1e6)

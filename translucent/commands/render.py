@@ -188,7 +188,7 @@ def render(
             scattering=scattering,
             caustics=photons,
             shadows=read_shadows(shadow_size),
-            progress=Progress(f"path tracing on {renderer.provenance.get('renderer', 'the CPU')}"),
+            progress=Progress(f"rendering on {renderer.provenance.get('renderer', 'the CPU')}"),
         )
         if opaque_with is not None:
             from translucent.interop.pyrender import render_scene

@@ -64,7 +64,7 @@ class FrameJob(SceneView):
     averaged : bool
         The averages have all samples: what is drawn now belongs to the pixel centers, but no picture is read of it.
     report : callable
-        Takes the share of the frame's paths that have ended, now and then.
+        Takes the share of the frame's samples, or random paths, that is done, now and then.
     corner : (int, int)
         Left and bottom of the picture in its targets.
     for_map : bool

@@ -38,6 +38,10 @@ from translucent.scene.scene import Scene
 MOST_LOST = 0.005
 
 
+#: Passes that make no more than light, which the averages have when the rest is found at the pixel centers.
+_LIGHT = (PassName.CAUSTICS, PassName.SURFACES, PassName.TRACED, PassName.PATH_TRACE)
+
+
 class GpuRenderer:
     """Renderer that runs plans with OpenGL.
 
@@ -105,8 +109,8 @@ class GpuRenderer:
     ) -> Frame:
         """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples.
 
-        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of random paths that have
-        ended, now and then.
+        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the samples, or of random
+        paths, that is done, now and then.
         """
         with self._alone(), self.context.current():
             job = self.prepare(scene, size, plan, backdrop)
@@ -115,7 +119,7 @@ class GpuRenderer:
                 self._timer.begin_frame()
                 if samples > 1:
                     self._average(job, samples)
-                self._run_passes(job)
+                self._run_passes(job, leave_out=_LIGHT if samples > 1 else ())
                 return self.read(job, samples)
             finally:
                 job.release()
@@ -289,6 +293,9 @@ class GpuRenderer:
             job.sample, job.samples = number, samples
             job.place((right, down))
             self._run_passes(job)
+            if not job.features.path_traced:  # of these, the share of paths is told
+                self.context.gl.finish()
+                job.report((number + 1) / samples)
         job.averaging, job.averaged, job.sample, job.samples = False, True, 0, 1
         job.place((0.0, 0.0))
 

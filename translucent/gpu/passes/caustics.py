@@ -49,8 +49,6 @@ class CausticsPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the photons of this sample, and add their light to the opaque objects."""
-        if job.averaged:
-            return
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
         with ExitStack() as stack:

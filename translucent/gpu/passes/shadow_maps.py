@@ -121,8 +121,8 @@ class ShadowMapsPass:
             atlas.held = seen
         assert atlas.views is not None
         center = media_center(scene)
-        # Of several samples of a pixel, each looks into its share of the directions.
-        turns = (job.sample % job.samples, job.samples)
+        # Of several samples of a pixel, each looks into its share of the directions; no picture is read beyond these.
+        turns = (0, max(len(atlas.views.sky), 1)) if job.averaged else (job.sample, job.samples)
         extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
         job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
         count = scene.environment_shadows
