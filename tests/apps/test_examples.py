@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 import translucent as tl
+from tests.little import with_few_shadows
 from translucent.formulas.color import srgb_to_linear
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,9 +24,10 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 @pytest.fixture(autouse=True)
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
-    """Little pictures, by the one renderer that all tests share."""
+    """Little pictures, with few shadows, by the one renderer that all tests share."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("EXAMPLE_WIDTH", "48")
+    with_few_shadows(monkeypatch)
     monkeypatch.setattr(tl, "Renderer", lambda: nullcontext(renderer))
 
 

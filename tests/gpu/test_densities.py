@@ -99,7 +99,8 @@ def test_a_rock_in_a_cloud_ends_rays_and_throws_shadows(renderer: tl.Renderer) -
     cloud = tl.Object(Sphere(radius=1).tessellate(24), MILK, density=NOISE)
     scene = tl.Scene([cloud, rock], CAMERA, LIGHTS["sun"], DUSK)
     method = tl.RayMarched(steps=8)
-    frame, truth = renderer.render(scene, SIZE, method), tl.reference.march(scene, SIZE, method)
+    shadows = tl.ShadowMaps(256)
+    frame, truth = renderer.render(scene, SIZE, method, shadows=shadows), tl.reference.march(scene, SIZE, method)
     error = np.abs(frame.radiance - truth.radiance) / truth.radiance.max()
     # A texel at the edge of the shadow is either lit or not.
     assert np.median(error) <= 1e-6
