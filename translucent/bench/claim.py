@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar
 
-from translucent.bench.record import Claim
+from translucent.bench.record import CaseRecord, Claim
 
-
-class _Named(Protocol):
-    """Case of whatever kind."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
+#: Whether a claim holds on a case, and the numbers behind that in words.
+Check = Callable[[CaseRecord], tuple[bool | None, str]]
 
 
-Case = TypeVar("Case", bound=_Named)
-
-
-def over_cases(text: str, cases: Sequence[Case], check: Callable[[Case], tuple[bool | None, str]]) -> Claim:
+def over_cases(text: str, cases: Sequence[CaseRecord], check: Check) -> Claim:
     """A claim over several cases: held where it holds on all, and not where it fails on one.
 
-    A check tells whether a claim holds on a case, and the numbers behind that in words. It gives no verdict (None)
-    where the case has not the numbers, or they are too noisy, which it tells in words: a claim that is undecided
-    anywhere is undecided, unless it fails elsewhere.
+    A check gives no verdict (None) where the case has not the numbers, or they are too noisy, which it tells in words:
+    a claim that is undecided anywhere is undecided, unless it fails elsewhere.
     """
     found = [(case, *check(case)) for case in cases]
     known = [(case, held, words) for case, held, words in found if held is not None]
