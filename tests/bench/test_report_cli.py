@@ -181,6 +181,19 @@ SMALL = ("--quick", "--size", "64x48", "--methods", "signed-depth,constant-thick
 
 
 @pytest.mark.usefixtures("nothing_else")
+def test_a_part_is_measured_anew_in_an_old_report(run: Run, new: Path, tmp_path: Path) -> None:
+    result = run("--from", new, "--only", "shadows,hard-cases", "-o", tmp_path / "out")
+    assert (result.code, result.err) == (0, "")
+    made = Report.from_json((tmp_path / "out" / "report.json").read_text())
+    assert made.cases == record().cases
+    (renewal,) = made.renewals
+    assert renewal.parts == ("shadows", "hard-cases")
+    assert renewal.provenance.command.startswith("translucent report -o")
+    assert "--only shadows,hard-cases --from" in renewal.provenance.command
+    assert "measured anew" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.usefixtures("nothing_else")
 def test_a_model_of_the_user_is_measured(run: Run, tmp_path: Path) -> None:
     result = run("knot", "bear", "-o", tmp_path, *SMALL, "--json")
     assert result.code == 0

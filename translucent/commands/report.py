@@ -28,6 +28,7 @@ from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
     from translucent.bench.record import CaseRecord, Part, Report
+    from translucent.bench.shadows.record import ShadowCase
     from translucent.media.medium import Medium
 
 #: Prefix of the names of cases from users' models.
@@ -216,10 +217,18 @@ def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
         "complete": made.complete,
         "seconds": made.seconds,
         "answers": [_answer(case) for case in made.cases],
+        "shadows": {case.name: _shadow(case) for case in made.shadows.cases},
         "hard_cases": {case.id: case.passed for case in made.hard_cases},
         "claims": {claim.text: claim.held for claim in made.claims},
         "failures": list(made.failures),
         "changes": None if changes is None else [dataclasses.asdict(change) for change in changes],
+    }
+
+
+def _shadow(case: ShadowCase) -> dict[str, Any]:
+    return {
+        "p999_error_in_texels": None if case.texels is None else case.texels.p999,
+        "order_with_outlines": case.order,
     }
 
 
@@ -255,7 +264,8 @@ def _tell_seen(answer: dict[str, Any]) -> None:
 
 def _tell(made: Report, files: list[Path], changes: Any) -> None:
     echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
-    echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
+    if made.cases:
+        echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
     for answer in map(_answer, made.cases):
         if answer["method"] is None:
             echo(f"{answer['case']:<20} -")
