@@ -27,9 +27,10 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "mathml",
     "method_reference",
+    "shadow_reference",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["_ext", "_templates", "generated/methods.md"]
+exclude_patterns = ["_ext", "_templates", "generated/*.md"]
 source_suffix = {".rst": "restructuredtext", ".md": "markdown"}
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -17,7 +17,8 @@ import translucent as tl
 from translucent.bench.codec import Packed
 from translucent.bench.files import read_report, write_csv
 from translucent.bench.page.pictures import heat_map
-from translucent.bench.record import CaseRecord, Picture, Provenance, Report
+from translucent.bench.picture import Picture
+from translucent.bench.record import CaseRecord, Provenance, Report
 from translucent.bench.row import Errors, Row, Timing
 from translucent.files.unpacking import PICTURES
 from translucent.geometry.solids import Box

@@ -12,6 +12,7 @@ import translucent as tl
 from translucent.bench.hard import geometry as hard_geometry
 from translucent.bench.hard import interfaces as hard_interfaces
 from translucent.bench.hard import scattering as hard_scattering
+from translucent.bench.hard import shadows as hard_shadows
 from translucent.bench.hard import values as hard_values
 from translucent.bench.hard import views as hard_views
 from translucent.bench.hard.cases import Checks, Hard
@@ -20,7 +21,7 @@ from translucent.bench.hard.measure import measure_hard_cases
 
 
 def test_there_is_one_of_each() -> None:
-    rooms = (hard_values, hard_views, hard_geometry, hard_interfaces, hard_scattering)
+    rooms = (hard_values, hard_views, hard_geometry, hard_interfaces, hard_scattering, hard_shadows)
     assert len(ALL) == sum(len(room.CASES) for room in rooms)
     assert [case.id for case in ALL] == [f"H{i:02}" for i in range(1, len(ALL) + 1)]
     assert all(case.title and case.promise for case in ALL)

@@ -11,6 +11,7 @@ import pytest
 
 import translucent as tl
 from tests.bench.measuring import case_of, measured
+from tests.bench.provenance import PROVENANCE
 from translucent.bench import measure as measuring
 from translucent.bench import run as running
 from translucent.bench import scaling
@@ -19,9 +20,10 @@ from translucent.bench.contenders import CONTENDERS, Effect, check_names, conten
 from translucent.bench.drawing import Floor, Studio
 from translucent.bench.files import read_report, write_report
 from translucent.bench.measure import CaseRun
-from translucent.bench.record import Report
+from translucent.bench.record import HardCase, Report
 from translucent.bench.run import Effort, measure_all
 from translucent.bench.scaling import ScalingRun
+from translucent.bench.shadows.record import ShadowCase
 from translucent.bench.shapes import lying_torus, menger_sponge, nested_shells, plates
 from translucent.bench.table import table
 from translucent.bench.truth import Truth
@@ -191,6 +193,7 @@ def small(monkeypatch: pytest.MonkeyPatch, *cases: Case) -> None:
     monkeypatch.setattr(running.ScalingRun, "ladders", lambda self: [])
     monkeypatch.setattr(running, "measure_hard_cases", lambda renderer: iter(()))
     monkeypatch.setattr(running, "measure_slabs", lambda *, quick: ())
+    monkeypatch.setattr(running.ShadowsRun, "steps", lambda self: {})
 
 
 def test_a_case_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -221,6 +224,24 @@ def test_an_interruption_leaves_what_is_done(monkeypatch: pytest.MonkeyPatch, tm
     assert not report.complete
     assert [case.name for case in report.cases] == ["mine"]
     assert read_report(path) == report
+
+
+def test_parts_are_measured_anew_and_the_rest_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    small(monkeypatch, case_of(Sphere().tessellate(24)))
+    ball = ShadowCase("ball", "Ball", "round")
+    monkeypatch.setattr(
+        running.ShadowsRun, "steps", lambda self: {"ball": lambda made: dataclasses.replace(made, cases=(ball,))}
+    )
+    hard = HardCase("H01", "grazing", "exact", "as promised", passed=True)
+    old = Report(PROVENANCE, hard_cases=(hard,), seconds=9.0, complete=True)
+    new = measure_all(only=["shadows"], base=old, quick=True, command="the command")
+    assert (new.provenance, new.seconds, new.complete, new.hard_cases) == (PROVENANCE, 9.0, True, (hard,))
+    assert new.shadows.cases == (ball,)
+    assert [(one.parts, one.provenance.command) for one in new.renewals] == [(("shadows",), "the command")]
+    again = measure_all(only=["shadows", "hard-cases"], base=new, quick=True)
+    assert [one.parts for one in again.renewals] == [("shadows", "hard-cases")], "nothing is left of the first"
+    assert again.hard_cases == ()
+    assert Report.from_json(again.to_json()) == again
 
 
 @pytest.mark.parametrize(

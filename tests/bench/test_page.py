@@ -27,7 +27,8 @@ from translucent.bench.frontier import mark_frontier
 from translucent.bench.page import numbers
 from translucent.bench.page.build import build_page, write_page
 from translucent.bench.page.overview import overview_svg
-from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series, Slab
+from translucent.bench.picture import Picture
+from translucent.bench.record import CaseRecord, Claim, HardCase, Report, ScalePoint, Series, Slab
 from translucent.bench.row import Errors, LightErrors, Ratio, Row, Timing
 from translucent.errors import InputError, RenderError
 

@@ -20,7 +20,8 @@ from translucent.bench.page.labels import place_labels, spread
 from translucent.bench.page.pictures import STEPS, heat_map, scale_colors
 from translucent.bench.page.scaling import short_count
 from translucent.bench.page.theme import COLORS, FAMILIES, style_of
-from translucent.bench.record import CaseRecord, Picture
+from translucent.bench.picture import Picture
+from translucent.bench.record import CaseRecord
 from translucent.bench.row import Errors, Kind, Ratio, Row
 
 

@@ -14,7 +14,8 @@ import pytest
 from tests.bench.provenance import PROVENANCE
 from translucent.bench.codec import Packed
 from translucent.bench.files import read_report, write_csv, write_report
-from translucent.bench.record import CaseRecord, Claim, HardCase, Picture, Report, ScalePoint, Series, Slab
+from translucent.bench.picture import Picture
+from translucent.bench.record import CaseRecord, Claim, HardCase, Report, ScalePoint, Series, Slab
 from translucent.bench.row import Errors, LightErrors, Ratio, Row, Timing
 from translucent.errors import InputError
 

@@ -143,12 +143,17 @@ def test_a_folder_that_cannot_be_is_an_error_before_any_work(run: Run, new: Path
         (["--from", "x.json", "-o", "out", "--quick"], "nothing is measured"),
         (["--from", "x.json", "-o", "out", "knot"], "nothing is measured"),
         (["--from", "x.json", "--preset", "jade"], "nothing is measured"),
+        (["--from", "x.json", "--only", "shadow"], "'shadow' is no part of a report; did you mean shadows?"),
+        (["knot", "--only", "shadows"], "a MODEL is measured among the scenes; add scenes"),
         (["--preset", "jade"], "--preset jade; no MODEL to fill; the toolkit's scenes keep their media; add a MODEL"),
         (["knot", "--color", "teal"], "--distance is missing"),
         (["knot", "--preset", "milk"], "did you mean skim_milk"),
         (["--from", "absent.json", "-o", "out"], "no such file"),
     ],
-    ids=["from and quick", "from and a model", "from a medium", "no model", "no distance", "preset", "no such file"],
+    ids=[
+        *("from and quick", "from and a model", "from a medium", "no such part", "a model in no part"),
+        *("no model", "no distance", "preset", "no such file"),
+    ],
 )
 def test_bad_usage(
     run: Run, arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -169,9 +174,23 @@ def nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measuring.ScalingRun, "ladders", lambda _: ())
     monkeypatch.setattr(measuring, "measure_hard_cases", lambda _: ())
     monkeypatch.setattr(measuring, "measure_slabs", lambda *, quick: ())
+    monkeypatch.setattr(measuring.ShadowsRun, "steps", lambda _: {})
 
 
 SMALL = ("--quick", "--size", "64x48", "--methods", "signed-depth,constant-thickness")
+
+
+@pytest.mark.usefixtures("nothing_else")
+def test_a_part_is_measured_anew_in_an_old_report(run: Run, new: Path, tmp_path: Path) -> None:
+    result = run("--from", new, "--only", "shadows,hard-cases", "-o", tmp_path / "out")
+    assert (result.code, result.err) == (0, "")
+    made = Report.from_json((tmp_path / "out" / "report.json").read_text())
+    assert made.cases == record().cases
+    (renewal,) = made.renewals
+    assert renewal.parts == ("shadows", "hard-cases")
+    assert renewal.provenance.command.startswith("translucent report -o")
+    assert "--only shadows,hard-cases --from" in renewal.provenance.command
+    assert "measured anew" in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.usefixtures("nothing_else")

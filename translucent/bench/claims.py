@@ -10,6 +10,8 @@ from translucent.bench.hard.measure import CASES as HARD_CASES
 from translucent.bench.record import CaseRecord, Claim, HardCase, Slab
 from translucent.bench.row import Row
 from translucent.bench.scattering.claims import scattering_claims
+from translucent.bench.shadows.claims import shadow_claims
+from translucent.bench.shadows.record import Shadows
 
 #: Largest time of signed depth, as a multiple of the floor.
 MOST_OF_FLOOR = 1.25
@@ -32,7 +34,10 @@ VISIBLE_FACTOR, VISIBLE = 10.0, 1e-6
 
 
 def check_claims(
-    cases: Sequence[CaseRecord], hard_cases: Sequence[HardCase], slabs: Sequence[Slab] = ()
+    cases: Sequence[CaseRecord],
+    hard_cases: Sequence[HardCase],
+    slabs: Sequence[Slab] = (),
+    shadows: Shadows | None = None,
 ) -> tuple[Claim, ...]:
     """All claims, each with the numbers behind it."""
     closed = [case for case in cases if case.closed and case.absorption_only and not case.failure]
@@ -64,6 +69,7 @@ def check_claims(
             lambda case: _off(case, "SignedDepth from the camera"),
         ),
         *scattering_claims(cases, slabs),
+        *shadow_claims(shadows or Shadows()),
         _hard(hard_cases),
     )
 

@@ -10,6 +10,7 @@ from typing import Literal
 from translucent.bench.frontier import ERROR_FLOOR, ERROR_MARGIN
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
+from translucent.bench.shadows.record import ShadowRow, Shadows
 
 #: Relative noise of a ratio to the floor between runs on one machine.
 TIME_SHARE = 0.15
@@ -76,6 +77,7 @@ def _changes(old: Report, new: Report) -> Iterator[Change]:
         for row in before.rows:
             if (now := rows.get(row.method)) is not None:
                 yield from _row_changes(before, after, row, now)
+    yield from _shadow_changes(old.shadows, new.shadows)
     hard = {case.id: case for case in new.hard_cases}
     for case in old.hard_cases:
         if (found := hard.get(case.id)) is not None and case.passed and not found.passed:
@@ -92,7 +94,32 @@ def _row_changes(before: CaseRecord, after: CaseRecord, old: Row, new: Row) -> I
         yield from _error_change(where, before, old, new)
 
 
-def _time_change(where: str, old: Row, new: Row) -> Iterator[Change]:
+def _shadow_changes(old: Shadows, new: Shadows) -> Iterator[Change]:
+    cases = {case.name: case for case in new.cases}
+    for before in old.cases:
+        if (after := cases.get(before.name)) is None:
+            continue
+        if after.failure and not before.failure:
+            yield Change("fails", f"shadow, {before.name}", after.failure)
+        rows = {row.method: row for row in after.rows}
+        for row in before.rows:
+            if (now := rows.get(row.method)) is None:
+                continue
+            where = f"shadow, {before.name} / {row.method}"
+            yield from _time_change(where, row, now)
+            # Points differ with the size of the picture.
+            if before.compared_points == after.compared_points and row.errors and now.errors:
+                yield from _median_change(where, row.errors.median, now.errors.median)
+
+
+def _median_change(where: str, before: float, after: float) -> Iterator[Change]:
+    a, b = max(before, ERROR_FLOOR), max(after, ERROR_FLOOR)
+    if b > a * ERROR_MARGIN or a > b * ERROR_MARGIN:
+        text = f"median error in transmittance {before:.2g} -> {after:.2g}"
+        yield Change("less accurate" if b > a else "more accurate", where, text)
+
+
+def _time_change(where: str, old: Row | ShadowRow, new: Row | ShadowRow) -> Iterator[Change]:
     if old.ratio is None or new.ratio is None:
         return
     difference = new.ratio.median - old.ratio.median

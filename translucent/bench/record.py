@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from translucent.bench.codec import Packed, decode, encode
+from translucent.bench.codec import decode, encode
+from translucent.bench.picture import Picture
 from translucent.bench.row import Quantity, Ratio, Row, Timing
+from translucent.bench.shadows.record import Shadows
 
 #: Format name of a report's file, and the version of the fields below. A change of meaning raises the version.
 FORMAT, VERSION = "translucent report", 1
@@ -56,35 +57,6 @@ class Provenance:
     dirty: bool | None
     seed: int
     quick: bool
-
-
-@dataclass(frozen=True)
-class Picture:
-    """Picture of one method with its errors; (h, w), row 0 at the top.
-
-    Attributes
-    ----------
-    method : str
-        As in its `Row`, or ``"reference"``: what all others are held against; that one has no error.
-    png : str
-        The sRGB picture as a PNG file in base64.
-    error : Packed, optional
-        Signed error in the case's quantity, in its unit, as floats: of radiance and transmittance, of the channel that
-        is farthest off; 0 below 5e-8. NaN where nothing is covered, or the method calls the pixel invalid.
-    invalid : Packed, optional
-        Booleans: pixels that the method marks.
-    """
-
-    method: str
-    png: str
-    error: Packed | None = None
-    invalid: Packed | None = None
-
-    def check(self) -> None:
-        """Raise `ValueError` if the picture is no base64, or its parts are of different shapes."""
-        base64.b64decode(self.png, validate=True)
-        if self.error is not None and self.invalid is not None and self.error.shape != self.invalid.shape:
-            raise ValueError(f"errors of shape {self.error.shape} and marks of shape {self.invalid.shape}")
 
 
 @dataclass(frozen=True)
@@ -283,17 +255,41 @@ class Claim:
         return self.held is None and self.measured.startswith("undecided")
 
 
+#: Parts of a report that can be measured by themselves.
+Part = Literal["scenes", "scaling", "slabs", "shadows", "hard-cases"]
+
+
+@dataclass(frozen=True)
+class Renewal:
+    """Parts that were measured anew, after the rest of the report.
+
+    Attributes
+    ----------
+    parts : tuple of str
+    provenance : Provenance
+        Of these.
+    seconds : float
+        That they took.
+    """
+
+    parts: tuple[Part, ...]
+    provenance: Provenance
+    seconds: float
+
+
 @dataclass(frozen=True)
 class Report:
     """Complete report.
 
     Attributes
     ----------
-    provenance, cases, scaling, hard_cases, claims, slabs
+    provenance, cases, scaling, hard_cases, claims, slabs, shadows
     seconds : float
         That the measurements took so far.
     complete : bool
         False where it was interrupted, or while it is being made: what is there is usable.
+    renewals : tuple of Renewal
+        What was measured anew after the rest; `provenance` and `seconds` are those of the rest.
     """
 
     provenance: Provenance
@@ -304,6 +300,8 @@ class Report:
     seconds: float = 0.0
     complete: bool = False
     slabs: tuple[Slab, ...] = ()
+    shadows: Shadows = field(default_factory=Shadows)
+    renewals: tuple[Renewal, ...] = ()
     format: str = field(default=FORMAT)
     version: int = field(default=VERSION)
 
@@ -318,7 +316,7 @@ class Report:
             for point in series.points
             if point.failure
         ]
-        return (*cases, *rows, *points)
+        return (*cases, *rows, *points, *self.shadows.failures)
 
     def to_json(self) -> str:
         """The report as one JSON object."""

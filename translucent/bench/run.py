@@ -6,6 +6,7 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from typing import Any, get_args
 
 from translucent.bench.cases import CASES, Case, Size
 from translucent.bench.claims import check_claims
@@ -15,9 +16,11 @@ from translucent.bench.hard.measure import CASES as HARD_CASES
 from translucent.bench.hard.measure import measure_hard_cases
 from translucent.bench.machine import provenance
 from translucent.bench.measure import CaseRun
-from translucent.bench.record import Report
+from translucent.bench.record import Part, Renewal, Report
 from translucent.bench.scaling import ScalingRun
 from translucent.bench.scattering.slabs import measure_slabs
+from translucent.bench.shadows.part import ShadowsRun
+from translucent.bench.shadows.record import Shadows
 from translucent.errors import RenderError
 from translucent.renderer import Renderer
 from translucent.scene.camera import check_size
@@ -59,6 +62,8 @@ def measure_all(
     quick: bool = False,
     backend: str | None = None,
     effort: Effort | None = None,
+    only: Sequence[Part] = (),
+    base: Report | None = None,
     command: str = "tl.bench.measure_all(...)",
     progress: Progress = lambda *_: None,
     keep: Callable[[Report], None] = lambda _: None,
@@ -79,6 +84,10 @@ def measure_all(
         Of the renderer; default: what works here.
     effort : Effort, optional
         How long to measure; default: `QUICK` or `FULL`.
+    only : sequence of {"scenes", "scaling", "slabs", "shadows", "hard-cases"}
+        Parts to measure; default: all.
+    base : Report, optional
+        What else there is, measured before: these parts are renewed in it, and the report tells so.
     command : str
         What the record says has made it.
     progress : callable
@@ -109,18 +118,47 @@ def measure_all(
         stack.enter_context(renderer.gpu.context.current())
         studio = Studio(renderer)
         stack.callback(studio.release)
-        report = Report(provenance(renderer, command, quick=quick))
+        made = provenance(renderer, command, quick=quick)
+        parts = tuple(part for part in get_args(Part) if part in only or not only)
+        report = Report(made) if base is None else _without(base, parts)
         begin = time.perf_counter()
+
+        def stamped(report: Report, *, complete: bool) -> Report:
+            seconds = time.perf_counter() - begin
+            if base is None:
+                return dataclasses.replace(report, seconds=seconds, complete=complete)
+            renewals = (*_without(base, parts).renewals, Renewal(parts, made, seconds))
+            return dataclasses.replace(report, renewals=renewals, complete=complete and base.complete)
+
         try:
-            cases = [*extra, *(case for case in CASES if case.quick or not quick)]
-            for report in _measured(report, studio, cpu, cases, size, methods, quick, effort, progress):  # noqa: B020
-                report = dataclasses.replace(report, seconds=time.perf_counter() - begin)
+            cases = [*extra, *(case for case in CASES if case.quick or not quick)] if "scenes" in parts else []
+            for report in _measured(report, studio, cpu, cases, parts, size, methods, quick, effort, progress):  # noqa: B020
+                report = stamped(report, complete=False)
                 keep(report)
         except KeyboardInterrupt:
             return report
-    report = dataclasses.replace(report, seconds=time.perf_counter() - begin, complete=True)
+        report = stamped(report, complete=True)
     keep(report)
     return report
+
+
+def _without(report: Report, parts: Sequence[Part]) -> Report:
+    """The report without these parts, and without stamps that nothing is left of."""
+    empty: dict[Part, dict[str, Any]] = {
+        "scenes": {"cases": ()},
+        "scaling": {"scaling": ()},
+        "slabs": {"slabs": ()},
+        "shadows": {"shadows": Shadows()},
+        "hard-cases": {"hard_cases": ()},
+    }
+    blank = report
+    for part in parts:
+        blank = dataclasses.replace(blank, **empty[part])
+    kept = [
+        dataclasses.replace(one, parts=tuple(part for part in one.parts if part not in parts))
+        for one in report.renewals
+    ]
+    return dataclasses.replace(blank, renewals=tuple(one for one in kept if one.parts))
 
 
 def _measured(
@@ -128,40 +166,62 @@ def _measured(
     studio: Studio,
     cpu: Renderer | None,
     cases: Sequence[Case],
+    wanted: Sequence[Part],
     size: Size,
     methods: Sequence[str],
     quick: bool,
     effort: Effort,
     progress: Progress,
 ) -> Iterator[Report]:
-    """The report after each part of it."""
-    scaling = ScalingRun(studio, effort.step_seconds, quick)
-    parts = 1 + len(cases) + sum(len(ladder.steps) for ladder in scaling.ladders()) + len(HARD_CASES)
-    done = 0
+    """The report after each step of it."""
+    scaling, shadows = ScalingRun(studio, effort.step_seconds, quick), ShadowsRun(studio, quick)
+    steps = {
+        "scaling": sum(len(ladder.steps) for ladder in scaling.ladders()),
+        "slabs": 1,
+        "shadows": len(shadows.steps()),
+        "hard-cases": len(HARD_CASES),
+    }
+    total, done = len(cases) + sum(steps[part] for part in wanted if part in steps), 0
+
+    def told(what: str) -> None:
+        nonlocal done
+        progress(what, done, total)
+        done += 1
+
     for case in cases:
-        progress(f"case {case.name}", done, parts)
+        told(f"case {case.name}")
         chosen = contenders(case.effect, quick=quick or case.brief, only=methods)
         run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared)
-        report = dataclasses.replace(report, cases=(*report.cases, run.measure(chosen)))
-        report = dataclasses.replace(report, claims=check_claims(report.cases, report.hard_cases, report.slabs))
-        studio.renderer.gpu.context.drain()
-        done += 1
-        yield report
-    for name, series in scaling.steps():
-        done += 1
-        progress(f"scaling, {name}", done, parts)
-        report = dataclasses.replace(report, scaling=series)
+        report = _judged(dataclasses.replace(report, cases=(*report.cases, run.measure(chosen))))
         studio.renderer.gpu.context.drain()
         yield report
-    done += 1
-    progress("slabs", done, parts)
-    report = dataclasses.replace(report, slabs=measure_slabs(quick=quick))
-    yield report
-    for found in measure_hard_cases(studio.renderer):
-        done += 1
-        progress(f"hard case {found.id}", done, parts)
-        report = dataclasses.replace(report, hard_cases=(*report.hard_cases, found))
-    yield dataclasses.replace(report, claims=check_claims(report.cases, report.hard_cases, report.slabs))
+    if "scaling" in wanted:
+        for name, series in scaling.steps():
+            told(f"scaling, {name}")
+            report = dataclasses.replace(report, scaling=series)
+            studio.renderer.gpu.context.drain()
+            yield report
+    if "slabs" in wanted:
+        told("slabs")
+        report = dataclasses.replace(report, slabs=measure_slabs(quick=quick))
+        yield report
+    if "shadows" in wanted:
+        for what, measure in shadows.steps().items():
+            told(what)
+            report = _judged(dataclasses.replace(report, shadows=measure(report.shadows)))
+            studio.renderer.gpu.context.drain()
+            yield report
+    if "hard-cases" in wanted:
+        for found in measure_hard_cases(studio.renderer):
+            told(f"hard case {found.id}")
+            report = dataclasses.replace(report, hard_cases=(*report.hard_cases, found))
+    yield _judged(report)
+
+
+def _judged(report: Report) -> Report:
+    """The report with what its numbers say of the claims."""
+    claims = check_claims(report.cases, report.hard_cases, report.slabs, report.shadows)
+    return dataclasses.replace(report, claims=claims)
 
 
 def _cpu_renderer(stack: ExitStack) -> Renderer | None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from translucent.bench.record import CaseRecord, Report
 from translucent.bench.row import Row
+from translucent.bench.shadows.record import ShadowRow, Shadows
 
 _HEAD = (
     f"{'method':<38}{'ms':>8}{'p95':>8}{'÷ floor':>9}{'±':>6}{'frame':>7}{'passes':>7}{'layers':>7}{'ms/layer':>9}"
@@ -34,6 +35,7 @@ def _lines(report: Report) -> Iterator[str]:
             continue
         yield _HEAD if case.truth_noise is None else _SCATTERED_HEAD
         yield from (_row(case, row) for row in case.rows)
+    yield from _shadows(report.shadows)
     if report.hard_cases:
         yield ""
         passed = sum(case.passed for case in report.hard_cases)
@@ -44,6 +46,33 @@ def _lines(report: Report) -> Iterator[str]:
     for claim in report.claims:
         state = {True: "held", False: "NOT HELD", None: "undecided" if claim.undecided else "not checked"}[claim.held]
         yield f"{state}: {claim.text}: {claim.measured}"
+
+
+def _shadows(shadows: Shadows) -> Iterator[str]:
+    for case in shadows.cases:
+        yield ""
+        yield f"shadow, {case.title}: {case.why}; {case.triangles} triangles; errors in transmittance"
+        if case.failure:
+            yield f"  failed: {case.failure}"
+            continue
+        if case.texels is not None:
+            found = f"median {case.texels.median:.1e}, p99.9 {case.texels.p999:.1e}"
+            yield f"  in the rays of {case.texel_size} x {case.texel_size} texels: {found}"
+        yield f"{'method':<38}{'÷ depth':>9}{'±':>6}{'median':>9}{'p99':>9}{'p99.9':>9}{'with outlines, mean':>21}"
+        yield from map(_shadow_row, case.rows)
+    for sky in shadows.sky:
+        yield f"{sky.environment}, {sky.directions} directions: error {sky.error:.1%} of the mean, {sky.seconds:.2f} s"
+    for caustic in shadows.caustics:
+        for row in caustic.rows:
+            found = f"power {row.power:+.2%}, nRMSE {row.nrmse:.3f}, at most {row.most:.3f}, {row.seconds:.1f} s"
+            yield f"caustic, {caustic.title}, {row.photons:,} photons: {found}"
+
+
+def _shadow_row(row: ShadowRow) -> str:
+    if row.errors is None:
+        return f"{row.method:<38}{'failed' if row.failure else 'refused'}: {row.failure or row.refusal}"
+    line = f"{row.method:<38}" + (f"{row.ratio.median:>9.2f}{row.ratio.noise:>6.2f}" if row.ratio else f"{'':>15}")
+    return f"{line}{row.errors.median:>9.1e}{row.errors.p99:>9.1e}{row.errors.p999:>9.1e}{row.edges or 0.0:>21.1e}"
 
 
 def _row(case: CaseRecord, row: Row) -> str:

@@ -17,7 +17,7 @@ from translucent import reference
 from translucent.arrays import Array
 from translucent.bench.codec import Packed
 from translucent.bench.drawing import Size
-from translucent.bench.record import Picture
+from translucent.bench.picture import Picture
 from translucent.bench.row import ColorDifference, Errors, LightErrors, Quantity
 from translucent.bench.scattering.stored import stored_truth
 from translucent.bench.seeing import color_difference

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import io
 import json
 import shlex
 import sys
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -26,7 +27,8 @@ from translucent.commands.model import read_scene, require_translucent
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
-    from translucent.bench.record import CaseRecord, Report
+    from translucent.bench.record import CaseRecord, Part, Report
+    from translucent.bench.shadows.record import ShadowCase
     from translucent.media.medium import Medium
 
 #: Prefix of the names of cases from users' models.
@@ -41,7 +43,14 @@ PATH = click.Path(path_type=Path)
 @click.option("--quick", is_flag=True, help="About a minute: fewer scenes, methods, pixels and repetitions.")
 @click.option("--size", metavar="WxH", help="Size of the timed frames in pixels.")
 @click.option("--methods", metavar="NAME,...", help="Only these: signed-depth, k-buffer, ray-marched, ...")
-@click.option("--from", "source", type=PATH, metavar="JSON", help="Measure nothing: take the report of this file.")
+@click.option("--only", metavar="PART,...", help="Only these: scenes, scaling, slabs, shadows, hard-cases.")
+@click.option(
+    "--from",
+    "source",
+    type=PATH,
+    metavar="JSON",
+    help="Measure nothing: take the report of this file; with --only, measure these parts of it anew.",
+)
 @click.option(
     "--compare",
     "old",
@@ -60,6 +69,7 @@ def report(
     quick: bool,
     size: str | None,
     methods: str | None,
+    only: str | None,
     source: Path | None,
     old: Path | None,
     color: str | None,
@@ -82,10 +92,17 @@ def report(
     from translucent.bench.output import checked_folder, write_outputs
     from translucent.bench.table import table
 
-    if source is not None and (models or quick or size or methods or backend or color or distance or preset_name):
+    parts = _parts(only)
+    if (
+        source is not None
+        and not parts
+        and (models or quick or size or methods or backend or color or distance or preset_name)
+    ):
         raise InputError(
             f"--from {source}", "nothing is measured, so there is nothing else to ask for", "leave one out"
         )
+    if models and parts and "scenes" not in parts:
+        raise InputError(f"--only {only}", "a MODEL is measured among the scenes", "add scenes, or leave MODEL out")
     medium = read_medium(color, distance, preset_name, clamp)
     if medium is not None and not models:
         given = "--color" if preset_name is None else f"--preset {preset_name}"
@@ -93,8 +110,8 @@ def report(
     before = None if old is None else read_report(old)
     made = None if source is None else read_report(source)
     with nullcontext() if output is None else checked_folder(output):
-        if made is None:
-            made = _measured(models, medium, output, quick, size, methods, unit, backend, allow_outside)
+        if made is None or parts:
+            made = _measured(models, medium, output, quick, size, methods, parts, made, unit, backend, allow_outside)
         files = [] if output is None else write_outputs(made, output)
     changes = None if before is None else compare_reports(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
@@ -105,7 +122,7 @@ def report(
         _tell(made, files, changes)
     if output is None and old is None and not as_json:
         echo(table(made))
-    if not made.complete and source is None:
+    if not made.complete and (source is None or parts):
         raise click.exceptions.Abort
     worse = [change for change in changes or () if change.worse]
     if made.failures:
@@ -124,6 +141,8 @@ def _measured(
     quick: bool,
     size: str | None,
     methods: str | None,
+    parts: tuple[Part, ...],
+    base: Report | None,
     unit: str,
     backend: str | None,
     allow_outside: bool,
@@ -156,16 +175,33 @@ def _measured(
             methods=[] if methods is None else [name.strip() for name in methods.split(",")],
             quick=quick,
             backend=backend,
+            only=parts,
+            base=base,
             command=_command(click.get_current_context().params),
             progress=progress,
             keep=keep,
         )
 
 
+def _parts(only: str | None) -> tuple[Part, ...]:
+    """Parts that ``--only`` names; none: all."""
+    from translucent.bench.record import Part
+
+    known = get_args(Part)
+    named = [] if only is None else [name.strip() for name in only.split(",")]
+    for name in named:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(known)}"
+            raise InputError(f"--only {only}", f"{name!r} is no part of a report", do)
+    return tuple(part for part in known if part in named)
+
+
 def _command(given: dict[str, Any]) -> str:
     """Command line of the user, as far as it tells what was measured."""
     words = ["translucent", "report", *given["models"]]
     options = {"-o": "output", "--size": "size", "--methods": "methods", "--backend": "backend"}
+    options |= {"--only": "only", "--from": "source"}
     options |= {"--color": "color", "--distance": "distance", "--preset": "preset_name"}
     for option, name in options.items():
         words += [option, str(given[name])] if given[name] is not None else []
@@ -181,10 +217,18 @@ def _summary(made: Report, files: list[Path], changes: Any) -> dict[str, Any]:
         "complete": made.complete,
         "seconds": made.seconds,
         "answers": [_answer(case) for case in made.cases],
+        "shadows": {case.name: _shadow(case) for case in made.shadows.cases},
         "hard_cases": {case.id: case.passed for case in made.hard_cases},
         "claims": {claim.text: claim.held for claim in made.claims},
         "failures": list(made.failures),
         "changes": None if changes is None else [dataclasses.asdict(change) for change in changes],
+    }
+
+
+def _shadow(case: ShadowCase) -> dict[str, Any]:
+    return {
+        "p999_error_in_texels": None if case.texels is None else case.texels.p999,
+        "order_with_outlines": case.order,
     }
 
 
@@ -220,7 +264,8 @@ def _tell_seen(answer: dict[str, Any]) -> None:
 
 def _tell(made: Report, files: list[Path], changes: Any) -> None:
     echo(f"{made.provenance.renderer}, {made.provenance.driver}; {made.seconds:.0f} s")
-    echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
+    if made.cases:
+        echo(f"{'scene':<20} {'cheapest that is good enough':<30} {'/ floor':>8} {'RMS error':>10} {'p99.9':>8}")
     for answer in map(_answer, made.cases):
         if answer["method"] is None:
             echo(f"{answer['case']:<20} -")
@@ -230,6 +275,10 @@ def _tell(made: Report, files: list[Path], changes: Any) -> None:
         echo(f"{answer['case']:<20} {answer['method']:<30} {numbers} {answer['quantity']}{mark}")
         if answer["case"].startswith(MODEL_CASE):
             _tell_seen(answer)
+    for case in made.shadows.cases:
+        if case.texels is not None and case.order is not None:
+            found = f"p99.9 {case.texels.p999:.1e} in rays of texels, order {case.order:.1f} with outlines"
+            echo(f"{'shadow, ' + case.name:<20} {found}")
     for claim in made.claims:
         if claim.held is False or claim.undecided:
             verdict = "undecided" if claim.undecided else "does not hold"

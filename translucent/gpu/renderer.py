@@ -26,6 +26,7 @@ from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
 from translucent.gpu.storage import SHADER_STORAGE
+from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
@@ -85,6 +86,11 @@ class GpuRenderer:
     def diffusion(self) -> DiffusionCache:
         """Light that diffuses in bodies, as it is known so far."""
         return self._resources.diffusion
+
+    @property
+    def shadows(self) -> ShadowAtlas:
+        """Maps of shadows of the last scene that has any."""
+        return self._resources.shadows
 
     @property
     def provenance(self) -> dict[str, str]:

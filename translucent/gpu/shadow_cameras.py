@@ -48,8 +48,13 @@ class ShadowThrowers:
     def __init__(self, light: Light, scene: Scene, corners: Sequence[Array]) -> None:
         self._light, self._scene, self._corners = light, scene, corners
         grounds: list[int] = []
-        for i, item in enumerate(scene.objects):
-            if item.medium is None and self._lights(i, (*grounds, i)) and all(self._lights(j, (i,)) for j in grounds):
+        # Large ones first: leaving those out makes the texels of maps smaller.
+        for i in sorted(range(len(corners)), key=lambda i: -float(np.ptp(corners[i], axis=0).max())):
+            if (
+                scene.objects[i].medium is None
+                and self._lights(i, (*grounds, i))
+                and all(self._lights(j, (i,)) for j in grounds)
+            ):
                 grounds.append(i)
         self.grounds = tuple(grounds)
         everything = range(len(corners))

@@ -14,6 +14,7 @@ from translucent.bench.page.figure import require_packages
 from translucent.bench.page.pareto import UNITS, identifier, pareto_svg, plotted
 from translucent.bench.page.pictures import data_address, heat_map, scale_colors
 from translucent.bench.page.scaling import AXES, axis_groups, scaling_svg
+from translucent.bench.page.shadows import shadow_section
 from translucent.bench.page.slabs import mark, slab_tables
 from translucent.bench.page.swatch import swatch
 from translucent.bench.page.theme import css_variables
@@ -57,6 +58,7 @@ def build_page(report: Report) -> str:
             for axis, group in axis_groups(report.scaling).items()
         ],
         slabs=slab_tables(report.slabs),
+        shadows=shadow_section(report.shadows),
         scale=scale_colors(),
         good_enough=GOOD_ENOUGH,
         worst=WORST,
@@ -90,6 +92,7 @@ def _environment() -> Any:
         count=numbers.count_text,
         rounded=numbers.rounded_text,
         data=data_address,
+        heat=heat_map,
         seen=seen_words,
     )
     environment.globals.update(swatch=swatch, mark=mark)

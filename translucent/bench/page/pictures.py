@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.bench.page.numbers import power_text
-from translucent.bench.record import Picture
+from translucent.bench.picture import Picture
 
 #: Magnitudes at which the color changes: anything below the first has none.
 STEPS = tuple(10.0**exponent for exponent in range(-7, 0))

@@ -51,7 +51,7 @@ def scaling_svg(axis: str, group: Sequence[Series]) -> str:
     axes.set_ylabel("ms, median")
     _ticks(axes, sorted({p.x for s in group for p in s.points}))
     figure.subplots_adjust(left=0.115, right=0.97, bottom=0.135, top=0.97)
-    _end_labels(axes, ends)
+    end_labels(axes, ends)
     return to_svg(figure, f"scaling-{axis}", f"Milliseconds against {AXES[axis]}")
 
 
@@ -84,7 +84,7 @@ def short_count(x: float) -> str:
     return f"{x:g}"
 
 
-def _end_labels(axes: Axes, ends: Sequence[tuple[str, str, float, float]]) -> None:
+def end_labels(axes: Axes, ends: Sequence[tuple[str, str, float, float]]) -> None:
     """Names to the right of where the lines end, apart from each other, with a line to each."""
     figure = axes.get_figure(root=True)
     assert figure is not None, "made with one"
