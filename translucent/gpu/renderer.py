@@ -25,8 +25,8 @@ from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
-from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.shadow_atlas import ShadowAtlas
+from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
