@@ -17,6 +17,7 @@ from translucent.errors import InputError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.dialects import Dialect, check_dialect, head_of
 from translucent.gpu.shaders import Gathered, gather
+from translucent.gpu.vulkan_glsl import in_vulkan
 from translucent.suggestions import close_names, did_you_mean
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -39,7 +40,7 @@ class Lifted:
     ----------
     name : str
         File under ``shaders/``.
-    dialect : {"glsl", "webgl2"}
+    dialect : {"glsl", "webgl2", "vulkan"}
     version : int
         Of GLSL that it needs.
     defines : dict of str to int
@@ -119,8 +120,9 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         As `find_shader` gives it.
     defines : dict of str to int
         Values of its switches; those in parts that others leave out may be missing.
-    target : {"glsl", "webgl2"}
-        GLSL 3.30 core, or 4.30 where it writes to buffers; or GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take.
+    target : {"glsl", "webgl2", "vulkan"}
+        GLSL 3.30 core, or 4.30 where it writes to buffers; GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take; or
+        GLSL 4.50 for Vulkan (`translucent.gpu.vulkan_glsl`), which translators to other languages read.
 
     Raises
     ------
@@ -135,8 +137,10 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     parts = list(_parts(_decided(name, gathered, defines)))
     kept = _reached(parts)
     used = set().union(*(part.names for part in kept))
-    body = "\n\n".join(part.text.strip("\n") for part in kept)
-    head = head_of(name, "\n".join(part.code for part in kept), target)
+    texts = [part.text.strip("\n") for part in kept]
+    code = "\n".join(part.code for part in kept)
+    head = head_of(name, code, target)
+    body = "\n\n".join(in_vulkan(name, texts, code) if target == "vulkan" else texts)
     decided = {key: int(value) for key, value in defines.items()}
     defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
     defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
