@@ -164,7 +164,9 @@ def _run(what: str, command: Sequence[str], folder: str) -> str:
     done = subprocess.run(command, capture_output=True, encoding="utf-8", cwd=folder)
     if done.returncode:
         tool = Path(command[0]).name
-        told = _first_line("\n".join(line for line in (done.stdout + done.stderr).splitlines() if folder not in line))
+        # It names the file that it was given, first alone and then with the line.
+        output = (done.stdout + done.stderr).replace(f"{command[-1]}:", "line ")
+        told = _first_line("\n".join(line for line in output.splitlines() if folder not in line))
         raise InputError(what, f"{tool}: {told or 'it stopped'}", "take another target")
     return done.stdout
 

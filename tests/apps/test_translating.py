@@ -1,0 +1,176 @@
+"""Shaders in other languages: translators take them, and what runs here gives the numbers of the float64 reference."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import translucent as tl
+from tests import webgpu
+from tests.hosts import BODY, RESOLVE, SUM, Host
+from tests.twins import ARGUMENTS, assert_equals_twin
+from translucent.assets import shader_library
+from translucent.commands import translating
+from translucent.commands.translating import NAGA, Language, translate
+from translucent.gpu.lifting import lift
+from translucent.gpu.probe import signatures
+
+#: The passes that make thickness of faces, and transmittance of thickness: whose texts an engine needs.
+STAGES = {
+    "body": ("geometry/body.vert", BODY),
+    "sum": ("thickness/signed_depth.frag", SUM),
+    "full": ("geometry/fullscreen.vert", {}),
+    "resolve": ("shade/transmittance.frag", RESOLVE),
+}
+LIBRARY = [f"lib/{path.name}" for path in shader_library()]
+MESHES = Path(__file__).parents[2] / "meshes"
+
+
+def glslang() -> str:
+    found = shutil.which("glslangValidator")
+    if found is None or shutil.which("spirv-cross") is None:
+        pytest.skip("glslang or SPIRV-Cross is absent: apt-get install glslang-tools spirv-cross")
+    return found
+
+
+@pytest.fixture(scope="module")
+def naga() -> None:
+    try:
+        translate("lib/ray.glsl", {}, "wgsl")
+    except tl.InputError as error:
+        if "not installed" not in str(error):
+            raise
+        pytest.skip(f"naga is absent: npm install {NAGA}, and set NODE_PATH")
+
+
+@pytest.fixture(scope="module")
+def device(naga: None) -> Any:
+    wgpu = pytest.importorskip("wgpu", reason="the package wgpu is absent")
+    try:
+        adapter = wgpu.gpu.request_adapter_sync()
+    except RuntimeError as error:
+        pytest.skip(f"there is no Vulkan for wgpu (apt-get install mesa-vulkan-drivers): {error}")
+    if "float32-blendable" not in adapter.features:
+        pytest.skip("this device does not blend 32-bit floats")
+    return adapter.request_device_sync(required_features=["float32-blendable"])
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_library_functions_in_wgsl_equal_their_twins(name: str, device: Any) -> None:
+    text = translate(name, {}, "wgsl").text
+    path = next(path for path in shader_library() if f"lib/{path.name}" == name)
+    for function, signature in signatures(path).items():
+        # Of grids that run through all combinations, as many as cost little.
+        arguments = [argument[:: max(len(argument) // 300, 1)] for argument in ARGUMENTS[function]]
+        found = webgpu.run_function(device, text, signature, arguments)
+        assert_equals_twin(path.stem, function, signature.returns, arguments, found)
+
+
+@pytest.mark.parametrize("mesh", ["knot.ply"])
+def test_thickness_in_wgsl_equals_the_reference(mesh: str, device: Any) -> None:
+    texts = {key: translate(name, defines, "wgsl").text for key, (name, defines) in STAGES.items()}
+    host = Host.of(tl.load_mesh(MESHES / mesh), (128, 96))
+    host.check(*webgpu.draw(device, host, texts))
+
+
+@pytest.mark.parametrize("name", [*STAGES, *LIBRARY])
+def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
+    compiler = glslang()
+    file, defines = STAGES.get(name, (name, {}))
+    text = translate(file, defines, "hlsl").text
+    if name in LIBRARY:
+        text += "float4 main() : SV_Target0 { return 0.0; }\n"
+    stage = "vert" if file.endswith(".vert") else "frag"
+    written = tmp_path / "shader.hlsl"
+    written.write_text(text)
+    command = [compiler, "-D", "-V", "-e", "main", "-S", stage, "-o", str(tmp_path / "shader.spv"), str(written)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("language", ["hlsl", "msl", "wgsl"])
+def test_a_library_has_all_its_functions_and_nothing_else(language: Language, request: pytest.FixtureRequest) -> None:
+    if language == "wgsl":
+        request.getfixturevalue("naga")
+    else:
+        glslang()
+    for name in ("lib/optics.glsl", "lib/spherical_harmonics.glsl"):
+        text = translate(name, {}, language).text
+        assert text.startswith(f"// translucent: shaders/{name}; ")
+        path = next(path for path in shader_library() if f"lib/{path.name}" == name)
+        for function in signatures(path):
+            assert len(re.findall(rf"^(?:fn |[a-z][\w<>, ]* ){function}\(", text, re.MULTILINE)) == 1, function
+        assert "main" not in text
+        assert "_call" not in text
+
+
+def test_what_a_stage_takes_and_gives_has_the_same_name_and_place_in_every_language(naga: None) -> None:
+    """No compiler for Metal runs here: its text is held against the interface of the others."""
+    glslang()
+    vulkan = lift(*STAGES["sum"], "vulkan").text
+    members = re.findall(r"^    (?:float|int|vec4|mat4) (\w+);", vulkan, re.MULTILINE)
+    assert {"axis", "axial_start", "count_weight", "snapping_share"} <= set(members)
+    hlsl, msl, wgsl = (translate(*STAGES["sum"], language).text for language in ("hlsl", "msl", "wgsl"))
+    assert re.findall(r" body_(\w+) : packoffset", hlsl) == members
+    assert re.findall(r"^    (?:float|int|float4|float4x4) (\w+);", msl.split("};")[0], re.MULTILINE) == members
+    assert re.findall(r"^    (\w+): ", wgsl.split("}")[0], re.MULTILINE) == members
+    place = "layout(location = 0) in float axial;"
+    assert place in vulkan
+    assert "float axial : TEXCOORD0;" in hlsl
+    assert "float axial [[user(locn0)]];" in msl
+    assert "@location(0) axial: f32" in wgsl
+    assert "float2 path_and_count : SV_Target0;" in hlsl
+    assert "float2 path_and_count [[color(0)]];" in msl
+    assert "@location(0) path_and_count: vec2<f32>" in wgsl
+    assert "constant Body& body [[buffer(0)]]" in msl
+    hlsl, msl, wgsl = (translate(*STAGES["body"], language).text for language in ("hlsl", "msl", "wgsl"))
+    assert "precise float4 gl_Position : SV_Position;" in hlsl
+    assert "float4 gl_Position [[position, invariant]];" in msl
+    assert "@builtin(position) @invariant" in wgsl
+
+
+@pytest.mark.parametrize(
+    ("present", "language", "message"),
+    [
+        ((), "hlsl", r"--target hlsl; glslang and SPIRV-Cross are not installed; install them: apt-get install "),
+        (("glslang",), "msl", r"--target msl; SPIRV-Cross is not installed; install them: .* spirv-cross"),
+        ((), "wgsl", r"--target wgsl; naga is not installed; install Node.js, and 'npm install naga-wasm@"),
+    ],
+)
+def test_a_translator_that_is_absent_is_told(
+    present: tuple[str, ...], language: Language, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: name if name in present else None)
+    with pytest.raises(tl.InputError, match=message):
+        translate("lib/ray.glsl", {}, language)
+
+
+def test_a_package_that_node_does_not_find_is_told(naga: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("NODE_PATH")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(tl.InputError, match="naga is not installed"):
+        translate("lib/ray.glsl", {}, "wgsl")
+
+
+@pytest.mark.parametrize(("language", "said"), [("hlsl", "glslang.*: .*nothing"), ("wgsl", "naga: .*nothing")])
+def test_what_a_translator_refuses_is_told_in_its_words(
+    language: Language, said: str, naga: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    glslang()
+    wrong = dataclasses.replace(lift(*STAGES["full"], "vulkan"), text="#version 450 core\nvoid main() { nothing(); }\n")
+    monkeypatch.setattr(translating, "lift", lambda *_: wrong)
+    with pytest.raises(tl.InputError, match=f"'a.frag' in (HLSL|WGSL); {said}.*; take another target"):
+        translate("a.frag", {}, language)
+
+
+def test_a_part_of_stages_is_refused() -> None:
+    with pytest.raises(
+        tl.InputError, match=r"part of stages, and asks them for .*; take a stage \(.vert, .frag\), a file"
+    ):
+        translate("transport/hierarchy.glsl", {"ONE_OBJECT": 1}, "hlsl")
