@@ -57,34 +57,45 @@ def _value(name: str, width: int, many: int, j: int) -> str:
     return f"{_KIND[width]}({parts})" if width > 1 else parts
 
 
-def draw(device: Any, host: Host, stages: dict[str, str]) -> tuple[np.ndarray, np.ndarray]:
-    """Thickness in metres and flags of a host's picture, by the WGSL of ``body``, ``sum``, ``full`` and ``resolve``."""
+#: Formats of what resolves write: thickness and flags are apart, or with the count in one.
+APART = ("rgba8unorm", "rgba8unorm", "rgba8unorm", "r32float", "r8unorm")
+TOGETHER = ("rgba32float",)
+_NUMBERS = {"rgba8unorm": (np.uint8, 4), "r8unorm": (np.uint8, 1), "r32float": (np.float32, 1)}
+_NUMBERS["rgba32float"] = (np.float32, 4)
+
+
+def draw(
+    device: Any, host: Host, stages: dict[str, str], outputs: tuple[str, ...], *, upside_down: bool
+) -> list[np.ndarray]:
+    """Outputs of the WGSL stages ``body``, ``sum``, ``full`` and ``resolve``, of these formats.
+
+    Upside down, the first row of the sums is the lowest of the picture, which turns faces around.
+    """
     import wgpu
 
     modules = {name: device.create_shader_module(code=text) for name, text in stages.items()}
     usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
     texture = lambda kind: device.create_texture(size=(*host.size, 1), format=kind, usage=usage)  # noqa: E731
     sums = texture("rg32float")
-    # The sum of all faces, in any order; its first row is the lowest, as the resolve wants it.
+    # The sum of all faces, in any order.
     add = {"operation": "add", "src_factor": "one", "dst_factor": "one"}
     attributes = [{"format": "float32x3", "offset": 0, "shader_location": 0}]
     drawn = device.create_render_pipeline(
         layout="auto",
         vertex={"module": modules["body"], "buffers": [{"array_stride": 12, "attributes": attributes}]},
-        primitive={"topology": "triangle-list", "front_face": "cw", "cull_mode": "none"},
+        primitive={"topology": "triangle-list", "front_face": "cw" if upside_down else "ccw"},
         fragment={
             "module": modules["sum"],
             "targets": [{"format": "rg32float", "blend": {"color": add, "alpha": add}}],
         },
     )
-    kinds = ["rgba8unorm", "rgba8unorm", "rgba8unorm", "r32float", "r8unorm"]
     resolved = device.create_render_pipeline(
         layout="auto",
         vertex={"module": modules["full"]},
         primitive={"topology": "triangle-list"},
-        fragment={"module": modules["resolve"], "targets": [{"format": kind} for kind in kinds]},
+        fragment={"module": modules["resolve"], "targets": [{"format": kind} for kind in outputs]},
     )
-    outputs = [texture(kind) for kind in kinds]
+    targets = [texture(kind) for kind in outputs]
 
     def buffer(data: bytes, kind: int) -> dict[str, Any]:
         return device.create_buffer_with_data(data=data, usage=kind)
@@ -96,7 +107,7 @@ def draw(device: Any, host: Host, stages: dict[str, str]) -> tuple[np.ndarray, n
     def target(view: Any) -> dict[str, Any]:
         return {"view": view.create_view(), "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
 
-    def block(name: str, *, upside_down: bool = False) -> dict[str, Any]:
+    def block(name: str) -> dict[str, Any]:
         return {"buffer": buffer(host.by_columns(name, upside_down=upside_down), wgpu.BufferUsage.UNIFORM)}
 
     encoder = device.create_command_encoder()
@@ -104,23 +115,23 @@ def draw(device: Any, host: Host, stages: dict[str, str]) -> tuple[np.ndarray, n
     work.set_pipeline(drawn)
     work.set_vertex_buffer(0, buffer(host.offsets.tobytes(), wgpu.BufferUsage.VERTEX))
     work.set_index_buffer(buffer(host.faces.tobytes(), wgpu.BufferUsage.INDEX), "uint32")
-    work.set_bind_group(0, bound(drawn, {1: block("Body", upside_down=True)}))
+    work.set_bind_group(0, bound(drawn, {1: block("Body")}))
     work.draw_indexed(host.faces.size)
     work.end()
-    work = encoder.begin_render_pass(color_attachments=[target(output) for output in outputs])
+    work = encoder.begin_render_pass(color_attachments=[target(one) for one in targets])
     work.set_pipeline(resolved)
-    blocks = {0: block("View"), 2: block("Shade"), 5: block("Environment"), 16: sums.create_view()}
+    blocks = {0: block("View"), 2: block("Shade"), 16: sums.create_view()}
+    if "seen_kind" in stages["resolve"]:
+        blocks[5] = block("Environment")
     work.set_bind_group(0, bound(resolved, blocks))
     work.draw(3)
     work.end()
     device.queue.submit([encoder.finish()])
-    return _read(device, outputs[3], np.float32), _read(device, outputs[4], np.uint8)
+    return [_read(device, one, *_NUMBERS[kind]) for one, kind in zip(targets, outputs, strict=True)]
 
 
-def _read(device: Any, texture: Any, kind: type) -> np.ndarray:
+def _read(device: Any, texture: Any, kind: type, channels: int) -> np.ndarray:
     width, height, _ = texture.size
-    size = np.dtype(kind).itemsize
-    data = device.queue.read_texture(
-        {"texture": texture}, {"bytes_per_row": width * size, "rows_per_image": height}, texture.size
-    )
-    return np.frombuffer(data, kind).reshape(height, width)
+    layout = {"bytes_per_row": width * channels * np.dtype(kind).itemsize, "rows_per_image": height}
+    data = device.queue.read_texture({"texture": texture}, layout, texture.size)
+    return np.frombuffer(data, kind).reshape(height, width, channels)

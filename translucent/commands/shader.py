@@ -14,6 +14,7 @@ from translucent.errors import InputError
 if TYPE_CHECKING:
     from translucent.commands.translating import Language
     from translucent.gpu.dialects import Dialect
+    from translucent.gpu.std140 import UniformBlock
 
 
 @click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target wgsl")
@@ -54,8 +55,24 @@ def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Languag
         text, version = lifted.text, lifted.version
     if not as_json:
         return echo(text, nl=False)
-    told = {"name": lifted.name, "target": target, "version": version, "defines": lifted.defines}
-    return echo(json.dumps({**told, "files": lifted.files, "text": text}))
+    told = {
+        "name": lifted.name,
+        "target": target,
+        "version": version,
+        "defines": lifted.defines,
+        "files": lifted.files,
+        "blocks": [_placed(block) for block in lifted.blocks],
+        "text": text,
+    }
+    return echo(json.dumps(told))
+
+
+def _placed(block: UniformBlock) -> dict[str, object]:
+    """Where a uniform block is bound, and where its members are in it."""
+    fields = block.dtype.fields
+    assert fields is not None
+    offsets = {name: place for name, (_, place, *_) in fields.items()}
+    return {"name": block.name, "binding": block.binding, "bytes": block.dtype.itemsize, "offsets": offsets}
 
 
 def _list(as_json: bool) -> None:

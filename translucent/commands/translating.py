@@ -26,9 +26,20 @@ Language = Literal["hlsl", "msl", "wgsl"]
 #: The npm package that has naga: its major version is naga's.
 NAGA = "naga-wasm@30.1.0"
 
+#: What engines call the inputs of vertex shaders in HLSL.
+_SEMANTICS = {
+    "offset": "POSITION",
+    "normal": "NORMAL",
+    "corner_normal": "NORMAL",
+    "uv": "TEXCOORD0",
+    "corner_color": "COLOR0",
+}
 _LANGUAGES: Mapping[Language, str] = {"hlsl": "HLSL", "msl": "Metal's language", "wgsl": "WGSL"}
 _SPIRV_CROSS: Mapping[Language, Sequence[str]] = {
-    "hlsl": ["--hlsl", "--shader-model", "50", "--hlsl-auto-binding", "all"],
+    "hlsl": [
+        *("--hlsl", "--shader-model", "50", "--hlsl-auto-binding", "all"),
+        *(word for pair in _SEMANTICS.items() for word in ("--set-hlsl-named-vertex-input-semantic", *pair)),
+    ],
     "msl": ["--msl", "--msl-version", "20100"],
 }
 _MADE_BY: Mapping[Language, str] = {

@@ -16,7 +16,9 @@ from translucent.assets import shader_names
 from translucent.errors import InputError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.dialects import Dialect, check_dialect, head_of
+from translucent.gpu.layout import BLOCKS
 from translucent.gpu.shaders import Gathered, gather
+from translucent.gpu.std140 import UniformBlock
 from translucent.gpu.vulkan_glsl import in_vulkan
 from translucent.suggestions import close_names, did_you_mean
 
@@ -29,6 +31,7 @@ _WORDS = re.compile(
     r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
 )
 _LINE = re.compile(r"#line \d+ (\d+)$")
+_BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
 _DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
 
 
@@ -47,6 +50,8 @@ class Lifted:
         By which its switches are decided.
     files : tuple of str
         Those of which something is in it.
+    blocks : tuple of UniformBlock
+        Uniform blocks in it.
     text : str
     """
 
@@ -55,6 +60,7 @@ class Lifted:
     version: int
     defines: Mapping[str, int]
     files: tuple[str, ...]
+    blocks: tuple[UniformBlock, ...]
     text: str
 
 
@@ -145,7 +151,9 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
     defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
     files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
-    return Lifted(name, target, head.version, decided, files, "\n".join([*head.lines, *defined, "", body, ""]))
+    blocks = tuple(BLOCKS[key] for key in _BLOCK.findall(code))
+    text = "\n".join([*head.lines, *defined, "", body, ""])
+    return Lifted(name, target, head.version, decided, files, blocks, text)
 
 
 def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:
