@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import translucent as tl
@@ -20,6 +21,7 @@ from tests.twins import ARGUMENTS, assert_equals_twin
 from translucent.assets import shader_library
 from translucent.commands import translating
 from translucent.commands.translating import NAGA, Language, translate
+from translucent.gpu.layout import BLOCKS
 from translucent.gpu.lifting import lift
 from translucent.gpu.probe import signatures
 
@@ -33,7 +35,7 @@ STAGES = {
 }
 #: Libraries that have between them all that the language has to say: loops, branches, arrays, powers and angles.
 LIBRARY = [f"lib/{name}.glsl" for name in ("optics", "interface", "environment", "spherical_harmonics", "tone")]
-MESHES = Path(__file__).parents[2] / "meshes"
+MESHES, DOCS = (Path(__file__).parents[2] / name for name in ("meshes", "docs"))
 
 
 @functools.cache
@@ -97,6 +99,55 @@ def test_thickness_in_wgsl_equals_the_reference(device: Any) -> None:
     host.check(thickness, covered + 2 * valid)
     *_, thickness, flags = webgpu.draw(device, host, texts, webgpu.APART, upside_down=True)
     host.check(thickness[..., 0], flags[..., 0])
+
+
+def test_what_docs_say_that_the_passes_take_is_what_the_renderer_gives_them() -> None:
+    """docs/lifting.md, "What they take", followed by hand."""
+    mesh, size = tl.load_mesh(MESHES / "bear.ply"), (96, 72)
+    host = Host.of(mesh, size)
+    camera, diagonal = host.scene.camera, host.scene.diagonal
+    assert camera.fov_y is not None
+    tan_y = np.tan(np.radians(camera.fov_y) / 2)
+    tan_x = tan_y * size[0] / size[1]
+    view = np.eye(4)
+    view[:3, :3] = [camera.right, camera.up, -camera.forward]
+    view[:3, 3] = view[:3, :3] @ -camera.eye
+    projection = np.diag([1 / tan_x, 1 / tan_y, 0.0, 0.0])
+    projection[3, 2] = -1.0
+    center = np.eye(4)
+    center[:3, 3] = mesh.center
+    expected: dict[str, dict[str, npt.ArrayLike]] = {
+        "Body": {
+            "clip_from_offset": projection @ view @ center,
+            "axis": [*camera.forward, 0.0],
+            "axial_start": -1e30,
+            "count_weight": 1.0,
+            "count_offset": 0.0,
+            "snapping_share": 2.0**-8 / diagonal,
+        },
+        "View": {
+            "frame_size": [*size, 0, 0],
+            "ray_right": [*(camera.right * tan_x), 0.0],
+            "ray_up": [*(camera.up * tan_y), 0.0],
+            "ray_forward": [*camera.forward, 0.0],
+        },
+        "Shade": {
+            "expected_count": [0.0, 0.0],
+            "rounding": 1e-5 * diagonal,
+            "count_share": diagonal,
+            "coverage_floor": 2e-7 * diagonal,
+        },
+    }
+    for name, members in expected.items():
+        record = np.frombuffer(host.blocks[name], BLOCKS[name].dtype)[0]
+        page = (DOCS / "lifting.md").read_text(encoding="utf-8")
+        for member, value in members.items():
+            near = 1e-6 * np.abs(value).max()
+            np.testing.assert_allclose(record[member], value, 0.0, near, err_msg=f"{name}.{member}")
+            fields = BLOCKS[name].dtype.fields
+            assert fields is not None
+            row = next(line for line in page.splitlines() if line.startswith("|") and f"`{member}`" in line)
+            assert re.search(rf"\b{fields[member][1]}\b", row.split("|")[2]), row
 
 
 @pytest.mark.parametrize("name", [*STAGES, *LIBRARY])

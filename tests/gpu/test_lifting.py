@@ -149,6 +149,16 @@ def test_a_target_that_is_none_is_told() -> None:
         lift("intervals/k_buffer.frag", values("intervals/k_buffer.frag"), "vulkan")
 
 
+@pytest.mark.parametrize("name", [name for name in shader_names() if not name.endswith(".glsl")])
+def test_every_stage_is_there_for_vulkan(name: str) -> None:
+    if lift(name, values(name)).version == WITH_STORAGE:
+        return
+    code = re.sub(r"//.*", "", lift(name, values(name), "vulkan").text)
+    assert re.findall(r"^(?:flat )?(?:uniform|in|out) .*", code, re.MULTILINE) == []
+    places = re.findall(r"binding = (\d+)\)", code)
+    assert len(places) == len(set(places))
+
+
 def test_for_vulkan_everything_has_its_place() -> None:
     name = "shade/paint.frag"
     text = lift(name, dict.fromkeys(switches(name), 1), "vulkan").text
