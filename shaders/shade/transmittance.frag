@@ -6,7 +6,7 @@
 #include <Environment>
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
-#include "thickness/snapping.glsl"
+#include "thickness/balance.glsl"
 #if !SURFACES && !MAP
 #include "shade/background.glsl"
 #endif
@@ -61,13 +61,11 @@ struct Path {
 
 // advance: metres along the ray per metre along the camera's forward axis.
 #if SPECTRAL
-Path read_path(sampler2D depths, sampler2D lengths, ivec2 texel, float advance) {
-    vec4 sum = texelFetch(depths, texel, 0);
-    return Path(texelFetch(lengths, texel, 0).r * advance, sum.rgb * advance, sum.a);
+Path path_of(vec4 sum, float lengths, float advance) {
+    return Path(lengths * advance, sum.rgb * advance, sum.a);
 }
 #else
-Path read_path(sampler2D sums, ivec2 texel, float advance) {
-    vec2 sum = texelFetch(sums, texel, 0).rg;
+Path path_of(vec2 sum, float advance) {
     return Path(sum.r * advance, sum.r * advance * extinction.rgb, sum.g);
 }
 #endif
@@ -86,9 +84,9 @@ void main() {
 
 #if ACCUMULATED
 #if SPECTRAL
-    Path path = read_path(accumulated, accumulated_path, texel, advance);
+    Path path = path_of(texelFetch(accumulated, texel, 0), texelFetch(accumulated_path, texel, 0).r, advance);
 #else
-    Path path = read_path(accumulated, texel, advance);
+    Path path = path_of(texelFetch(accumulated, texel, 0).rg, advance);
 #endif
 #else
     Path path = Path(0.0, vec3(0.0), 0.0);
@@ -104,19 +102,17 @@ void main() {
     bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= rounding;
     float misplaced = 0.0;
 #else
-    float count = whole_count(path.count);
-    bool balanced = count >= expected_count.x && count <= expected_count.y;
-    float misplaced = share_of_count(path.count) * count_share * advance;
+    bool balanced = is_balanced(path.count);
+    float misplaced = misplaced_length(path.count, advance);
 #endif
-    // NaN fails every comparison, so this refuses it, too.
-    bool valid = balanced && path.thickness >= -(rounding + misplaced) && path.thickness < NOTHING;
+    bool valid = balanced && is_length(path.thickness, misplaced);
     bool covered = path.thickness > coverage_floor || !valid;
     if (!valid) {
 #if FALLBACK
 #if SPECTRAL
-        path = read_path(fallback, fallback_path, texel, advance);
+        path = path_of(texelFetch(fallback, texel, 0), texelFetch(fallback_path, texel, 0).r, advance);
 #else
-        path = read_path(fallback, texel, advance);
+        path = path_of(texelFetch(fallback, texel, 0).rg, advance);
 #endif
 #else
         path = Path(0.0, vec3(0.0), 0.0);

@@ -15,7 +15,11 @@ from dataclasses import dataclass
 from translucent.assets import shader_names
 from translucent.errors import InputError
 from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.dialects import Dialect, check_dialect, head_of
+from translucent.gpu.layout import BLOCKS
 from translucent.gpu.shaders import Gathered, gather
+from translucent.gpu.std140 import UniformBlock
+from translucent.gpu.vulkan_glsl import in_vulkan
 from translucent.suggestions import close_names, did_you_mean
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -27,12 +31,8 @@ _WORDS = re.compile(
     r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
 )
 _LINE = re.compile(r"#line \d+ (\d+)$")
+_BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
 _DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
-#: Identifiers that need a newer GLSL version.
-_STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
-
-#: Versions of GLSL: for all shaders, and for those that write to buffers.
-PLAIN, WITH_STORAGE = 330, 430
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,24 @@ class Lifted:
     ----------
     name : str
         File under ``shaders/``.
+    dialect : {"glsl", "webgl2", "vulkan"}
     version : int
         Of GLSL that it needs.
     defines : dict of str to int
         By which its switches are decided.
     files : tuple of str
         Those of which something is in it.
+    blocks : tuple of UniformBlock
+        Uniform blocks in it.
     text : str
     """
 
     name: str
+    dialect: Dialect
     version: int
     defines: Mapping[str, int]
     files: tuple[str, ...]
+    blocks: tuple[UniformBlock, ...]
     text: str
 
 
@@ -112,7 +117,7 @@ def switches(name: str) -> list[str]:
     return sorted(gather(name).switches)
 
 
-def lift(name: str, defines: Mapping[str, int]) -> Lifted:
+def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lifted:
     """Text of a shader, with its includes and constants written out.
 
     Parameters
@@ -121,12 +126,16 @@ def lift(name: str, defines: Mapping[str, int]) -> Lifted:
         As `find_shader` gives it.
     defines : dict of str to int
         Values of its switches; those in parts that others leave out may be missing.
+    target : {"glsl", "webgl2", "vulkan"}
+        GLSL 3.30 core, or 4.30 where it writes to buffers; GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take; or
+        GLSL 4.50 for Vulkan (`translucent.gpu.vulkan_glsl`), which translators to other languages read.
 
     Raises
     ------
     InputError
-        If a switch is unknown or missing, or the shader refuses the values.
+        If a switch is unknown or missing, the shader refuses the values, or it needs what the target lacks.
     """
+    check_dialect(target)
     gathered = gather(name)
     if unknown := sorted(defines.keys() - gathered.switches):
         known = ", ".join(sorted(gathered.switches)) or "it has none"
@@ -134,16 +143,17 @@ def lift(name: str, defines: Mapping[str, int]) -> Lifted:
     parts = list(_parts(_decided(name, gathered, defines)))
     kept = _reached(parts)
     used = set().union(*(part.names for part in kept))
-    version = WITH_STORAGE if any(_STORAGE.search(part.code) for part in kept) else PLAIN
-    head = [f"#version {version} core", f"// translucent: shaders/{name}"]
-    if any("precise" in part.names for part in kept):
-        head.append("#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere")
+    texts = [part.text.strip("\n") for part in kept]
+    code = "\n".join(part.code for part in kept)
+    head = head_of(name, code, target)
+    body = "\n\n".join(in_vulkan(name, texts, code) if target == "vulkan" else texts)
     decided = {key: int(value) for key, value in defines.items()}
-    head += [f"#define {key} {value}" for key, value in decided.items() if key in used]
-    head += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
+    defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
+    defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
     files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
-    body = "\n\n".join(part.text.strip("\n") for part in kept)
-    return Lifted(name, version, decided, files, "\n".join([*head, "", body, ""]))
+    blocks = tuple(BLOCKS[key] for key in _BLOCK.findall(code))
+    text = "\n".join([*head.lines, *defined, "", body, ""])
+    return Lifted(name, target, head.version, decided, files, blocks, text)
 
 
 def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:
