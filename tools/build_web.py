@@ -36,6 +36,7 @@ SHADERS: dict[str, tuple[str, dict[str, int]]] = {
         "shade/opaque.frag",
         {"DEPTH_ONLY": 1, "SURFACE": 0, "LIGHT_MAP": 0, "SHADOW_MAPS": 0},
     ),
+    "recentered": ("thickness/recentered.glsl", {}),
     "thickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 0}),
     "spectralThickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 1}),
 }

@@ -131,7 +131,8 @@ export class ExactThicknessPass {
     if (scene.matrixWorldAutoUpdate) scene.updateMatrixWorld();
     if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
     const [bodies, opaque] = this.sort(scene, camera);
-    const view = seesFrom(camera);
+    const [width, height] = this.size();
+    const view = seesFrom(camera, width, height);
     const media = new Box3();
     for (const one of bodies) {
       one.measure();
@@ -139,7 +140,7 @@ export class ExactThicknessPass {
     }
     for (const one of opaque) one.measure();
     const spectral = this.isSpectral(bodies);
-    this.prepare(spectral, opaque.length > 0);
+    this.prepare(width, height, spectral, opaque.length > 0);
 
     const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
     const range = view.range(media);
@@ -266,10 +267,13 @@ export class ExactThicknessPass {
     });
   }
 
-  /** Make the targets, where they are not there yet in this size. */
-  private prepare(spectral: boolean, opaque: boolean): void {
+  private size(): number[] {
     const size = this.options.size ?? this.renderer.getDrawingBufferSize(new Vector2()).toArray();
-    const [width, height] = size.map((n) => Math.max(1, Math.floor(n)));
+    return size.map((n) => Math.max(1, Math.floor(n)));
+  }
+
+  /** Make the targets, where they are not there yet in this size. */
+  private prepare(width: number, height: number, spectral: boolean, opaque: boolean): void {
     const type = this.precision === "float32" ? FloatType : HalfFloatType;
     const layout = [width, height, type, spectral, opaque].join();
     if (layout === this.layout) return;

@@ -4,6 +4,7 @@ import type { Camera } from "three";
 import { sumOfInstances } from "./bodies.js";
 import type { StandIn } from "./bodies.js";
 import { NEAR_SURFACE, NOTHING } from "./generated/shaders.js";
+import type { BodyUniforms } from "./programs.js";
 import { isClosed, windingNumber } from "./topology.js";
 
 /** Distances along the camera's axis that media span. */
@@ -16,6 +17,9 @@ export interface DepthRange {
 export interface View {
   camera: Camera;
   orthographic: boolean;
+  /** Pixels of the picture. */
+  width: number;
+  height: number;
   /** Metres ahead of the camera at which rays start. */
   start: number;
   eye: Vector3;
@@ -24,7 +28,7 @@ export interface View {
   setRays(right: Vector4, up: Vector4, forward: Vector4): void;
 }
 
-export function seesFrom(camera: Camera): View {
+export function seesFrom(camera: Camera, width: number, height: number): View {
   const p = camera.projectionMatrix.elements;
   const orthographic = p[15] === 1;
   const start = orthographic ? ((camera as { near?: number }).near ?? 0) : 0;
@@ -32,6 +36,8 @@ export function seesFrom(camera: Camera): View {
   return {
     camera,
     orthographic,
+    width,
+    height,
     start,
     eye: new Vector3().setFromMatrixPosition(camera.matrixWorld),
     range(box) {
@@ -72,9 +78,23 @@ export function place(one: StandIn, view: View, range: DepthRange): void {
   const e = viewFromOffset.elements;
   const cut = isCut(one, view);
   uniforms.axis.value.set(-e[2], -e[6], -e[10], cut ? -e[14] : 0);
+  setAnchor(uniforms, view, [clip[12], clip[13]], -e[14], cut);
   uniforms.axial_start.value = view.orthographic && cut ? view.start : -NOTHING;
   uniforms.axial_depth_scale.value = 1 / range.length;
   uniforms.axial_depth_start.value = ((cut ? 0 : -e[14]) - range.near) / range.length;
+}
+
+/** Where in the picture places count from: the center of the body, or of the picture if that has no place. */
+function setAnchor(uniforms: BodyUniforms, view: View, clip: [number, number], ahead: number, cut: boolean): void {
+  const { orthographic, width, height } = view;
+  const weight = orthographic || cut ? 1 : ahead;
+  const [x, y] = cut && !orthographic ? [0, 0] : clip.map((c) => c / weight);
+  const [right, up] = [(x + 1) * (width / 2), (y + 1) * (height / 2)];
+  uniforms.anchor_pixel.value.set(Math.fround(right), Math.fround(up), right - Math.fround(right), up - Math.fround(up));
+  uniforms.anchor_slope.value.set(orthographic ? 0 : x, orthographic ? 0 : y);
+  uniforms.across_start.value.set(cut && !orthographic ? clip[0] : 0, cut && !orthographic ? clip[1] : 0);
+  uniforms.clip_weight.value.set(orthographic ? 0 : 1, orthographic ? 1 : cut ? 0 : ahead);
+  uniforms.half_size.value.set(width / 2, height / 2);
 }
 
 /** Whether rays may start within the bounds of a body: distances then count from there. */

@@ -21,10 +21,12 @@ const VERTEX = `
 #include <morphtarget_pars_vertex>
 #include <skinning_pars_vertex>
 uniform vec3 center;
+uniform vec2 across_start;
+out vec2 across;
 #ifdef USE_INSTANCING
 flat out float mirrored;
 #endif
-${generated.bodyVertex.replace("in vec3 offset;", "vec3 offset;").replace("void main()", "void place_vertex()")}
+${generated.bodyVertex.replace("in vec3 offset;", "vec3 offset;").replace("void main()", "void place_vertex()").replace(/\baxial\b/g, "axial_shown")}
 void main() {
   #include <begin_vertex>
   #include <morphinstance_vertex>
@@ -37,6 +39,7 @@ void main() {
   #endif
   offset = transformed - center;
   place_vertex();
+  across = (clip_from_offset * vec4(offset, 0.0)).xy + across_start;
 }
 `;
 
@@ -48,6 +51,22 @@ flat in float mirrored;
 #else
 #define FRONT_FACING gl_FrontFacing
 #endif
+`;
+
+// Where the interpolated point is in the picture, and from that where the ray of the pixel meets its face.
+const RECENTERED = `
+in float axial_shown;
+in vec2 across;
+uniform vec2 clip_weight;
+uniform vec2 half_size;
+uniform vec4 anchor_pixel;
+uniform vec2 anchor_slope;
+float axial;
+${generated.recentered}
+void find_axial() {
+  vec2 shown = (across - anchor_slope * axial_shown) / dot(clip_weight, vec2(axial_shown, 1.0)) * half_size;
+  axial = recentered(axial_shown, shown, gl_FragCoord.xy - anchor_pixel.xy - anchor_pixel.zw);
+}
 `;
 
 const FULLSCREEN = `
@@ -62,6 +81,13 @@ export interface BodyUniforms {
   [name: string]: IUniform;
   clip_from_offset: IUniform<Matrix4>;
   axis: IUniform<Vector4>;
+  /** Of the interpolated point, w of its place in the picture: times axial, and the rest. */
+  clip_weight: IUniform<Vector2>;
+  half_size: IUniform<Vector2>;
+  /** Pixel from which places in the picture count, as a number and what its float32 leaves out. */
+  anchor_pixel: IUniform<Vector4>;
+  anchor_slope: IUniform<Vector2>;
+  across_start: IUniform<Vector2>;
   center: IUniform<Vector3>;
   axial_start: IUniform<number>;
   axial_depth_scale: IUniform<number>;
@@ -78,6 +104,11 @@ export function bodyUniforms(): BodyUniforms {
   return {
     clip_from_offset: { value: new Matrix4() },
     axis: { value: new Vector4() },
+    clip_weight: { value: new Vector2() },
+    half_size: { value: new Vector2() },
+    anchor_pixel: { value: new Vector4() },
+    anchor_slope: { value: new Vector2() },
+    across_start: { value: new Vector2() },
     center: { value: new Vector3() },
     axial_start: { value: -generated.NOTHING },
     axial_depth_scale: { value: 1 },
@@ -91,11 +122,18 @@ export function bodyUniforms(): BodyUniforms {
   };
 }
 
+function recentering(fragment: string): string {
+  return fragment
+    .replace("gl_FrontFacing", "FRONT_FACING")
+    .replace("in float axial;\n", "")
+    .replace("void main() {", "void main() {\n  find_axial();");
+}
+
 function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
   return new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: VERTEX,
-    fragmentShader: SIDE + fragment.replace("gl_FrontFacing", "FRONT_FACING"),
+    fragmentShader: SIDE + RECENTERED + recentering(fragment),
     defines: instanced ? { WITH_INSTANCES: 1 } : {},
     uniforms,
     side: DoubleSide,
