@@ -132,7 +132,8 @@ export class ExactThicknessPass {
     if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
     const [bodies, opaque] = this.sort(scene, camera);
     const [width, height] = this.size();
-    const view = seesFrom(camera, width, height);
+    const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
+    const view = seesFrom(camera, width, height, subpixel);
     const media = new Box3();
     for (const one of bodies) {
       one.measure();
@@ -144,10 +145,9 @@ export class ExactThicknessPass {
 
     const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
     const range = view.range(media);
-    const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
     const saved = this.save();
     try {
-      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one)), this.nothing);
+      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one)), [this.nothing, 0, 0, 0]);
       const expected = [0, 0];
       const sound = bodies.every((one) => isClosed(one.mesh.geometry));
       let open = 0;
@@ -158,15 +158,15 @@ export class ExactThicknessPass {
         expected[1] += weight * most;
         const { uniforms } = one;
         uniforms.count_weight.value = weight;
-        uniforms.snapping_share.value = sound && this.precision === "float32" ? subpixel / diagonal : 0;
+        uniforms.snapping_share.value = sound && this.precision === "float32" ? 1 / diagonal : 0;
         uniforms.opaque_axial_depth.value = this.ends?.texture ?? null;
         setExtinction(one, diagonal);
         const blocked = this.ends !== null;
         const key = `sum ${spectral} ${blocked} ${one.instanced !== null}`;
         return one.use(key, () => summing(uniforms, spectral, blocked, one.instanced !== null));
       });
-      this.draw(this.sums!, meshes, 0);
-      this.finish(view, spectral, diagonal, expected);
+      this.draw(this.sums!, meshes, [0, 0, 0, 0]);
+      this.finish(view, media, spectral, diagonal, expected);
     } finally {
       this.restore(saved);
     }
@@ -296,7 +296,7 @@ export class ExactThicknessPass {
   }
 
   /** Sums to metres. */
-  private finish(view: View, spectral: boolean, diagonal: number, expected: number[]): void {
+  private finish(view: View, media: Box3, spectral: boolean, diagonal: number, expected: number[]): void {
     const { resolve, sums, result } = this;
     const precise = this.precision === "float32";
     resolve.accumulated.value = sums!.textures[0];
@@ -309,17 +309,26 @@ export class ExactThicknessPass {
     resolve.coverage_floor.value = (precise ? COVERAGE_FLOOR : ROUNDING_16) * diagonal;
     this.resolvers[String(spectral)] ??= resolving(resolve, spectral);
     this.screen.material = this.resolvers[String(spectral)];
+    // Where no body is, no number has to be found.
+    const everywhere = expected[0] !== 0 || expected[1] !== 0;
+    const [x, y, w, h] = everywhere ? [0, 0, result!.width, result!.height] : view.rectangle(media);
+    this.draw(result!, [], [0, 0, 1, 0]);
+    if (w <= 0 || h <= 0) return;
+    result!.scissor.set(x, y, w, h);
+    result!.scissorTest = true;
     this.draw(result!, [this.screen], null);
+    result!.scissorTest = false;
   }
 
-  private draw(target: WebGLRenderTarget, meshes: Mesh[], cleared: number | null): void {
+  private draw(target: WebGLRenderTarget, meshes: Mesh[], cleared: number[] | null): void {
     const { renderer, stage } = this;
     renderer.setRenderTarget(target);
     if (cleared !== null) {
       renderer.state.buffers.color.setMask(true);
       const gl = renderer.getContext() as WebGL2RenderingContext;
-      target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, [cleared, cleared, cleared, cleared]));
+      target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, i ? [0, 0, 0, 0] : cleared));
     }
+    if (!meshes.length) return;
     stage.children = meshes; // none of them is anybody else's child
     renderer.render(stage, this.eye);
     stage.children = [];

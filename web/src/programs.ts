@@ -21,6 +21,9 @@ const VERTEX = `
 #include <morphtarget_pars_vertex>
 #include <skinning_pars_vertex>
 uniform vec3 center;
+uniform vec2 half_size;
+uniform vec2 anchor_slope;
+uniform vec2 anchor_rest;
 uniform vec2 across_start;
 out vec2 across;
 #ifdef USE_INSTANCING
@@ -39,7 +42,8 @@ void main() {
   #endif
   offset = transformed - center;
   place_vertex();
-  across = (clip_from_offset * vec4(offset, 0.0)).xy + across_start;
+  vec2 apart = (clip_from_offset * vec4(offset, 0.0)).xy + across_start - anchor_slope * axial_shown;
+  across = half_size * apart + anchor_rest * gl_Position.w;
 }
 `;
 
@@ -57,16 +61,15 @@ flat in float mirrored;
 const RECENTERED = `
 in float axial_shown;
 in vec2 across;
-uniform vec2 clip_weight;
-uniform vec2 half_size;
-uniform vec4 anchor_pixel;
-uniform vec2 anchor_slope;
+uniform vec2 anchor_pixel;
+uniform float subpixel;
 float axial;
 ${generated.recentered}
-void find_axial() {
-  vec2 shown = (across - anchor_slope * axial_shown) / dot(clip_weight, vec2(axial_shown, 1.0)) * half_size;
-  axial = recentered(axial_shown, shown, gl_FragCoord.xy - anchor_pixel.xy - anchor_pixel.zw);
-}
+`;
+
+const FIND_AXIAL = `
+  vec2 on_ray = recentered(axial_shown, (gl_FragCoord.xy - anchor_pixel) - across * gl_FragCoord.w, subpixel);
+  axial = on_ray.x;
 `;
 
 const FULLSCREEN = `
@@ -81,11 +84,11 @@ export interface BodyUniforms {
   [name: string]: IUniform;
   clip_from_offset: IUniform<Matrix4>;
   axis: IUniform<Vector4>;
-  /** Of the interpolated point, w of its place in the picture: times axial, and the rest. */
-  clip_weight: IUniform<Vector2>;
   half_size: IUniform<Vector2>;
-  /** Pixel from which places in the picture count, as a number and what its float32 leaves out. */
-  anchor_pixel: IUniform<Vector4>;
+  /** Pixel from which places in the picture count, and what its float32 leaves out. */
+  anchor_pixel: IUniform<Vector2>;
+  anchor_rest: IUniform<Vector2>;
+  subpixel: IUniform<number>;
   anchor_slope: IUniform<Vector2>;
   across_start: IUniform<Vector2>;
   center: IUniform<Vector3>;
@@ -104,9 +107,10 @@ export function bodyUniforms(): BodyUniforms {
   return {
     clip_from_offset: { value: new Matrix4() },
     axis: { value: new Vector4() },
-    clip_weight: { value: new Vector2() },
     half_size: { value: new Vector2() },
-    anchor_pixel: { value: new Vector4() },
+    anchor_pixel: { value: new Vector2() },
+    anchor_rest: { value: new Vector2() },
+    subpixel: { value: 0 },
     anchor_slope: { value: new Vector2() },
     across_start: { value: new Vector2() },
     center: { value: new Vector3() },
@@ -126,7 +130,8 @@ function recentering(fragment: string): string {
   return fragment
     .replace("gl_FrontFacing", "FRONT_FACING")
     .replace("in float axial;\n", "")
-    .replace("void main() {", "void main() {\n  find_axial();");
+    .replace("snapping(axial, snapping_share)", "on_ray.y * snapping_share")
+    .replace("void main() {", `void main() {${FIND_AXIAL}`);
 }
 
 function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
