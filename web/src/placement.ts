@@ -102,6 +102,8 @@ export function place(one: StandIn, view: View, range: DepthRange): void {
   uniforms.axis.value.set(-e[2], -e[6], -e[10], cut ? -e[14] : 0);
   setAnchor(uniforms, view, [clip[12], clip[13]], -e[14], cut);
   uniforms.axial_start.value = view.orthographic && cut ? view.start : -NOTHING;
+  uniforms.ahead.value = cut ? 0 : -e[14];
+  uniforms.world_from_normal.value.copy(mesh.matrixWorld).invert().transpose();
   uniforms.axial_depth_scale.value = 1 / range.length;
   uniforms.axial_depth_start.value = ((cut ? 0 : -e[14]) - range.near) / range.length;
 }

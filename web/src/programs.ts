@@ -3,6 +3,7 @@ import {
   AddEquation,
   CustomBlending,
   DoubleSide,
+  GreaterDepth,
   GLSL3,
   Matrix4,
   MinEquation,
@@ -16,8 +17,20 @@ import {
 import type { BlendingEquation, IUniform, Texture } from "three";
 import * as generated from "./generated/shaders.js";
 
+const NORMALS = `
+  #include <beginnormal_vertex>
+  #include <morphinstance_vertex>
+  #include <morphnormal_vertex>
+  #include <skinbase_vertex>
+  #include <skinnormal_vertex>
+  #ifdef USE_INSTANCING
+  mat3 turned = mat3(instanceMatrix);
+  objectNormal = turned * (objectNormal / vec3(dot(turned[0], turned[0]), dot(turned[1], turned[1]), dot(turned[2], turned[2])));
+  #endif
+`;
+
 // Vertices as three.js moves them, then as body.vert places them.
-const VERTEX = `
+const vertex = (body: string, normals: boolean): string => `
 #include <morphtarget_pars_vertex>
 #include <skinning_pars_vertex>
 uniform vec3 center;
@@ -29,23 +42,27 @@ out vec2 across;
 #ifdef USE_INSTANCING
 flat out float mirrored;
 #endif
-${generated.bodyVertex.replace("in vec3 offset;", "vec3 offset;").replace("void main()", "void place_vertex()").replace(/\baxial\b/g, "axial_shown")}
+${body.replace(/^in (vec3 (offset|normal);)/gm, "$1").replace("void main()", "void place_vertex()").replace(/\b(axial|normal)\b/g, "$1_shown")}
 void main() {
+  ${normals ? NORMALS : ""}
   #include <begin_vertex>
-  #include <morphinstance_vertex>
+  ${normals ? "" : "#include <morphinstance_vertex>\n  #include <skinbase_vertex>"}
   #include <morphtarget_vertex>
-  #include <skinbase_vertex>
   #include <skinning_vertex>
   #ifdef USE_INSTANCING
   mirrored = sign(determinant(mat3(instanceMatrix)));
   transformed = (instanceMatrix * vec4(transformed, 1.0)).xyz;
   #endif
+  ${normals ? "normal_shown = objectNormal;" : ""}
   offset = transformed - center;
   place_vertex();
   vec2 apart = (clip_from_offset * vec4(offset, 0.0)).xy + across_start - anchor_slope * axial_shown;
   across = half_size * apart + anchor_rest * gl_Position.w;
 }
 `;
+
+const VERTEX = vertex(generated.bodyVertex, false);
+const VERTEX_WITH_NORMAL = vertex(generated.bodyVertexWithNormal, true);
 
 // An instance that is mirrored shows its other side; three.js turns only whole objects.
 const SIDE = `
@@ -101,6 +118,9 @@ export interface BodyUniforms {
   extinction: IUniform<Vector4>;
   opaque_axial_depth: IUniform<Texture | null>;
   opaque_range: IUniform<Vector2>;
+  world_from_normal: IUniform<Matrix4>;
+  /** Metres ahead of the eye that `axial` counts from. */
+  ahead: IUniform<number>;
 }
 
 export function bodyUniforms(): BodyUniforms {
@@ -123,6 +143,8 @@ export function bodyUniforms(): BodyUniforms {
     extinction: { value: new Vector4() },
     opaque_axial_depth: { value: null },
     opaque_range: { value: new Vector2(0, 1) },
+    world_from_normal: { value: new Matrix4() },
+    ahead: { value: 0 },
   };
 }
 
@@ -163,6 +185,32 @@ export function summing(uniforms: BodyUniforms, spectral: boolean, opaque: boole
 /** Keeps the nearest opaque surface, as a share of the depth of the media; without a depth buffer, which would round it. */
 export function nearest(uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
   return drawn(generated.opaqueDepth, MinEquation, uniforms, instanced);
+}
+
+// The last surface of bodies on each ray: its normal, outwards, and metres along the camera's axis.
+const EXIT = `
+in vec3 world_normal;
+uniform float ahead;
+uniform float axial_depth_scale;
+uniform float axial_depth_start;
+layout(location = 0) out vec4 normal_and_axial;
+void main() {
+  if (FRONT_FACING) { discard; }
+  float size = length(world_normal);
+  normal_and_axial = vec4(size > 0.0 ? world_normal / size : vec3(0.0), axial_shown + ahead);
+  gl_FragDepth = clamp(axial_shown * axial_depth_scale + axial_depth_start, 0.0, 1.0);
+}
+`;
+
+/** Keeps the last surface that rays leave through; `reversed` as the renderer's depth buffer is. */
+export function last(uniforms: BodyUniforms, instanced: boolean, reversed: boolean): ShaderMaterial {
+  const made = drawn("", AddEquation, uniforms, instanced);
+  made.fragmentShader = `${SIDE}\nin float axial_shown;\n${reversed ? EXIT.replace("clamp", "1.0 - clamp") : EXIT}`;
+  made.vertexShader = VERTEX_WITH_NORMAL;
+  made.blending = NoBlending;
+  made.depthTest = made.depthWrite = true;
+  made.depthFunc = GreaterDepth;
+  return made;
 }
 
 /** Uniforms of the pass over the pixels: fields of the blocks View and Shade. */
