@@ -72,6 +72,8 @@ const LARGEST_16 = 65504;
 export class ExactThicknessPass {
   readonly renderer: WebGLRenderer;
   options: ExactThicknessOptions;
+  /** Of the box around all bodies at the last `render`, in metres. */
+  diagonal = 1;
   private standIns = new Map<Mesh, StandIn>();
   private sums: WebGLRenderTarget | null = null;
   private last: WebGLRenderTarget | null = null;
@@ -155,6 +157,7 @@ export class ExactThicknessPass {
     this.prepare(width, height, spectral, opaque.length > 0, exits);
 
     const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
+    this.diagonal = diagonal;
     const range = view.range(media);
     const saved = this.save();
     try {

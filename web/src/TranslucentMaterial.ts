@@ -17,6 +17,7 @@ interface Uniforms {
   exactExits: IUniform<Texture | null>;
   exactEnds: IUniform<Texture | null>;
   exactExtinction: IUniform<Vector3>;
+  exactDiagonal: IUniform<number>;
   exactUse: IUniform<[boolean, boolean, boolean]>;
 }
 
@@ -27,7 +28,10 @@ uniform sampler2D exactOpticalDepth;
 uniform sampler2D exactExits;
 uniform sampler2D exactEnds;
 uniform vec3 exactExtinction;
+uniform float exactDiagonal;
 uniform bool exactUse[3];  // optical depth, exits, opaque ends
+#define STEPS 16
+#define HALVINGS 5
 ${library}
 
 vec2 exactPlace(vec3 p) {
@@ -63,6 +67,11 @@ vec3 exactBehind(vec3 p, vec3 direction, float roughness, float ior) {
 #endif
 }
 
+bool exactInside(vec3 p) {
+  vec2 place = exactPlace(p);
+  return all(equal(place, clamp(place, 0.0, 1.0))) && -p.z <= exactTexel(exactExits, place).a;
+}
+
 // Light that comes through from behind: bent where it enters, and where it leaves the last surface.
 vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback) {
   vec2 place = exactPlace(p);
@@ -70,28 +79,40 @@ vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback
   bool valid = path.b > 0.5;
   float thickness = valid ? path.r : fallback;
   vec3 ray = isOrthographic ? vec3(0.0, 0.0, -1.0) : normalize(p);
+  // Smooth normals may look away at an outline.
+  n = normalize(n - ray * max(dot(ray, n) + 0.05, 0.0));
   vec3 inside = tl_refracted_direction(ray, n, ior);
   float kept = 1.0 - tl_fresnel_dielectric(-dot(ray, n), ior);
-  float stretch = 1.0;
   float along = thickness;
+  float filled = 1.0;
+  float crossings = 1.0;
   vec3 outside = inside;
   if (exactUse[1] && valid) {
-    vec4 straight = exactTexel(exactExits, place);
-    float reach = length(exactPoint(place, straight.a) - p);
-    // To where the bent ray meets the last surface, by the tangent planes of it.
-    along = reach;
-    vec3 exitNormal = straight.rgb;
-    for (int i = 0; i < 6; ++i) {
-      vec2 at = exactPlace(p + along * inside);
-      vec4 exit = exactTexel(exactExits, at);
-      if (exit.a <= 0.0) { along *= 0.7; continue; }
-      vec3 normal = (viewMatrix * vec4(exit.rgb, 0.0)).xyz;
-      float slope = dot(inside, normal);
-      exitNormal = exit.rgb;
-      if (slope < 0.02) { break; }
-      along = clamp(dot(exactPoint(at, exit.a) - p, normal) / slope, 0.0, 2.0 * reach + thickness);
+    // To where the bent ray is behind the last surface: in steps, then halving them, then by the tangent plane there.
+    float reach = length(exactPoint(place, exactTexel(exactExits, place).a) - p);
+    float low = 0.0;
+    float high = exactDiagonal;
+    for (int i = 1; i <= STEPS; ++i) {
+      float at = exactDiagonal * float(i) / float(STEPS);
+      if (!exactInside(p + at * inside)) { high = at; break; }
+      low = at;
     }
-    stretch = along / max(reach, 1e-20);
+    for (int i = 0; i < HALVINGS; ++i) {
+      float at = 0.5 * (low + high);
+      if (exactInside(p + at * inside)) { low = at; } else { high = at; }
+    }
+    vec2 there = exactPlace(p + low * inside);
+    vec4 exit = exactTexel(exactExits, there);
+    vec3 exitNormal = exit.rgb;
+    float slope = dot(inside, (viewMatrix * vec4(exitNormal, 0.0)).xyz);
+    along = low;
+    if (exit.a > 0.0 && slope > 0.05) {
+      float tangent = dot(exactPoint(there, exit.a) - p, (viewMatrix * vec4(exitNormal, 0.0)).xyz) / slope;
+      along = clamp(tangent, low - exactDiagonal / float(STEPS), high + exactDiagonal / float(STEPS));
+      along = max(along, 0.0);
+    }
+    // Of the way to the last surface, the share that is inside.
+    filled = reach > thickness ? thickness / reach : 1.0;
     vec3 normal = normalize((viewMatrix * vec4(exitNormal, 0.0)).xyz);
     float cosine = dot(inside, normal);
     if (dot(exitNormal, exitNormal) > 0.25 && cosine > 0.0) {
@@ -99,10 +120,12 @@ vec3 exactTransmitted(vec3 p, vec3 n, float roughness, float ior, float fallback
       bool leaves = dot(leaving, leaving) > 0.25;
       outside = leaves ? leaving : tl_reflected_direction(inside, -normal);
       kept *= leaves ? 1.0 - tl_fresnel_dielectric(cosine, 1.0 / ior) : 1.0;
+      crossings = leaves ? 1.0 : 2.0;  // mirrored inside, it goes as far again
     }
   }
-  vec3 depth = exactUse[0] && valid ? exactTexel(exactOpticalDepth, place).rgb : exactExtinction * thickness;
-  return kept * tl_transmittance(depth * stretch) * exactBehind(p + along * inside, outside, roughness, ior);
+  // Per metre of the straight ray, of all media on it.
+  vec3 extinction = exactUse[0] && thickness > 0.0 ? exactTexel(exactOpticalDepth, place).rgb / thickness : exactExtinction;
+  return kept * tl_transmittance(extinction * (along * filled * crossings)) * exactBehind(p + along * inside, outside, roughness, ior);
 }
 #endif
 `;
@@ -133,6 +156,7 @@ export class TranslucentMaterial extends MeshPhysicalMaterial {
     exactExits: { value: null },
     exactEnds: { value: null },
     exactExtinction: { value: new Vector3() },
+    exactDiagonal: { value: 1 },
     exactUse: { value: [false, false, false] },
   };
 
@@ -148,6 +172,7 @@ export class TranslucentMaterial extends MeshPhysicalMaterial {
     exact.exactExits.value = pass.exits;
     exact.exactEnds.value = pass.opaqueDepth;
     exact.exactExtinction.value.fromArray(extinctionOf(this));
+    exact.exactDiagonal.value = pass.diagonal;
     exact.exactUse.value = [pass.opticalDepth !== null, pass.exits !== null, pass.opaqueDepth !== null];
   }
 
