@@ -12,7 +12,7 @@ from tests.scans import scan
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box
 
-SIZE = (512, 512)
+SIZE = (256, 256)
 ABSORBING = tl.Medium(absorption=1.0)
 SCANS = ["bunny.obj", "armadillo.obj", "quadknot.obj", "mengerSponge3.glb"]
 
@@ -86,7 +86,7 @@ def test_an_eye_inside_sees_the_rest_of_the_body(renderer: tl.Renderer, assets: 
     eye = corners.mean(axis=0) - 1e-3 * mesh.diagonal * normal / np.linalg.norm(normal)
     assert round(mesh.winding_number(eye)) == 1
     camera = tl.Camera.look_at(eye, eye + (0.2, -0.3, 1.0), fov_y=100)
-    errors = _errors(renderer, _scene(mesh, camera), (320, 240))
+    errors = _errors(renderer, _scene(mesh, camera), (200, 150))
     # Distances count from the eye: up to a diagonal, at up to 1 / cos(corner of the view) per unit of depth.
     assert errors.median <= 2e-7 * mesh.diagonal
     assert errors.p999 <= 1e-5 * mesh.diagonal

@@ -20,7 +20,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.storage import Storage
 from translucent.gpu.timer import PassTimer
 
-SIZE = (320, 240)
+SIZE = (160, 120)
 METHODS = {
     "lists": tl.FragmentLists(),
     "peeling": tl.DepthPeeling(max_layers=256),
@@ -36,9 +36,8 @@ AZURE = tl.Medium(absorption=(2.0, 0.5, 0.2), emission=(0.1, 0.3, 1.0))
 JADE = tl.Medium(absorption=(1.0, 0.2, 1.0), emission=(0.0, 0.5, 0.0))
 
 
-@pytest.fixture(params=METHODS)
-def method(request: pytest.FixtureRequest) -> Any:
-    return METHODS[request.param]
+#: To be put above other parameters, so that it varies first: the reference's picture is made once for all methods.
+each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
 
 def moved(
@@ -71,6 +70,7 @@ def assert_equal_to_reference(renderer: tl.Renderer, scene: tl.Scene, size: tupl
 # On meshes
 
 
+@each_method
 @pytest.mark.parametrize("name", ["bunny.obj", "armadillo.obj", "mengerSponge3.glb"])
 def test_scans_equal_the_reference(renderer: tl.Renderer, assets: Path, name: str, method: Any) -> None:
     mesh = scan(assets / "meshes_clean" / name)
@@ -85,6 +85,7 @@ def test_scans_equal_the_reference(renderer: tl.Renderer, assets: Path, name: st
     assert np.quantile(off, 0.999) <= 1e-5 * mesh.diagonal
 
 
+@each_method
 @pytest.mark.parametrize("policy", POLICIES)
 def test_wine_in_a_goblet(renderer: tl.Renderer, method: Any, policy: Any) -> None:
     """The wine's surface reaches a little into the wall of the glass, which displaces it where priorities rule."""
@@ -97,6 +98,7 @@ def test_wine_in_a_goblet(renderer: tl.Renderer, method: Any, policy: Any) -> No
     assert_equal_to_reference(renderer, scene, SIZE, method)
 
 
+@each_method
 def test_volumes_of_two_balls_that_overlap(renderer: tl.Renderer, assets: Path, method: Any) -> None:
     balls = [scan(assets / "meshes_clean" / f"ball{letter}.off") for letter in "AB"]
     truth = json.loads((assets / "truth" / "boolean.json").read_text())
@@ -119,6 +121,7 @@ def test_volumes_of_two_balls_that_overlap(renderer: tl.Renderer, assets: Path, 
 # Policies, order, emission
 
 
+@each_method
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("view", ["outside", "orthographic", "inside", "cut"])
 def test_emission_of_overlapping_media(renderer: tl.Renderer, method: Any, policy: Any, view: str) -> None:
@@ -137,6 +140,7 @@ def test_emission_of_overlapping_media(renderer: tl.Renderer, method: Any, polic
     assert_equal_to_reference(renderer, tl.Scene(objects, camera, overlap=policy), SIZE, method)
 
 
+@each_method
 def test_what_is_in_front_dims_what_is_behind(renderer: tl.Renderer, method: Any) -> None:
     """Two slabs, one of which only emits and one only absorbs: their order decides."""
     slab = Box.slab((4.0, 4.0), 0.5).tessellate()
@@ -151,6 +155,7 @@ def test_what_is_in_front_dims_what_is_behind(renderer: tl.Renderer, method: Any
     np.testing.assert_allclose(seen[1], 0.5 * np.exp(-1.0), rtol=1e-6)
 
 
+@each_method
 @pytest.mark.parametrize("policy", POLICIES)
 def test_two_bodies_that_share_a_face_neither_leak_nor_flicker(renderer: tl.Renderer, method: Any, policy: Any) -> None:
     """The same wall, once as the exit of one body and once as the entry of the other, under a transform that rounds."""
@@ -165,6 +170,7 @@ def test_two_bodies_that_share_a_face_neither_leak_nor_flicker(renderer: tl.Rend
     np.testing.assert_allclose(frame.thickness[same], whole.thickness[same], atol=20 * EPS * scene.diagonal)
 
 
+@each_method
 def test_coplanar_double_walls_count_twice(renderer: tl.Renderer, method: Any) -> None:
     """Faces at the same place with the same side: peeling must not lose one of them."""
     cube = Box().tessellate()
@@ -177,6 +183,7 @@ def test_coplanar_double_walls_count_twice(renderer: tl.Renderer, method: Any) -
     np.testing.assert_allclose(frame.thickness, 2 * single.thickness, rtol=1e-6)
 
 
+@each_method
 def test_faces_that_are_alike_in_the_middle_of_a_ray(renderer: tl.Renderer, method: Any) -> None:
     """Two entries in one place between another entry and three exits in one: the last that peeling finds, and two."""
     outer, inner = (Box(low=(-1, -1, -1), high=(1, 1, top)).tessellate() for top in (1.0, 0.5))
@@ -230,6 +237,7 @@ def test_more_layers_than_asked_for_are_marked_not_wrong(renderer: tl.Renderer, 
     assert np.isfinite(frame.radiance).all()
 
 
+@each_method
 def test_pixels_without_anything_have_no_layers(renderer: tl.Renderer, method: Any) -> None:
     camera = tl.Camera.look_at((0, 0, 5), (0, 0, 9))
     frame = renderer.render(tl.Scene([tl.Object(Box().tessellate(), AMBER)], camera), (16, 16), method)
@@ -248,6 +256,7 @@ def test_peeling_goes_on_in_batches(renderer: tl.Renderer) -> None:
 # Eyes at hard places
 
 
+@each_method
 @pytest.mark.parametrize("where", ["face", "edge", "corner"])
 def test_an_eye_on_the_surface(renderer: tl.Renderer, method: Any, where: str) -> None:
     box = Box(low=(-1, -1, -1), high=(1, 1, 1))
@@ -263,6 +272,7 @@ def test_an_eye_on_the_surface(renderer: tl.Renderer, method: Any, where: str) -
         assert np.quantile(off, 0.99) <= 1e-5 * scene.diagonal
 
 
+@each_method
 def test_a_camera_10_000_diameters_away(renderer: tl.Renderer, method: Any) -> None:
     ball = Sphere().tessellate(64)
     objects = [moved(ball, AMBER, (-0.5, 0, 0)), moved(ball, AZURE, (0.5, 0.1, 0.2))]
@@ -274,6 +284,7 @@ def test_a_camera_10_000_diameters_away(renderer: tl.Renderer, method: Any) -> N
 # What the scene is made of
 
 
+@each_method
 @pytest.mark.parametrize("count", [3, 16])
 def test_many_media(renderer: tl.Renderer, method: Any, count: int) -> None:
     ball = Sphere().tessellate(24)
@@ -290,6 +301,7 @@ def test_many_media(renderer: tl.Renderer, method: Any, count: int) -> None:
     assert np.quantile(np.abs(frame.radiance - truth.radiance)[inside], 0.99) <= 1e-5 * float(truth.radiance.max())
 
 
+@each_method
 def test_an_open_body_is_marked_where_its_hole_shows(renderer: tl.Renderer, method: Any) -> None:
     cube = Box().tessellate()
     open_box = tl.Mesh(cube.vertices, cube.faces[2:], name="open box")
@@ -307,6 +319,7 @@ def test_an_open_body_is_marked_where_its_hole_shows(renderer: tl.Renderer, meth
     assert (frame.thickness[~frame.valid & inside] > 0).all()
 
 
+@each_method
 def test_union_counts_the_medium_of_an_open_body_once(renderer: tl.Renderer, method: Any) -> None:
     cube = Box().tessellate()
     open_box = tl.Mesh(cube.vertices, cube.faces[2:], name="open box")
@@ -316,10 +329,11 @@ def test_union_counts_the_medium_of_an_open_body_once(renderer: tl.Renderer, met
         frame = renderer.render(scene, SIZE, method)
     truth = references.render(scene, SIZE)
     sound = interior(references.hit_counts(scene, SIZE)) & truth.valid & frame.valid
-    assert sound.sum() > 5000
+    assert sound.sum() > 1250
     np.testing.assert_allclose(frame.optical_depth[sound], truth.optical_depth[sound], atol=5e-5)
 
 
+@each_method
 def test_sheets_keep_thickness_and_transmittance_exact(renderer: tl.Renderer, method: Any) -> None:
     ball, pane = Sphere().tessellate(64), Box.slab((3.0, 3.0), 0.1).tessellate()
     objects = [
@@ -367,6 +381,7 @@ def test_a_buffer_that_opengl_cannot_hold_is_one_error(monkeypatch: pytest.Monke
         renderer.render(shells(3), (160, 120), tl.KBuffer(k=31))
 
 
+@each_method
 def test_several_samples_average_light_and_leave_layers_at_the_centers(renderer: tl.Renderer, method: Any) -> None:
     scene, size = shells(4), (48, 36)
     one, many = renderer.render(scene, size, method), renderer.render(scene, size, method, samples=4)
