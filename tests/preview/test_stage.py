@@ -64,6 +64,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch, slow: bool
 ) -> None:
     work.do(Change("material.ior", 1.5))
+    work.do(Change("display.antialias", False))
     finish(stage, work)
     assert stage.plans[0] is not None
     usual = stage.plans[0].interfaces
@@ -87,13 +88,14 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     scene = work.scene()
     assert scene is not None
     with stage.current():
-        frame = stage.renderer.render(scene, SIZE, samples=16)
+        frame = stage.renderer.render(scene, SIZE)
     assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
 
 
 def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspace) -> None:
     """Until then, and in every picture for which it is not known, bodies are layers; a camera may move."""
     work.do(ChoosePreset("whole_milk"))
+    work.do(Change("display.antialias", False))
     assert stage.draw(work, SIZE)
     assert "until its diffusion is solved for" in stage.diffusing
     assert stage.plans[0] is not None
@@ -104,7 +106,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspac
     scene = work.scene()
     assert scene is not None
     with stage.current():
-        frame = stage.renderer.render(scene, SIZE, samples=16)
+        frame = stage.renderer.render(scene, SIZE)
     assert np.abs(pixels(stage) - frame.to_srgb8().astype(int)).mean() < 1.0
     work.do(Change("look.light", True))
     finish(stage, work)

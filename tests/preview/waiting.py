@@ -26,11 +26,11 @@ def finish(stage: Stage, work: Workspace) -> None:
     """Draw until nothing is left to draw, or to be compiled or solved for it."""
     end = time.monotonic() + 60.0
     lanes = work.compiler.lane, work.lanes["diffuse"]
-    while (drawn := stage.draw(work, SIZE)) or any(lane.task is not None for lane in lanes):
+    while stage.draw(work, SIZE) | (busy := any(lane.task is not None for lane in lanes)):
         assert time.monotonic() < end, "the picture is never done"
         work.update()
-        if not drawn:
-            time.sleep(0.002)
+        if busy:
+            time.sleep(0.01)  # a stage that waits for a lane returns at once: turning round, it would slow the lane
 
 
 def pixels(stage: Stage) -> np.ndarray:

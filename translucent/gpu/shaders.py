@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import moderngl
@@ -64,7 +65,11 @@ def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int
     RenderError
         If an include is missing or goes in circles, or the switches do not match the source.
     """
-    gathered = gather(name)
+    return _with_switches(name, gather(name), defines, version)
+
+
+def _with_switches(name: str, gathered: Gathered, defines: Mapping[str, int] | None, version: int) -> ShaderSource:
+    """Text of what was gathered, as `preprocess` gives it."""
     body = "\n".join(gathered.lines)
     given = dict(defines or {})
     if unknown := sorted(given.keys() - gathered.switches):
@@ -95,15 +100,30 @@ class Gathered:
             return
         number = len(self.files)
         self.files.append(name)
-        self.lines.append(f"#line 1 {number}")
-        for line_number, line in enumerate(_text(name, parents).splitlines(), 1):
-            if match := _INCLUDE.match(line):
-                self.add(match[1] or f"<{match[2]}>", (*parents, name))
-                self.lines.append(f"#line {line_number + 1} {number}")
-                continue
-            if match := _CONDITION.match(line):
-                self.switches.update(re.findall(r"[A-Z_][A-Z0-9_]*", match[1]))
-            self.lines.append(line)
+        pieces, switches = _pieces(_text(name, parents))
+        self.switches |= switches
+        for line_number, lines, included in pieces:
+            self.lines += [f"#line {line_number} {number}", *lines]
+            if included is not None:
+                self.add(included, (*parents, name))
+
+
+@lru_cache(maxsize=256)
+def _pieces(text: str) -> tuple[tuple[tuple[int, tuple[str, ...], str | None], ...], frozenset[str]]:
+    """Number of the first line, lines, and name of the file included after them or None; and the switches in them all.
+
+    Hundreds of programs are made of the same files.
+    """
+    pieces, switches, lines, first = [], set[str](), list[str](), 1
+    for number, line in enumerate(text.splitlines(), 1):
+        if match := _INCLUDE.match(line):
+            pieces.append((first, tuple(lines), match[1] or f"<{match[2]}>"))
+            lines, first = [], number + 1
+            continue
+        if match := _CONDITION.match(line):
+            switches.update(re.findall(r"[A-Z_][A-Z0-9_]*", match[1]))
+        lines.append(line)
+    return (*pieces, (first, tuple(lines), None)), frozenset(switches)
 
 
 def gather(name: str) -> Gathered:
@@ -176,8 +196,9 @@ def build_program(
 
 def _stage(name: str, defines: Mapping[str, int], version: int) -> ShaderSource:
     """Preprocessed stage, with those of the defines that it uses."""
-    asked = gather(name).switches
-    return preprocess(name, {key: value for key, value in defines.items() if key in asked}, version)
+    gathered = gather(name)
+    asked = {key: value for key, value in defines.items() if key in gathered.switches}
+    return _with_switches(name, gathered, asked, version)
 
 
 def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
