@@ -26,10 +26,11 @@ demo: ## render a few pictures into out/
 	$(BOOTSTRAP)
 	@$(BIN)/python tools/demo.py
 
-# One thread of the BLAS in each: more would wait for one another.
+# One thread of the BLAS in each: more would wait for one another. Bytecode is kept whatever the shell says: tests start
+# Python dozens of times, and pytest keeps the asserts that it rewrites.
 test: ## run the tests, in two processes
 	$(BOOTSTRAP) --group test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
 test-drivers: ## run the tests of rendering on every OpenGL driver that is here: it takes long, see docs/drivers.md
 	$(BOOTSTRAP) --group test

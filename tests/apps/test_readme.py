@@ -5,13 +5,17 @@ from __future__ import annotations
 import glob
 import re
 import shlex
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import translucent as tl
+from translucent.bake import unwrap
 from translucent.cli import cli, main
 from translucent.planning.methods import METHODS
+from translucent.scene import staging
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = {
@@ -31,13 +35,44 @@ def make_models() -> None:
     trimesh.creation.icosphere(subdivisions=2).export("model.stl")
 
 
+def little(snippet: str) -> str:
+    """The snippet with pictures of 80 x 60 pixels: the pages show some of a useful size, tests need none."""
+    return re.sub(r"\((?:640, 480|320, 240|160, 120)\)", "(80, 60)", snippet)
+
+
+NEW_UV = unwrap._new_uv
+
+#: What xatlas has made, which takes it seconds for a bear.
+UNWRAPPED: dict[tuple[bytes, bytes, int], Any] = {}
+
+
+def new_uv(mesh: tl.Mesh, size: int) -> Any:
+    """Texture coordinates, made once for each mesh."""
+    key = mesh.vertices.tobytes(), mesh.faces.tobytes(), size
+    if key not in UNWRAPPED:
+        UNWRAPPED[key] = NEW_UV(mesh, size)
+    return UNWRAPPED[key]
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
+    """One renderer, which keeps its programs, for all; and on stages, shadows of few directions."""
+    own = tl.Renderer
+    monkeypatch.setattr(
+        tl, "Renderer", lambda backend="auto": own("cpu") if backend == "cpu" else nullcontext(renderer)
+    )
+    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 8)
+    monkeypatch.setattr(unwrap, "_new_uv", new_uv)
+
+
+@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("page", SNIPPETS)
-def test_python_snippets_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+def test_python_snippets_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     make_models()
     names = {"__name__": "__main__"}
     for snippet in SNIPPETS[page]:
-        exec(compile(snippet, page, "exec"), names)
+        exec(compile(little(snippet), page, "exec"), names)
         for saved in re.findall(r'\.save\("([^"]+)"', snippet):
             assert (tmp_path / saved).stat().st_size > 1000, saved
 
@@ -82,9 +117,9 @@ def runs_here(command: str) -> bool:
     return command.split()[0] != WINDOWED and ON_A_FARM not in command
 
 
-@pytest.mark.usefixtures("one_scene")
+@pytest.mark.usefixtures("one_scene", "small")
 @pytest.mark.parametrize("command", [command for command in COMMANDS if runs_here(command)])
-def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+def test_commands_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import trimesh
 
     monkeypatch.chdir(tmp_path)
@@ -121,8 +156,8 @@ def test_links_lead_somewhere(page: str) -> None:
             assert ((ROOT / page).parent / target).exists(), target
 
 
-@pytest.mark.usefixtures("one_scene")
-def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: object) -> None:
+@pytest.mark.usefixtures("one_scene", "small")
+def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import trimesh
 
     monkeypatch.chdir(tmp_path)
@@ -130,7 +165,7 @@ def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     trimesh.creation.icosphere(subdivisions=1).export("model.stl")
     for name, command in cli.commands.items():
         assert command.epilog is not None
-        if name == WINDOWED:
-            continue
         example = command.epilog.removeprefix("Example: translucent ")
+        if name == WINDOWED or example in COMMANDS:  # those run above
+            continue
         assert main([*shlex.split(example), *SMALL.get(name, [])]) == 0, example
