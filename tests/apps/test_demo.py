@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from translucent.scene import staging
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -18,7 +20,8 @@ def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
     monkeypatch.chdir(tmp_path)
     demo = runpy.run_path(str(ROOT / "tools" / "demo.py"))
     main = demo["main"]
-    main.__globals__["SIZE"] = (160, 120)
+    main.__globals__["SIZE"] = (80, 60)
+    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 8)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         assert main() == 0
@@ -28,6 +31,6 @@ def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
     printed = capsys.readouterr()
     assert printed.err == ""
     for name in ("bear", "wine"):
-        assert (tmp_path / "out" / f"{name}.png").stat().st_size > 5_000
+        assert (tmp_path / "out" / f"{name}.png").stat().st_size > 2_000
     for word in ("backend ", "plan: SignedDepth", "signed_depth", " ms", "p99.9", "of the scene's diagonal"):
         assert word in printed.out, word

@@ -40,7 +40,7 @@ def test_doctor_as_json(run: Run) -> None:
 def test_without_opengl_render_works_on_the_cpu_and_says_so(
     run: Run, cube: Path, tmp_path: Path, no_opengl: None
 ) -> None:
-    result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "4x4", "--json")
+    result = run("render", cube, "-o", tmp_path / "cube.png", "--stage", "none", "--size", "4x4", "--json")
     assert result.code == 0
     (line,) = result.err.splitlines()
     assert line.startswith("warning: rendering on the CPU, for want of OpenGL: OpenGL 3.3 context; none; tried egl: no")

@@ -15,6 +15,7 @@ from translucent.commands.model import CameraOptions, read_scene
 from translucent.scene.showcase import LIGHT_TABLE
 
 SMALL = ("--size", "48x27", "--samples", "1")
+FEW = ("--environment-shadows", "8", *SMALL)
 
 
 def pixels(path: Path) -> np.ndarray:
@@ -46,7 +47,7 @@ def write_gltf(path: Path, **more: object) -> Path:
 
 def test_models_stand_on_a_stage_and_cast_shadows(run: Run, tmp_path: Path) -> None:
     staged, none = tmp_path / "staged.png", tmp_path / "none.png"
-    code, out, _ = run("render", "bear", "-o", str(staged), *SMALL)
+    code, out, _ = run("render", "bear", "-o", str(staged), *FEW)
     assert code == 0
     assert "shadow_maps" in out
     code, out, _ = run("render", "bear", "-o", str(none), "--stage", "none", *SMALL)
@@ -72,7 +73,7 @@ def test_environments_take_the_place_of_the_stage(run: Run, tmp_path: Path, opti
 def test_transparent_pictures_keep_the_shadow(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     medium = ("--color", "#7b1e3a", "--distance", "1cm")
-    assert run("render", "sphere", "-o", str(path), *medium, "--transparent", *SMALL)[0] == 0
+    assert run("render", "sphere", "-o", str(path), *medium, "--transparent", *FEW)[0] == 0
     arrays = np.load(path)
     beside = ~arrays["coverage"]
     assert (arrays["alpha"][beside] > 0.1).any(), "the shadow"
@@ -81,7 +82,7 @@ def test_transparent_pictures_keep_the_shadow(run: Run, tmp_path: Path) -> None:
 
 
 def test_turntables_have_a_stage(run: Run, tmp_path: Path) -> None:
-    options = ("--turntable", "2", "--stage", "night", *SMALL)
+    options = ("--turntable", "2", "--stage", "night", *FEW)
     assert run("render", "sphere", "-o", str(tmp_path / "a.gif"), *options)[0] == 0
 
 
@@ -151,7 +152,23 @@ def test_shadows_have_the_size_and_number_asked_for(run: Run, tmp_path: Path) ->
     none = run("explain", "soap", "--stage", "none", "--json").out
     assert "shadow_maps" not in [step["name"] for step in json.loads(none)["plan"]["passes"]]
     output = tmp_path / "soap.npz"
-    assert run("render", "soap", "-o", output, "--size", "8x8", "--samples", 1, "--shadow-size", 64).code == 0
+    assert (
+        run(
+            "render",
+            "soap",
+            "-o",
+            output,
+            "--size",
+            "8x8",
+            "--samples",
+            1,
+            "--shadow-size",
+            64,
+            "--environment-shadows",
+            5,
+        ).code
+        == 0
+    )
     for option, message in (
         (("--shadow-size", 9), "ShadowMaps size 9; not a whole number in 64 to 8192"),
         (("--environment-shadows", -1), "environment_shadows -1; not a whole number in 0 to 256"),

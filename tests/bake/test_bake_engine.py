@@ -48,12 +48,12 @@ def same(one: tl.ThicknessMap, other: tl.ThicknessMap) -> bool:
 def test_the_same_bits_in_any_number_of_threads_and_chunks(
     asked: dict, bear: tl.Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = tl.bake_thickness(bear, 48, rays=16, threads=1, **asked)
-    assert same(one, tl.bake_thickness(bear, 48, rays=16, threads=2, **asked))
-    for texels, rays in ((48, 16), (48 * 7, 1001), (1 << 20, 1 << 20)):
+    one = tl.bake_thickness(bear, 24, rays=16, threads=1, **asked)
+    assert same(one, tl.bake_thickness(bear, 24, rays=16, threads=2, **asked))
+    for texels, rays in ((24, 16), (24 * 7, 1001), (1 << 20, 1 << 20)):
         monkeypatch.setattr(strips, "STRIP_TEXELS", texels)
         monkeypatch.setattr(measure, "CHUNK_RAYS", rays)
-        assert same(one, tl.bake_thickness(bear, 48, rays=16, threads=2, **asked))
+        assert same(one, tl.bake_thickness(bear, 24, rays=16, threads=2, **asked))
 
 
 def test_settings_and_their_keywords_are_one(bear: tl.Mesh) -> None:
