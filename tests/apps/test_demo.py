@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from translucent.scene import staging
+from tests.little import with_few_shadows
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -21,7 +21,7 @@ def test_demo_renders_two_pictures_and_says_how_wrong_they_are(
     demo = runpy.run_path(str(ROOT / "tools" / "demo.py"))
     main = demo["main"]
     main.__globals__["SIZE"] = (80, 60)
-    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 8)
+    with_few_shadows(monkeypatch)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         assert main() == 0

@@ -14,8 +14,8 @@ import pytest
 from PIL import Image
 
 import translucent as tl
+from tests.little import with_few_shadows
 from translucent.formulas.color import srgb_to_linear
-from translucent.scene import staging
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
@@ -24,10 +24,10 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 @pytest.fixture(autouse=True)
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
-    """Little pictures, with shadows of few directions, by the one renderer that all tests share."""
+    """Little pictures, with few shadows, by the one renderer that all tests share."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("EXAMPLE_WIDTH", "48")
-    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 8)
+    with_few_shadows(monkeypatch)
     monkeypatch.setattr(tl, "Renderer", lambda: nullcontext(renderer))
 
 

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 import translucent as tl
+from tests.little import with_few_shadows
 from translucent.bake import unwrap
 from translucent.cli import cli, main
 from translucent.planning.methods import METHODS
-from translucent.scene import staging
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = {
@@ -56,12 +56,12 @@ def new_uv(mesh: tl.Mesh, size: int) -> Any:
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> None:
-    """One renderer, which keeps its programs, for all; and on stages, shadows of few directions."""
+    """One renderer, which keeps its programs, for all; and few shadows."""
     own = tl.Renderer
     monkeypatch.setattr(
         tl, "Renderer", lambda backend="auto": own("cpu") if backend == "cpu" else nullcontext(renderer)
     )
-    monkeypatch.setattr(staging, "ENVIRONMENT_SHADOWS", 8)
+    with_few_shadows(monkeypatch)
     monkeypatch.setattr(unwrap, "_new_uv", new_uv)
 
 

@@ -15,7 +15,7 @@ from translucent.commands.model import CameraOptions, read_scene
 from translucent.scene.showcase import LIGHT_TABLE
 
 SMALL = ("--size", "48x27", "--samples", "1")
-FEW = ("--environment-shadows", "8", *SMALL)
+FEW = ("--environment-shadows", "8", "--shadow-size", "64", *SMALL)
 
 
 def pixels(path: Path) -> np.ndarray:
@@ -65,7 +65,7 @@ def test_environments_take_the_place_of_the_stage(run: Run, tmp_path: Path, opti
     code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, *SMALL)
     assert code == 0
     assert "shadow_maps" not in out
-    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", *SMALL)
+    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", "--shadow-size", "64", *SMALL)
     assert code == 0
     assert "128 directions of the environment" in out
 

@@ -99,13 +99,13 @@ def test_a_rock_in_a_cloud_ends_rays_and_throws_shadows(renderer: tl.Renderer) -
     cloud = tl.Object(Sphere(radius=1).tessellate(24), MILK, density=NOISE)
     scene = tl.Scene([cloud, rock], CAMERA, LIGHTS["sun"], DUSK)
     method = tl.RayMarched(steps=8)
-    size = (16, 12)
-    frame, truth = renderer.render(scene, size, method), tl.reference.march(scene, size, method)
+    shadows = tl.ShadowMaps(256)
+    frame, truth = renderer.render(scene, SIZE, method, shadows=shadows), tl.reference.march(scene, SIZE, method)
     error = np.abs(frame.radiance - truth.radiance) / truth.radiance.max()
     # A texel at the edge of the shadow is either lit or not.
     assert np.median(error) <= 1e-6
     assert (error.max(axis=2) > 1e-4)[frame.coverage].mean() <= 0.05
-    bright = renderer.render(tl.Scene([cloud], CAMERA, LIGHTS["sun"], DUSK), size, method)
+    bright = renderer.render(tl.Scene([cloud], CAMERA, LIGHTS["sun"], DUSK), SIZE, method)
     changed = np.abs(bright.radiance - truth.radiance).max(axis=2) > 1e-3
     assert changed[frame.coverage].mean() > 0.1
 
