@@ -65,7 +65,8 @@ def test_environments_take_the_place_of_the_stage(run: Run, tmp_path: Path, opti
     code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, *SMALL)
     assert code == 0
     assert "shadow_maps" not in out
-    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", "--shadow-size", "64", *SMALL)
+    quick = ("--stage", "daylight", "--shadow-size", "64", *SMALL)
+    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, *quick)
     assert code == 0
     assert "128 directions of the environment" in out
 
