@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for checkers and editors: the same names as in the table below
     from translucent import bench as bench
     from translucent import reference as reference
+    from translucent.bake.audit.check import check_materials as check_materials
+    from translucent.bake.audit.finding import MaterialCheck as MaterialCheck
+    from translucent.bake.audit.finding import MaterialFinding as MaterialFinding
+    from translucent.bake.audit.fix import fix_materials as fix_materials
     from translucent.bake.bake import bake_thickness as bake_thickness
     from translucent.bake.baked import BakeReport as BakeReport
     from translucent.bake.batch import BatchReport as BatchReport
@@ -98,6 +102,9 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
+    "bake.audit.check": "check_materials",
+    "bake.audit.finding": "MaterialCheck MaterialFinding",
+    "bake.audit.fix": "fix_materials",
     "bake.bake": "bake_thickness",
     "bake.baked": "BakeReport",
     "bake.batch": "BatchReport bake_many",

@@ -1,10 +1,10 @@
-"""``translucent material``: the volume materials of a glTF file, shown and replaced."""
+"""``translucent material``: the volume materials of a glTF file, shown, replaced and checked."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,15 +18,16 @@ from translucent.commands.common import (
     triple_text,
 )
 from translucent.commands.console import echo
-from translucent.errors import InputError
+from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
+    from translucent.bake.audit.finding import MaterialCheck
     from translucent.gltf.materials import GltfMaterial
 
 
 @click.group(epilog="Example: translucent material show model.glb")
 def material() -> None:
-    """Show or replace the materials of a glTF file that light passes."""
+    """Show, replace or check the materials of a glTF file that light passes."""
 
 
 @material.command(epilog="Example: translucent material show model.glb")
@@ -118,3 +119,77 @@ def apply(
         echo(json.dumps({"output": str(output), "materials": changed}))
         return
     echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")
+
+
+@material.command(epilog="Example: translucent material check model.glb --fix -o fixed.glb")
+@click.argument("model")
+@click.option("--fix", is_flag=True, help="Bake the thickness where it is wrong, into OUTPUT, and check that.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --fix: a .glb file.")
+@click.option("--size", type=int, default=512, show_default=True, metavar="N", help="Of --fix: texels along a side.")
+@click.option("--rays", type=int, default=64, show_default=True, metavar="N", help="Of --fix: rays from each texel.")
+@overwrite_option
+@outside_option
+@common_options
+def check(model: str, fix: bool, output: Path | None, size: int, rays: int, allow_outside: bool, as_json: bool) -> None:
+    """Check whether the thickness and attenuation that MODEL, a .glb or .gltf file, states are those of its meshes.
+
+    Told are errors, warnings and notes, each with what to change, and the color that passes each body in truth and in
+    known viewers. The exit code is 1 if there is an error (with --fix: in OUTPUT), and else 0.
+
+    --fix bakes thickness maps, sets metallicFactor of what transmits to 0 and removes doubleSided of volumes. Meshes,
+    units and attenuations are told, and not changed.
+    """
+    from translucent.bake.audit.check import check_materials
+    from translucent.bake.audit.fix import fix_materials
+
+    if fix != (output is not None):
+        given, missing = ("--fix", "-o OUTPUT is missing") if fix else (f"-o {output}", "--fix is missing")
+        raise InputError(given, missing, "give both, or neither")
+    found = left = check_materials(model, allow_outside=allow_outside)
+    if output is not None:
+        refuse_overwriting(output, model)
+        left = fix_materials(model, output, size=size, rays=rays, allow_outside=allow_outside)
+    if as_json:
+        fixed = {} if output is None else {"fixed": left.summary()}
+        echo(json.dumps({**found.summary(), **fixed}))
+    else:
+        _tell(model, found)
+        if output is not None:
+            _tell(str(output), left)
+    if left.errors:
+        count = len(left.errors)
+        asked = f"material check {model if output is None else output}"
+        told = f"{count} finding{'' if count == 1 else 's'} of severity error"
+        raise RenderError(asked, told, left.errors[0].do)
+
+
+def _tell(model: str, found: MaterialCheck) -> None:
+    counts = found.summary()["counts"]
+    told = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
+    echo(f"{model}: {len(found.bodies)} bod{'y' if len(found.bodies) == 1 else 'ies'} that light passes; {told}")
+    for one in found.findings:
+        echo(f"{one.severity:8}{one.code}: {one.where}")
+        echo(f"        {one.text}")
+        echo(f"        do: {one.do}")
+    for body in found.bodies:
+        if body["colors"] and body["stated"]:
+            _tell_body(body)
+
+
+def _tell_body(body: dict[str, Any]) -> None:
+    """Thickness of a body and what passes it, in a few lines."""
+    from translucent.formulas.color import to_hex
+
+    echo(f"{body['mesh_name']!r}, material {body['material']}, node {body['nodes'][0]!r}:")
+    lengths = [
+        f"{name} {values['median']:.4g} m (p95 {values['p95']:.4g})"
+        for name, values in (
+            ("stated", body["stated"]),
+            ("along normals", body["along_normals"]),
+            ("along views", body["along_views"]),
+        )
+        if values is not None
+    ]
+    echo(f"        thickness {', '.join(lengths)}")
+    colors = [f"{name} {to_hex(color)}" for name, color in body["colors"].items()]
+    echo(f"        passes, mean over views: {', '.join(colors)}")
