@@ -33,6 +33,7 @@ BAKED = frozenset(
         "thickness-zero",
         "thickness-map-empty",
         "thickness-map-inverted",
+        "thickness-map-off",
         "thickness-texture-unreadable",
         "shell-as-solid",
     }

@@ -74,7 +74,7 @@ def _optics(material: GltfMaterial) -> Iterator[_Told]:
 
 
 def scale_findings(body: Body) -> Iterator[MaterialFinding]:
-    """Finding about nodes that shear or turn and stretch a body: viewers get its thickness wrong there."""
+    """Findings about nodes that stretch a body unevenly: viewers get its thickness wrong there."""
     if body.material.thickness == 0:
         return
     for placement in body.placements:
@@ -83,12 +83,11 @@ def scale_findings(body: Body) -> Iterator[MaterialFinding]:
             continue
         where = f"{material_name(body.material)}, mesh {body.name!r}, node {placement.name!r}"
         text = (
-            "the node stretches the mesh along axes that are turned: three.js, the Khronos viewer and PlayCanvas, "
-            "which scale world directions by the lengths of the matrix's columns, "
-            f"take {least:.2f} to {most:.2f} of the length"
+            "the node stretches the mesh unevenly: three.js, the Khronos viewer and PlayCanvas, which scale directions "
+            f"of the world by the lengths of the matrix's columns, take {least:.2f} to {most:.2f} of the length"
         )
         do = "apply the scale to the vertices"
-        yield MaterialFinding("warning", "scale-turned", where, text, do, body.material.index, body.key)
+        yield MaterialFinding("warning", "scale-uneven", where, text, do, body.material.index, body.key)
 
 
 def scale_errors(matrix: Array) -> tuple[float, float]:

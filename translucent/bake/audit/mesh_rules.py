@@ -75,6 +75,8 @@ def overlap_findings(bodies: Sequence[Body]) -> Iterator[MaterialFinding]:
     for i, j in combinations(range(len(placed)), 2):
         if (boxes[i][0] >= boxes[j][1]).any() or (boxes[i][1] <= boxes[j][0]).any():
             continue
+        if placed[i][0].mesh is placed[j][0].mesh and placed[i][1] is placed[j][1]:
+            continue  # primitives that bound one body
         looked += 1
         if looked > MOST_PAIRS:
             return

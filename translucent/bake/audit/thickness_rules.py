@@ -29,6 +29,9 @@ INVERTED, SPREAD = -0.3, 1.5
 #: Share of the true thickness below which a map has no value, and the share of the surface from which on it is told.
 NO_VALUE, MUCH = 0.01, 0.1
 
+#: Share of the surface from which on it is told that a map is off there by more than `WRONG`.
+MUCH_OFF = 0.25
+
 #: Transmittance that an 8-bit picture shows as black, and the one that it shows as white.
 BLACK, WHITE = 1.0 / 255.0, 254.0 / 255.0
 
@@ -181,6 +184,12 @@ def _map_findings(body: Body) -> Iterator[MaterialFinding]:
         if correlation < INVERTED:
             text = f"the thickness texture is dark where the mesh is thick (rank correlation {correlation:.2f})"
             yield _found(body, "error", "thickness-map-inverted", text, "invert it: white is thick (--fix bakes it)")
+            return
+    below, above = np.minimum(body.beneath[finite], true), np.maximum(body.beneath[finite], true)
+    off = float(np.mean((stated > WRONG * above) | (WRONG * stated < below)))
+    if off > MUCH_OFF and off > empty:
+        text = f"the thickness texture is more than {WRONG:g} times off on {off:.0%} of the surface"
+        yield _found(body, "warning", "thickness-map-off", text, "bake it again (--fix): it may be of another mesh")
 
 
 def _units(
