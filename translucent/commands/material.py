@@ -10,6 +10,7 @@ import click
 
 from translucent.commands.common import (
     common_options,
+    draft_option,
     medium_options,
     outside_option,
     overwrite_option,
@@ -23,6 +24,7 @@ from translucent.errors import InputError, RenderError
 if TYPE_CHECKING:
     from translucent.bake.audit.finding import MaterialCheck
     from translucent.gltf.materials import GltfMaterial
+    from translucent.gltf.scattering import Draft
 
 
 @click.group(epilog="Example: translucent material show model.glb")
@@ -32,12 +34,13 @@ def material() -> None:
 
 @material.command(epilog="Example: translucent material show model.glb")
 @click.argument("model")
+@draft_option
 @common_options
-def show(model: str, as_json: bool) -> None:
+def show(model: str, draft_extensions: bool, as_json: bool) -> None:
     """List the materials of MODEL, a .glb or .gltf file, with the volume that each of them states."""
     from translucent.gltf.materials import read_materials
 
-    found = read_materials(model)
+    found = read_materials(model, draft_extensions=draft_extensions)
     if as_json:
         echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
         return
@@ -55,6 +58,8 @@ def _describe(entry: GltfMaterial) -> None:
         echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
     if medium is not None:
         echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
+        if medium.scatters:
+            echo(f"  scattering  {triple_text(medium.scattering)} 1/m, anisotropy {medium.anisotropy:g}")
     if entry.dispersion:
         echo(f"  dispersion  {entry.dispersion:10.5g}")
     if any(entry.emissive):
@@ -82,6 +87,13 @@ def _texture_text(entry: GltfMaterial) -> str:
     help="Only the objects of this name. Default: all that light enters, or all.",
 )
 @click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
+@click.option(
+    "--draft-extensions",
+    is_flag=False,
+    flag_value="scatter",
+    type=click.Choice(["scatter", "volume-scatter"]),
+    help="Write scattering, too, by a draft: KHR_materials_scatter, or KHR_materials_volume_scatter.",
+)
 @overwrite_option
 @outside_option
 @common_options
@@ -94,6 +106,7 @@ def apply(
     clamp: bool | None,
     object_name: str | None,
     thickness: str | None,
+    draft_extensions: Draft | None,
     allow_outside: bool,
     as_json: bool,
 ) -> None:
@@ -101,7 +114,7 @@ def apply(
     from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
-    medium = read_medium(color, distance, preset_name, clamp)
+    medium = read_medium(color, distance, preset_name, clamp, shows_scattering=draft_extensions is not None)
     if medium is None:
         raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
     refuse_overwriting(output, model)
@@ -113,6 +126,7 @@ def apply(
         object_name=object_name,
         thickness=None if thickness is None else parse_length(thickness),
         keep_ior=preset_name is None,
+        draft_extensions=draft_extensions,
         allow_outside=allow_outside,
     )
     if as_json:

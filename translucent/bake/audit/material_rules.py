@@ -11,6 +11,7 @@ from translucent.bake.audit.body import Body, material_name
 from translucent.bake.audit.finding import MaterialFinding, Severity
 from translucent.gltf.file import Json
 from translucent.gltf.materials import EXCLUDED, TRANSMISSION, VOLUME, GltfMaterial
+from translucent.gltf.scattering import DRAFTS
 from translucent.media.color_distance import BLACKEST
 
 #: Largest index of refraction of what is clear: rutile and moissanite have 2.6 to 2.9.
@@ -47,6 +48,12 @@ def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterato
     if entry.get("doubleSided") is True and material.thickness > 0:
         text = "doubleSided has no effect on the boundary of a volume, and some viewers draw its back, too"
         yield "double-sided", "warning", text, "remove it (--fix does)"
+    for name in DRAFTS.values():
+        if name in extensions and material.has_volume:
+            text = (
+                f"{name} is a draft: viewers that do not know it take all extinction for absorption, and show it darker"
+            )
+            yield "draft-extension", "note", text, "look at it without the extension, too"
     for name in EXCLUDED:
         if name in extensions and material.has_volume:
             yield "excluded-extension", "error", f"{name} must not be used with {VOLUME}", "remove one of them"
