@@ -16,6 +16,7 @@ from translucent.bake.audit.finding import MaterialFinding, Severity
 from translucent.formulas.color import to_hex
 from translucent.media.color_distance import extinction_at
 from translucent.media.medium import Medium
+from translucent.units import length_text
 
 #: Ratios of stated to true thickness beyond which it is told, and beyond which it is an error.
 SUSPECT, WRONG = 1.5, 3.0
@@ -66,7 +67,7 @@ def attenuation_findings(body: Body) -> Iterator[MaterialFinding]:
         return
     extinction = extinction_of(body)
     passed = Medium(absorption=extinction).transmittance(thick)
-    at = f"at its true thickness of {length(thick)} (median along views)"
+    at = f"at its true thickness of {length_text(thick)} (median along views)"
     told = False
     if extinction.any() and passed.max() < BLACK:
         do = "raise attenuationDistance, or brighten attenuationColor"
@@ -78,8 +79,10 @@ def attenuation_findings(body: Body) -> Iterator[MaterialFinding]:
         told = yield from _units(body, thick, extinction, [(name, 1.0 / size) for name, size in UNITS[:2]])
     if not told and not USUAL[0] <= thick <= USUAL[1]:
         scale = 0.01 if thick > USUAL[1] else 100.0
-        text = f"it is {length(thick)} thick along views, and what light passes is rarely so"
-        do = f"check the unit: glTF is in metres; should it be {length(scale * thick)}, scale its node by {scale:g}"
+        text = f"it is {length_text(thick)} thick along views, and what light passes is rarely so"
+        do = (
+            f"check the unit: glTF is in metres; should it be {length_text(scale * thick)}, scale its node by {scale:g}"
+        )
         yield _found(body, "note", "size-unusual", text, do)
 
 
@@ -88,19 +91,13 @@ def extinction_of(body: Body) -> Array:
     return extinction_at(body.material.attenuation_color, body.material.attenuation_distance)
 
 
-def length(metres: float) -> str:
-    """Length in a metric unit."""
-    unit, name = next(((u, n) for u, n in ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm")) if metres >= u), (1e-9, "nm"))
-    return f"{metres / unit:.3g} {name}"
-
-
 def _without_thickness(body: Body) -> Iterator[MaterialFinding]:
     material = body.material
     if not material.has_volume or not extinction_of(body).any():
         return
     text = "thicknessFactor is 0 beside an attenuation: viewers draw a thin wall and show none of it"
     if body.mesh.diagnosis.closed:
-        thick = length(float(np.nanmedian(np.where(np.isfinite(body.beneath), body.beneath, np.nan))))
+        thick = length_text(float(np.nanmedian(np.where(np.isfinite(body.beneath), body.beneath, np.nan))))
         do = f"write the thickness of the mesh, {thick} along its normals in mesh space (--fix bakes it)"
         yield _found(body, "error", "thickness-zero", text, do)
     else:
@@ -137,7 +134,7 @@ def _compared(body: Body, stated: float, ratio: float) -> str:
     per_metre = float(np.median(body.world_normals()))
     text = (
         f"stated {stated:.3g} (median), true {beneath:.3g} along normals (p95 {ends[0]:.3g}), {chords:.3g} along views "
-        f"(p95 {ends[1]:.3g}), {around:.3g} around normals, in mesh space, where 1 is {length(per_metre)}: "
+        f"(p95 {ends[1]:.3g}), {around:.3g} around normals, in mesh space, where 1 is {length_text(per_metre)}: "
         f"{ratio:.3g} times off"
     )
     if not extinction_of(body).any():
@@ -202,8 +199,8 @@ def _units(
             small = scale < 1
             meant = "its lengths were in" if small else "its attenuation was meant for"
             text = (
-                f"{length(thick)} thick it is {'black' if small else 'clear'}; {length(scale * thick)} thick it would "
-                f"be {to_hex(passed)}, as if {meant} {name}"
+                f"{length_text(thick)} thick it is {'black' if small else 'clear'}; {length_text(scale * thick)} thick "
+                f"it would be {to_hex(passed)}, as if {meant} {name}"
             )
             do = f"glTF is in metres: scale its node by {scale:g}, or attenuationDistance by {1 / scale:g}"
             yield _found(body, "warning", "units-suspect", text, do)
