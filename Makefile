@@ -14,7 +14,7 @@ BIN = .venv/bin
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv demo test test-drivers lint bench docs meshes wheel clean
+.PHONY: help venv demo test test-drivers lint bench docs meshes web wheel clean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,6 +29,7 @@ demo: ## render a few pictures into out/
 # One thread of the BLAS in each: more would wait for one another.
 test: ## run the tests, in two processes
 	$(BOOTSTRAP) --group test
+	@$(BIN)/python tools/build_web.py --if-npm
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
 test-drivers: ## run the tests of rendering on every OpenGL driver that is here: it takes long, see docs/drivers.md
@@ -41,6 +42,7 @@ lint: ## check style, types and the layers of the imports
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	@$(BIN)/python tools/build_web.py --if-npm --types
 
 bench: ## measure speed and error of every method into out/report/, in a quarter of an hour; BENCH_ARGS=--quick: in one or two minutes
 	$(BOOTSTRAP) --group test
@@ -55,10 +57,15 @@ meshes: ## regenerate the files in meshes/
 	$(BOOTSTRAP) --group meshes
 	$(BIN)/python tools/make_meshes.py
 
+web: ## build what runs in browsers into web/dist/, and check its types; it needs npm
+	$(BOOTSTRAP)
+	@$(BIN)/python tools/build_web.py --types
+
 wheel: ## build the wheel into dist/ and check it in an environment of its own
 	$(BOOTSTRAP) --group dev
+	@$(BIN)/python tools/build_web.py --if-npm
 	$(BIN)/python tools/check_wheel.py
 
 clean: ## remove all that these commands made: .venv, out/, dist/, caches
-	rm -rf .venv out build dist docs/generated docs/gallery_of_examples .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv out build dist web/dist web/node_modules web/src/generated docs/generated docs/gallery_of_examples .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find translucent tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

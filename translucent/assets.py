@@ -1,5 +1,5 @@
-"""Paths of the files in ``shaders/`` and ``meshes/``: beside the package in an installed wheel, else in the
-checkout.
+"""Paths of the files in ``shaders/`` and ``meshes/``, and of what is built out of ``web/``: beside the package in an
+installed wheel, else in the checkout.
 """
 
 from __future__ import annotations
@@ -53,6 +53,20 @@ def mesh_path(name: str) -> Path:
 def mesh_names() -> list[str]:
     """Names of the meshes that come with the toolkit."""
     return [path.stem for path in _mesh_files()]
+
+
+def web_path(name: str) -> Path:
+    """Path of a file that browsers run, such as ``page.js``; raises `InputError` where it was not built."""
+    path = _web_folder() / name
+    if not path.is_file():
+        found = f"{path} is not there: it is built, not kept with the source"
+        raise InputError(f"the script {name!r} for browsers", found, "run `make web` in the checkout (it needs npm)")
+    return path
+
+
+def _web_folder() -> Path:
+    installed = _PACKAGE / "web"
+    return installed if installed.is_dir() else _PACKAGE.parent / "web" / "dist"
 
 
 def _mesh_files() -> list[Path]:

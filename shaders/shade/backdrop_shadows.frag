@@ -27,8 +27,8 @@ bool is_there(ivec2 texel) {
 
 // Point that a pixel shows; samples share the picture, which belongs to the centers.
 vec3 shown_at(ivec2 texel) {
-    vec2 pixel = vec2(texel.x + 0.5, frame_size.y - texel.y - 0.5);
-    return point_at(pixel, texelFetch(opaque_axial_depth, texel, 0).r);
+    vec2 center = vec2(texel) + 0.5;
+    return point_at(vec2(center.x, frame_size.y - center.y), texelFetch(opaque_axial_depth, texel, 0).r);
 }
 
 // Way along the surface to the next pixel ahead or back: to the nearer one, which is not beyond an edge. 0: there is none.

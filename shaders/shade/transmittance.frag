@@ -6,7 +6,7 @@
 #include <Environment>
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
-#include "thickness/snapping.glsl"
+#include "thickness/balance.glsl"
 #if !SURFACES && !MAP
 #include "shade/background.glsl"
 #endif
@@ -104,12 +104,10 @@ void main() {
     bool balanced = ordered.a == 1.0 && texelFetch(ordered_layers, texel, 0).b <= rounding;
     float misplaced = 0.0;
 #else
-    float count = whole_count(path.count);
-    bool balanced = count >= expected_count.x && count <= expected_count.y;
-    float misplaced = share_of_count(path.count) * count_share * advance;
+    bool balanced = is_balanced(path.count);
+    float misplaced = misplaced_length(path.count, advance);
 #endif
-    // NaN fails every comparison, so this refuses it, too.
-    bool valid = balanced && path.thickness >= -(rounding + misplaced) && path.thickness < NOTHING;
+    bool valid = balanced && is_length(path.thickness, misplaced);
     bool covered = path.thickness > coverage_floor || !valid;
     if (!valid) {
 #if FALLBACK

@@ -14,7 +14,8 @@ from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import shaders
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.lifting import PLAIN, WITH_STORAGE, find_shader, lift, switches
+from translucent.gpu.dialects import PLAIN, WITH_STORAGE
+from translucent.gpu.lifting import find_shader, lift, switches
 from translucent.gpu.shaders import ShaderSource, gather
 
 SIZE = (24, 18)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,12 +11,22 @@ from translucent.commands.common import common_options
 from translucent.commands.console import echo
 from translucent.errors import InputError
 
+if TYPE_CHECKING:
+    from translucent.gpu.dialects import Dialect
+
 
 @click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0")
 @click.argument("name", required=False)
 @click.option("--define", "defines", multiple=True, metavar="X=1", help="Value of a switch, once for each that it has.")
+@click.option(
+    "--target",
+    type=click.Choice(["glsl", "webgl2"]),
+    default="glsl",
+    show_default=True,
+    help="Language to write it in.",
+)
 @common_options
-def shader(name: str | None, defines: tuple[str, ...], as_json: bool) -> None:
+def shader(name: str | None, defines: tuple[str, ...], target: Dialect, as_json: bool) -> None:
     """Print the shader NAME as one text, with its constants and includes in place and without what it does not use.
 
     NAME is a file under shaders/, or its name alone where no other has it. Without NAME, all are listed, with the
@@ -28,10 +39,16 @@ def shader(name: str | None, defines: tuple[str, ...], as_json: bool) -> None:
         if given:
             raise InputError(f"--define {defines[0]}", "no shader is named", "add its NAME")
         return _list(as_json)
-    lifted = lift(find_shader(name), given)
+    lifted = lift(find_shader(name), given, target)
     if not as_json:
         return echo(lifted.text, nl=False)
-    told = {"name": lifted.name, "version": lifted.version, "defines": lifted.defines, "files": lifted.files}
+    told = {
+        "name": lifted.name,
+        "target": target,
+        "version": lifted.version,
+        "defines": lifted.defines,
+        "files": lifted.files,
+    }
     return echo(json.dumps({**told, "text": lifted.text}))
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from translucent.assets import shader_names
 from translucent.errors import InputError
 from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.dialects import Dialect, check_dialect, head_of
 from translucent.gpu.shaders import Gathered, gather
 from translucent.suggestions import close_names, did_you_mean
 
@@ -28,11 +29,6 @@ _WORDS = re.compile(
 )
 _LINE = re.compile(r"#line \d+ (\d+)$")
 _DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
-#: Identifiers that need a newer GLSL version.
-_STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
-
-#: Versions of GLSL: for all shaders, and for those that write to buffers.
-PLAIN, WITH_STORAGE = 330, 430
 
 
 @dataclass(frozen=True)
@@ -43,6 +39,7 @@ class Lifted:
     ----------
     name : str
         File under ``shaders/``.
+    dialect : {"glsl", "webgl2"}
     version : int
         Of GLSL that it needs.
     defines : dict of str to int
@@ -53,6 +50,7 @@ class Lifted:
     """
 
     name: str
+    dialect: Dialect
     version: int
     defines: Mapping[str, int]
     files: tuple[str, ...]
@@ -112,7 +110,7 @@ def switches(name: str) -> list[str]:
     return sorted(gather(name).switches)
 
 
-def lift(name: str, defines: Mapping[str, int]) -> Lifted:
+def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lifted:
     """Text of a shader, with its includes and constants written out.
 
     Parameters
@@ -121,12 +119,15 @@ def lift(name: str, defines: Mapping[str, int]) -> Lifted:
         As `find_shader` gives it.
     defines : dict of str to int
         Values of its switches; those in parts that others leave out may be missing.
+    target : {"glsl", "webgl2"}
+        GLSL 3.30 core, or 4.30 where it writes to buffers; or GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take.
 
     Raises
     ------
     InputError
-        If a switch is unknown or missing, or the shader refuses the values.
+        If a switch is unknown or missing, the shader refuses the values, or it needs what the target lacks.
     """
+    check_dialect(target)
     gathered = gather(name)
     if unknown := sorted(defines.keys() - gathered.switches):
         known = ", ".join(sorted(gathered.switches)) or "it has none"
@@ -134,16 +135,13 @@ def lift(name: str, defines: Mapping[str, int]) -> Lifted:
     parts = list(_parts(_decided(name, gathered, defines)))
     kept = _reached(parts)
     used = set().union(*(part.names for part in kept))
-    version = WITH_STORAGE if any(_STORAGE.search(part.code) for part in kept) else PLAIN
-    head = [f"#version {version} core", f"// translucent: shaders/{name}"]
-    if any("precise" in part.names for part in kept):
-        head.append("#extension GL_ARB_gpu_shader5 : enable // for precise; leave both out elsewhere")
-    decided = {key: int(value) for key, value in defines.items()}
-    head += [f"#define {key} {value}" for key, value in decided.items() if key in used]
-    head += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
-    files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
     body = "\n\n".join(part.text.strip("\n") for part in kept)
-    return Lifted(name, version, decided, files, "\n".join([*head, "", body, ""]))
+    head = head_of(name, "\n".join(part.code for part in kept), target)
+    decided = {key: int(value) for key, value in defines.items()}
+    defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
+    defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
+    files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
+    return Lifted(name, target, head.version, decided, files, "\n".join([*head.lines, *defined, "", body, ""]))
 
 
 def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:

@@ -1,0 +1,51 @@
+"""Headless Chromium for tests: one for the session, without a network, on files from disk."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.browser.pages import CHROMIUM_OPTIONS, WebPage, find_chromium
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """The browser; skips where Chromium, Playwright or npm are not here."""
+    executable = find_chromium()
+    if executable is None:
+        pytest.skip("no Chromium on this machine (apt-get install chromium, or CHROMIUM=/path/to/it)")
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="Playwright is not installed (dependency group test)"
+    )
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=executable, args=CHROMIUM_OPTIONS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def web_page(chromium: Browser) -> Iterator[WebPage]:
+    """An empty page of 300 x 150 CSS pixels, in which `WebPage` opens files. It must be left without errors."""
+    page = WebPage(chromium, (300, 150))
+    yield page
+    page.close()
+    assert page.errors == []
+
+
+@pytest.fixture(scope="session")
+def web_dist() -> Path:
+    """The folder web/dist; skips where it was not built."""
+    folder = ROOT / "web" / "dist"
+    if not (folder / "translucent-three.browser.js").is_file():
+        why = "npm is not here" if shutil.which("npm") is None else "run `make web`"
+        pytest.skip(f"web/dist is not built ({why})")
+    return folder

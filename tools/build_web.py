@@ -1,0 +1,138 @@
+"""Build what runs in browsers: GLSL out of shaders/ into web/src/generated/, and the bundles of web/ into web/dist/.
+
+Run by .venv/bin/python: ``python tools/build_web.py``; needs npm. With ``--if-npm`` it says so and ends well where npm,
+or what it should install, is not to be had. Every formula stays in shaders/: nothing in web/ is a copy of one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+from translucent.errors import InputError
+from translucent.gpu.balance import COVERAGE_FLOOR, OPEN_WEIGHTS, ROUNDING
+from translucent.gpu.constants import CONSTANTS
+from translucent.gpu.lifting import lift
+from translucent.gpu.placement import NEAR_SURFACE
+
+ROOT = Path(__file__).resolve().parents[1]
+WEB = ROOT / "web"
+GENERATED = WEB / "src" / "generated"
+STAMP = WEB / "node_modules" / ".package-lock.sha256"
+
+#: What web/src imports from generated/shaders.ts: a shader with its switches decided.
+SHADERS: dict[str, tuple[str, dict[str, int]]] = {
+    "bodyVertex": ("geometry/body.vert", {"WITH_NORMAL": 0, "WITH_POSITION": 0}),
+    "signedDepth": ("thickness/signed_depth.frag", {"OPAQUE": 0, "SPECTRAL": 0}),
+    "signedDepthBeforeOpaque": ("thickness/signed_depth.frag", {"OPAQUE": 1, "SPECTRAL": 0}),
+    "spectralDepth": ("thickness/signed_depth.frag", {"OPAQUE": 0, "SPECTRAL": 1}),
+    "spectralDepthBeforeOpaque": ("thickness/signed_depth.frag", {"OPAQUE": 1, "SPECTRAL": 1}),
+    "opaqueDepth": (
+        "shade/opaque.frag",
+        {"DEPTH_ONLY": 1, "SURFACE": 0, "LIGHT_MAP": 0, "SHADOW_MAPS": 0},
+    ),
+    "thickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 0}),
+    "spectralThickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 1}),
+}
+
+#: Pure functions of the library, as one text `library`.
+LIBRARY = ("lib/optics.glsl", "lib/interface.glsl")
+
+#: Numbers that it takes from there.
+NUMBERS = {
+    "NOTHING": float(CONSTANTS["NOTHING"]),
+    "ROUNDING": ROUNDING,
+    "COVERAGE_FLOOR": COVERAGE_FLOOR,
+    "NEAR_SURFACE": NEAR_SURFACE,
+    "OPEN_WEIGHTS": OPEN_WEIGHTS,
+}
+
+_BLOCK = re.compile(r"^layout\(std140, row_major\) uniform \w+ \{\n(.*?)^\};\n", re.M | re.S)
+_HEAD = re.compile(r"^#version .*\n|^precision .*\n", re.M)
+_INPUT = re.compile(r"^in \w+ (\w+);\n", re.M)
+_COMMENT = re.compile(r"[ \t]*//.*$", re.M)
+
+
+def for_three(text: str) -> str:
+    """A lifted shader as three.js takes it: without the head that it writes itself, and uniforms one by one."""
+    code = _COMMENT.sub("", _HEAD.sub("", text))
+    code = _BLOCK.sub(lambda block: "".join(f"uniform {field}\n" for field in _fields(block[1], code)), code)
+    # Inputs that this variant does not use have no vertex stage to come from.
+    code = _INPUT.sub(lambda found: found[0] if len(re.findall(rf"\b{found[1]}\b", code)) > 1 else "", code)
+    return re.sub(r"\n{2,}", "\n", code).strip() + "\n"
+
+
+def _fields(block: str, code: str) -> list[str]:
+    fields = [line.strip() for line in block.splitlines()]
+    names = {field: re.sub(r"\[.*", "", field.rstrip(";").split()[1]) for field in fields}
+    return [field for field in fields if len(re.findall(rf"\b{names[field]}\b", code)) > 1]
+
+
+def generate() -> None:
+    """Write web/src/generated/shaders.ts, where it differs from what is there."""
+    texts = {name: for_three(lift(file, switches, "webgl2").text) for name, (file, switches) in SHADERS.items()}
+    head = "// Generated from shaders/ by tools/build_web.py; do not edit.\n"
+    values = {**NUMBERS, **texts, "library": library()}
+    script = "".join(f"export const {name} = {json.dumps(value)};\n" for name, value in values.items())
+    _write(GENERATED / "shaders.ts", head + script)
+
+
+def library() -> str:
+    """The functions of the library, each once."""
+    texts = [for_three(lift(file, {}, "webgl2").text) for file in LIBRARY]
+    parts = [part for text in texts for part in re.split(r"(?<=^}\n)|(?=^#)", text, flags=re.M) if part]
+    return "".join(dict.fromkeys(parts))
+
+
+def _write(path: Path, text: str) -> None:
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def install() -> None:
+    """Bring web/node_modules up to date with the lock file."""
+    lock = hashlib.sha256((WEB / "package-lock.json").read_bytes()).hexdigest()
+    if not STAMP.is_file() or STAMP.read_text(encoding="utf-8") != lock:
+        _run("npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
+        STAMP.write_text(lock, encoding="utf-8")
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, cwd=WEB, check=False)
+    if done.returncode:
+        told = " ".join(command)
+        raise InputError(f"`{told}` in web/", f"it ended with code {done.returncode}", "see its message above")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Build the bundles of web/ into web/dist/.")
+    parser.add_argument("--if-npm", action="store_true", help="do nothing where npm is not installed")
+    parser.add_argument("--types", action="store_true", help="check types and write declarations, too")
+    arguments = parser.parse_args()
+    try:
+        generate()
+        if shutil.which("npm") is None:
+            if arguments.if_npm:
+                return print("web/dist is not built: npm is not here, so that tests in a browser skip")
+            raise InputError("make web", "npm is not here", "install Node.js 20 or newer")
+        try:
+            install()
+        except InputError as error:
+            if arguments.if_npm:
+                return print(f"web/dist is not built, so that tests in a browser may skip: {error}")
+            raise
+        _run("node", "build.mjs")
+        if arguments.types:
+            _run("npx", "tsc", "-p", ".")
+    except InputError as error:
+        raise SystemExit(f"error: {error}") from None
+
+
+if __name__ == "__main__":
+    main()

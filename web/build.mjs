@@ -1,0 +1,28 @@
+// Bundles of web/dist. Each entry is one file that a browser takes as it is, but for the module, which leaves three to its user.
+import { existsSync, statSync } from "node:fs";
+import { resolve } from "node:path";
+import { build } from "esbuild";
+
+const MODULE = { format: "esm", external: ["three", "three/*"], sourcemap: true };
+const SCRIPT = { format: "iife", minify: true, legalComments: "none" };
+
+// The viewer turns cameras with three.js and draws without it.
+const WITHOUT_RENDERER = {
+  name: "without-renderer",
+  setup: (build) => build.onResolve({ filter: /^three$/ }, () => ({ path: resolve("src/viewer/three.js") })),
+};
+
+const BUNDLES = [
+  { entry: "src/index.ts", out: "dist/translucent-three.js", ...MODULE },
+  // For classic scripts and pages from disk: everything, three included, as the global `translucentThree`.
+  { entry: "src/browser.ts", out: "dist/translucent-three.browser.js", globalName: "translucentThree", ...SCRIPT },
+  { entry: "examples/glb/main.ts", out: "dist/example-glb.js", ...SCRIPT },
+  // The page of `translucent page`.
+  { entry: "page/main.js", out: "dist/page.js", ...SCRIPT, plugins: [WITHOUT_RENDERER] },
+];
+
+for (const { entry, out, ...options } of BUNDLES) {
+  if (!existsSync(entry)) continue;
+  await build({ entryPoints: [entry], outfile: out, bundle: true, target: "es2022", logLevel: "warning", ...options });
+  console.log(`web/${out} ${Math.round(statSync(out).size / 1000)} kB`);
+}

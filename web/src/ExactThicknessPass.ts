@@ -1,0 +1,383 @@
+/** One unsorted, additive pass: metres of every ray inside bodies. shaders/thickness/signed_depth.frag is what it draws. */
+import {
+  Box3,
+  Camera,
+  FloatType,
+  HalfFloatType,
+  Mesh,
+  NearestFilter,
+  BufferGeometry,
+  BufferAttribute,
+  RGFormat,
+  RedFormat,
+  RGBAFormat,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderTarget,
+} from "three";
+import type { Color, Material, Object3D, Texture, WebGLRenderer } from "three";
+import { StandIn, checkBody, visibleMeshes } from "./bodies.js";
+import { TranslucentError } from "./errors.js";
+import { COVERAGE_FLOOR, NOTHING, OPEN_WEIGHTS, ROUNDING } from "./generated/shaders.js";
+import { expectedCount, place, seesFrom } from "./placement.js";
+import type { DepthRange, View } from "./placement.js";
+import { nearest, resolveUniforms, resolving, summing } from "./programs.js";
+import { isClosed } from "./topology.js";
+
+/** Numbers that paths are added up in. */
+export type Precision = "float32" | "float16";
+
+export interface ExactThicknessOptions {
+  /** Meshes whose inside is measured, with all below them; or which. Else those with a TranslucentMaterial. */
+  bodies?: Object3D[] | ((mesh: Mesh) => boolean);
+  /** Meshes that end rays; or which. Else all others that write depth and are not transparent. None: `[]`. */
+  opaque?: Object3D[] | ((mesh: Mesh) => boolean);
+  /** Pixels of the picture; else those of the renderer's canvas, whatever they become. */
+  size?: [number, number];
+  /** float16 where float32 cannot be added up is taken by itself; here it can be asked for. */
+  precision?: Precision;
+  /** Optical depth per channel beside the metres: where media differ ("auto"), always, or never. */
+  opticalDepth?: "auto" | boolean;
+}
+
+/** What `read` gives; row 0 is the top one. */
+export interface ThicknessPixels {
+  width: number;
+  height: number;
+  /** Metres inside bodies; 0 where `valid` is. */
+  thickness: Float32Array;
+  /** Exits minus entries ahead of the eye. */
+  count: Float32Array;
+  /** 0 where a hole, or a face wound wrongly, leaves no number to trust. */
+  valid: Uint8Array;
+  /** 1 where a ray meets a body. */
+  covered: Uint8Array;
+}
+
+// What is left of a sum in 16 bits: 11 bits of each number, over a handful of faces.
+const ROUNDING_16 = 4e-3;
+const LARGEST_16 = 65504;
+
+/**
+ * Exact thickness of meshes along every view ray, for a three.js scene.
+ *
+ * `render(scene, camera)` before the picture itself; `texture` then holds, for each pixel of the canvas: metres (r), signed
+ * count (g), 1 if the number can be trusted (b), 1 if a body is there (a). Exact for closed meshes of any shape, in any
+ * order, as deep as they overlap; other pixels are marked.
+ */
+export class ExactThicknessPass {
+  readonly renderer: WebGLRenderer;
+  options: ExactThicknessOptions;
+  private standIns = new Map<Mesh, StandIn>();
+  private sums: WebGLRenderTarget | null = null;
+  private ends: WebGLRenderTarget | null = null;
+  private result: WebGLRenderTarget | null = null;
+  private readonly resolve = resolveUniforms();
+  private readonly resolvers: Record<string, Material> = {};
+  private readonly screen: Mesh;
+  private readonly stage = new Scene();
+  private readonly eye = new Camera();
+  private layout = "";
+
+  constructor(renderer: WebGLRenderer, options: ExactThicknessOptions = {}) {
+    if (!(renderer as { isWebGLRenderer?: boolean }).isWebGLRenderer) {
+      throw new TranslucentError("ExactThicknessPass", "the renderer is no WebGLRenderer", "use three's WebGLRenderer, on WebGL2");
+    }
+    this.renderer = renderer;
+    this.options = options;
+    void this.precision; // refuses a renderer that can add up nothing
+    this.stage.matrixWorldAutoUpdate = false;
+    this.eye.matrixWorldAutoUpdate = false;
+    const triangle = new BufferGeometry();
+    triangle.setAttribute("position", new BufferAttribute(new Float32Array(9), 3));
+    this.screen = new Mesh(triangle);
+    this.screen.frustumCulled = false;
+  }
+
+  /** Numbers that paths are added up in, on this machine; float16 has three digits. */
+  get precision(): Precision {
+    const { extensions } = this.renderer;
+    const float = extensions.has("EXT_color_buffer_float");
+    if (float && extensions.has("EXT_float_blend") && this.options.precision !== "float16") return "float32";
+    if (float || extensions.has("EXT_color_buffer_half_float")) return "float16";
+    throw new TranslucentError(
+      "exact thickness in this browser",
+      "it draws into no texture of floats (EXT_color_buffer_float, EXT_color_buffer_half_float)",
+      "use another browser or graphics driver; show the bodies with three's own material meanwhile",
+    );
+  }
+
+  /** Metres, count, validity and coverage of each pixel; null before the first `render`. */
+  get texture(): Texture | null {
+    return this.result?.textures[0] ?? null;
+  }
+
+  /** Optical depth of each pixel per channel, where bodies are of several media; else null. */
+  get opticalDepth(): Texture | null {
+    return this.result?.textures[1] ?? null;
+  }
+
+  /** Where opaque surfaces end rays: metres along the camera's axis are `near + length * r`; null where there are none. */
+  get opaqueDepth(): Texture | null {
+    return this.ends?.texture ?? null;
+  }
+
+  /** Measure what a camera sees of a scene. False, with nothing drawn, while the context is lost. */
+  render(scene: Object3D, camera: Camera): boolean {
+    const { renderer } = this;
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    if (gl.isContextLost()) return false;
+    if (scene.matrixWorldAutoUpdate) scene.updateMatrixWorld();
+    if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
+    const [bodies, opaque] = this.sort(scene, camera);
+    const view = seesFrom(camera);
+    const media = new Box3();
+    for (const one of bodies) {
+      one.measure();
+      media.union(one.worldBox);
+    }
+    for (const one of opaque) one.measure();
+    const spectral = this.isSpectral(bodies);
+    this.prepare(spectral, opaque.length > 0);
+
+    const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
+    const range = view.range(media);
+    const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
+    const saved = this.save();
+    try {
+      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one)), this.nothing);
+      const expected = [0, 0];
+      const sound = bodies.every((one) => isClosed(one.mesh.geometry));
+      let open = 0;
+      const meshes = this.placed(bodies, view, range, (one) => {
+        const weight = isClosed(one.mesh.geometry) ? 1 : this.openWeight(open++);
+        const [least, most] = expectedCount(one, view);
+        expected[0] += weight * least;
+        expected[1] += weight * most;
+        const { uniforms } = one;
+        uniforms.count_weight.value = weight;
+        uniforms.snapping_share.value = sound && this.precision === "float32" ? subpixel / diagonal : 0;
+        uniforms.opaque_axial_depth.value = this.ends?.texture ?? null;
+        setExtinction(one, diagonal);
+        const blocked = this.ends !== null;
+        const key = `sum ${spectral} ${blocked} ${one.instanced !== null}`;
+        return one.use(key, () => summing(uniforms, spectral, blocked, one.instanced !== null));
+      });
+      this.draw(this.sums!, meshes, 0);
+      this.finish(view, spectral, diagonal, expected);
+    } finally {
+      this.restore(saved);
+    }
+    return true;
+  }
+
+  /** Pixels of the last `render`, read back from the graphics card. */
+  read(): ThicknessPixels {
+    if (!this.result) throw new TranslucentError("read()", "nothing is rendered yet", "call render(scene, camera) first");
+    const { width, height } = this.result;
+    const pixels = new Float32Array(4 * width * height);
+    this.renderer.readRenderTargetPixels(this.result, 0, 0, width, height, pixels);
+    const found = {
+      width,
+      height,
+      thickness: new Float32Array(width * height),
+      count: new Float32Array(width * height),
+      valid: new Uint8Array(width * height),
+      covered: new Uint8Array(width * height),
+    };
+    for (let y = 0, i = 0; y < height; y++) {
+      for (let x = 0, j = 4 * width * (height - 1 - y); x < width; x++, i++, j += 4) {
+        found.thickness[i] = pixels[j];
+        found.count[i] = pixels[j + 1];
+        found.valid[i] = pixels[j + 2];
+        found.covered[i] = pixels[j + 3];
+      }
+    }
+    return found;
+  }
+
+  /** Free all that is on the graphics card; the pass may be used again. */
+  dispose(): void {
+    for (const one of this.standIns.values()) one.dispose();
+    this.standIns.clear();
+    for (const key of Object.keys(this.resolvers)) {
+      this.resolvers[key].dispose();
+      delete this.resolvers[key];
+    }
+    this.screen.geometry.dispose();
+    for (const target of [this.sums, this.ends, this.result]) target?.dispose();
+    this.sums = this.ends = this.result = null;
+    this.layout = "";
+  }
+
+  /** Bodies, and what ends rays. */
+  private sort(scene: Object3D, camera: Camera): [StandIn[], StandIn[]] {
+    const { bodies, opaque } = this.options;
+    const all = visibleMeshes(scene, camera);
+    const chosen = Array.isArray(bodies) ? below(bodies, camera) : all.filter(bodies ?? isTranslucent);
+    chosen.forEach(checkBody);
+    const inside = new Set<Mesh>(chosen);
+    const ends = Array.isArray(opaque) ? below(opaque, camera) : all.filter(opaque ?? endsRays);
+    const kept = new Map<Mesh, StandIn>();
+    const standIn = (mesh: Mesh): StandIn => {
+      const one = kept.get(mesh) ?? this.standIns.get(mesh) ?? new StandIn(mesh);
+      kept.set(mesh, one);
+      return one;
+    };
+    const sorted: [StandIn[], StandIn[]] = [
+      chosen.map(standIn),
+      ends.filter((mesh) => !inside.has(mesh) && mesh.geometry.getAttribute("position")).map(standIn),
+    ];
+    for (const [mesh, one] of this.standIns) if (!kept.has(mesh)) one.dispose();
+    this.standIns = kept;
+    return sorted;
+  }
+
+  private isSpectral(bodies: StandIn[]): boolean {
+    const asked = this.options.opticalDepth ?? "auto";
+    if (asked !== "auto") return asked;
+    const media = new Set(bodies.map((one) => extinctionOf(one.mesh).join()));
+    return media.size > 1;
+  }
+
+  private openWeight(number: number): number {
+    return this.precision === "float32" ? OPEN_WEIGHTS[Math.min(number, OPEN_WEIGHTS.length - 1)] : 1;
+  }
+
+  private get nothing(): number {
+    return this.precision === "float32" ? NOTHING : LARGEST_16;
+  }
+
+  private placed(bodies: StandIn[], view: View, range: DepthRange, material: (one: StandIn) => Mesh): Mesh[] {
+    return bodies.map((one) => {
+      place(one, view, range);
+      return material(one);
+    });
+  }
+
+  private ending(one: StandIn): Mesh {
+    const { material } = one.mesh;
+    const side = (Array.isArray(material) ? material[0] : material).side;
+    return one.use(`end ${side} ${one.instanced !== null}`, () => {
+      const made = nearest(one.uniforms, one.instanced !== null);
+      made.side = side;
+      return made;
+    });
+  }
+
+  /** Make the targets, where they are not there yet in this size. */
+  private prepare(spectral: boolean, opaque: boolean): void {
+    const size = this.options.size ?? this.renderer.getDrawingBufferSize(new Vector2()).toArray();
+    const [width, height] = size.map((n) => Math.max(1, Math.floor(n)));
+    const type = this.precision === "float32" ? FloatType : HalfFloatType;
+    const layout = [width, height, type, spectral, opaque].join();
+    if (layout === this.layout) return;
+    for (const target of [this.sums, this.ends, this.result]) target?.dispose();
+    const common = {
+      depthBuffer: false,
+      stencilBuffer: false,
+      generateMipmaps: false,
+      minFilter: NearestFilter,
+      magFilter: NearestFilter,
+    } as const;
+    const count = spectral ? 2 : 1;
+    this.sums = new WebGLRenderTarget(width, height, { ...common, type, format: spectral ? RGBAFormat : RGFormat, count });
+    if (spectral) this.sums.textures[1].format = RedFormat;
+    this.ends = opaque ? new WebGLRenderTarget(width, height, { ...common, type, format: RedFormat }) : null;
+    const precise = this.renderer.extensions.has("EXT_color_buffer_float") ? FloatType : HalfFloatType;
+    this.result = new WebGLRenderTarget(width, height, { ...common, type: precise, format: RGBAFormat, count });
+    this.result.textures[0].name = "thickness";
+    this.layout = layout;
+  }
+
+  /** Sums to metres. */
+  private finish(view: View, spectral: boolean, diagonal: number, expected: number[]): void {
+    const { resolve, sums, result } = this;
+    const precise = this.precision === "float32";
+    resolve.accumulated.value = sums!.textures[0];
+    resolve.accumulated_path.value = sums!.textures[1] ?? null;
+    resolve.frame_size.value.set(result!.width, result!.height, 0, 0);
+    view.setRays(resolve.ray_right.value, resolve.ray_up.value, resolve.ray_forward.value);
+    resolve.expected_count.value.set(expected[0], expected[1]);
+    resolve.rounding.value = (precise ? ROUNDING : ROUNDING_16) * diagonal;
+    resolve.count_share.value = diagonal;
+    resolve.coverage_floor.value = (precise ? COVERAGE_FLOOR : ROUNDING_16) * diagonal;
+    this.resolvers[String(spectral)] ??= resolving(resolve, spectral);
+    this.screen.material = this.resolvers[String(spectral)];
+    this.draw(result!, [this.screen], null);
+  }
+
+  private draw(target: WebGLRenderTarget, meshes: Mesh[], cleared: number | null): void {
+    const { renderer, stage } = this;
+    renderer.setRenderTarget(target);
+    if (cleared !== null) {
+      renderer.state.buffers.color.setMask(true);
+      const gl = renderer.getContext() as WebGL2RenderingContext;
+      target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, [cleared, cleared, cleared, cleared]));
+    }
+    stage.children = meshes; // none of them is anybody else's child
+    renderer.render(stage, this.eye);
+    stage.children = [];
+  }
+
+  private save() {
+    const { renderer } = this;
+    const saved = {
+      target: renderer.getRenderTarget(),
+      face: renderer.getActiveCubeFace(),
+      level: renderer.getActiveMipmapLevel(),
+      autoClear: renderer.autoClear,
+      xr: renderer.xr.enabled,
+      shadows: renderer.shadowMap.autoUpdate,
+      info: renderer.info.autoReset,
+    };
+    renderer.autoClear = renderer.xr.enabled = renderer.shadowMap.autoUpdate = renderer.info.autoReset = false;
+    return saved;
+  }
+
+  private restore(saved: ReturnType<ExactThicknessPass["save"]>): void {
+    const { renderer } = this;
+    renderer.autoClear = saved.autoClear;
+    renderer.xr.enabled = saved.xr;
+    renderer.shadowMap.autoUpdate = saved.shadows;
+    renderer.info.autoReset = saved.info;
+    renderer.setRenderTarget(saved.target, saved.face, saved.level);
+  }
+}
+
+/** Extinction of a mesh's medium in 1/m: what its material's attenuation says. */
+export function extinctionOf(mesh: Mesh): [number, number, number] {
+  const material = (Array.isArray(mesh.material) ? mesh.material[0] : mesh.material) as {
+    attenuationColor?: Color;
+    attenuationDistance?: number;
+  };
+  const { attenuationColor: color, attenuationDistance: distance = Infinity } = material;
+  if (!color || distance === Infinity) return [0, 0, 0];
+  return [color.r, color.g, color.b].map((c) => -Math.log(Math.min(c, 1)) / distance + 0) as [number, number, number];
+}
+
+/** Denser than this is opaque anyway, and its products stay finite. */
+function setExtinction(one: StandIn, diagonal: number): void {
+  const [r, g, b] = extinctionOf(one.mesh).map((sigma) => Math.min(sigma, NOTHING / diagonal));
+  one.uniforms.extinction.value.set(r, g, b, 0);
+}
+
+function below(roots: Object3D[], camera: Camera): Mesh[] {
+  for (const root of roots) if (root.children.length === 0) checkBody(root);
+  return [...new Set(roots.flatMap((root) => visibleMeshes(root, camera)))];
+}
+
+function isTranslucent(mesh: Mesh): boolean {
+  return materials(mesh).some((one) => (one as { isTranslucentMaterial?: boolean }).isTranslucentMaterial);
+}
+
+function endsRays(mesh: Mesh): boolean {
+  const all = materials(mesh);
+  const transmissive = (one: Material): boolean => ((one as { transmission?: number }).transmission ?? 0) > 0;
+  return all.every((one) => one.visible && one.depthWrite && !one.transparent && !transmissive(one));
+}
+
+function materials(mesh: Mesh): Material[] {
+  return Array.isArray(mesh.material) ? mesh.material : [mesh.material];
+}

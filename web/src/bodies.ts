@@ -1,0 +1,127 @@
+/** The meshes of a scene that fill space or end rays, and their stand-ins in the scenes that the pass draws. */
+import { Box3, InstancedMesh, Matrix4, Mesh, SkinnedMesh } from "three";
+import type { BufferGeometry, Camera, Material, Object3D, Vector3 } from "three";
+import { TranslucentError } from "./errors.js";
+import { bodyUniforms } from "./programs.js";
+import type { BodyUniforms } from "./programs.js";
+
+/** A mesh as the pass draws it: one geometry, other materials; nothing of the user's own scene is touched. */
+export class StandIn {
+  readonly uniforms: BodyUniforms = bodyUniforms();
+  readonly box = new Box3();
+  readonly worldBox = new Box3();
+  private drawn: Mesh | null = null;
+  private geometry: BufferGeometry | null = null;
+  private material: { key: string; made: Material } | null = null;
+
+  constructor(readonly mesh: Mesh) {}
+
+  get instanced(): InstancedMesh | null {
+    return (this.mesh as InstancedMesh).isInstancedMesh ? (this.mesh as InstancedMesh) : null;
+  }
+
+  get skinned(): SkinnedMesh | null {
+    return (this.mesh as SkinnedMesh).isSkinnedMesh ? (this.mesh as SkinnedMesh) : null;
+  }
+
+  /** Bounds now, in the mesh's own coordinates and in the world's. */
+  measure(): void {
+    const { mesh, instanced, skinned } = this;
+    if (skinned) {
+      skinned.skeleton.update(); // bones as they are now
+      skinned.computeBoundingBox();
+      this.box.copy(skinned.boundingBox!);
+    } else if (instanced) {
+      instanced.computeBoundingBox();
+      this.box.copy(instanced.boundingBox!);
+    } else {
+      if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
+      this.box.copy(mesh.geometry.boundingBox!);
+    }
+    this.worldBox.copy(this.box).applyMatrix4(mesh.matrixWorld);
+  }
+
+  /** The stand-in, with this material; it is made once for each `key`. */
+  use(key: string, make: () => Material): Mesh {
+    if (this.material?.key !== key) {
+      this.material?.made.dispose();
+      this.material = { key, made: make() };
+    }
+    const standIn = this.object();
+    standIn.material = this.material.made;
+    return standIn;
+  }
+
+  private object(): Mesh {
+    const { mesh, instanced, skinned } = this;
+    if (!this.drawn || this.geometry !== mesh.geometry) {
+      this.geometry = mesh.geometry;
+      if (skinned) this.drawn = new SkinnedMesh(mesh.geometry);
+      else if (instanced) this.drawn = new InstancedMesh(mesh.geometry, undefined, 0);
+      else this.drawn = new Mesh(mesh.geometry);
+      this.drawn.frustumCulled = false;
+      this.drawn.matrixAutoUpdate = this.drawn.matrixWorldAutoUpdate = false;
+    }
+    const drawn = this.drawn;
+    drawn.matrixWorld.copy(mesh.matrixWorld); // mirrors it, too: three.js then turns the sides of faces
+    drawn.morphTargetInfluences = mesh.morphTargetInfluences;
+    if (skinned) {
+      const copy = drawn as SkinnedMesh;
+      copy.skeleton = skinned.skeleton;
+      copy.bindMode = skinned.bindMode;
+      copy.bindMatrix.copy(skinned.bindMatrix);
+      copy.bindMatrixInverse.copy(skinned.bindMatrixInverse);
+    } else if (instanced) {
+      const copy = drawn as InstancedMesh;
+      copy.instanceMatrix = instanced.instanceMatrix;
+      copy.morphTexture = instanced.morphTexture;
+      copy.count = instanced.count;
+    }
+    return drawn;
+  }
+
+  dispose(): void {
+    this.material?.made.dispose();
+    this.material = null;
+    this.drawn = null;
+  }
+}
+
+/** Winding number that instances, or the mesh itself, have around a point of the mesh's coordinates, by `number` of one of them. */
+export function sumOfInstances(mesh: Mesh, point: Vector3, number: (point: Vector3) => number): number {
+  const instanced = mesh as InstancedMesh;
+  if (!instanced.isInstancedMesh) return number(point);
+  let sum = 0;
+  const matrix = new Matrix4();
+  for (let i = 0; i < instanced.count; i++) {
+    instanced.getMatrixAt(i, matrix);
+    if (matrix.determinant() !== 0) sum += number(point.clone().applyMatrix4(matrix.invert()));
+  }
+  return sum;
+}
+
+/** All visible meshes at and below an object, that a camera sees the layers of. */
+export function visibleMeshes(root: Object3D, camera: Camera): Mesh[] {
+  const found: Mesh[] = [];
+  const visit = (object: Object3D): void => {
+    if (!object.visible) return;
+    if ((object as Mesh).isMesh && object.layers.test(camera.layers)) found.push(object as Mesh);
+    object.children.forEach(visit);
+  };
+  visit(root);
+  return found;
+}
+
+/** Refuse what has no inside that this pass can measure. */
+export function checkBody(object: Object3D): asserts object is Mesh {
+  const name = object.name ? `${object.type} "${object.name}"` : object.type;
+  const flags = object as unknown as Record<string, boolean>;
+  if (!flags.isMesh) throw new TranslucentError(name, "it has no triangles, so no inside", "give meshes as bodies");
+  if (flags.isBatchedMesh) {
+    throw new TranslucentError(name, "batches have a transform per part that passes do not know", "use meshes or an InstancedMesh");
+  }
+  const { geometry } = object as Mesh;
+  if (!geometry.getAttribute("position")) {
+    throw new TranslucentError(name, "its geometry has no positions", "give a geometry with triangles");
+  }
+}
