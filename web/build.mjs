@@ -19,6 +19,8 @@ const BUNDLES = [
   { entry: "examples/glb/main.ts", out: "dist/example-glb.js", ...SCRIPT },
   // The page of `translucent page`.
   { entry: "page/main.js", out: "dist/page.js", ...SCRIPT, plugins: [WITHOUT_RENDERER] },
+  // The widget of `tl.view`.
+  { entry: "notebook/widget.js", out: "dist/widget.js", ...SCRIPT, format: "esm", plugins: [WITHOUT_RENDERER] },
 ];
 
 for (const { entry, out, ...options } of BUNDLES) {
