@@ -144,6 +144,10 @@ class RecordingContext:
             items.append(item)
         return self._numbers[key]
 
+    def number_of_mesh(self, mesh: Mesh) -> int:
+        """Number of a mesh."""
+        return self.number(("mesh", id(mesh)), self.meshes, mesh)
+
     def number_of_content(self, content: npt.NDArray[Any]) -> int:
         """Number of an array among the contents."""
         digest = hashlib.sha256(content.tobytes()).digest()
@@ -206,7 +210,7 @@ class RecordingContext:
             "op": "draw",
             "target": self.number_of_framebuffer(framebuffer),
             "program": self.number(key, self.programs, (program.vertex, program.fragment)),
-            "mesh": None if array.mesh is None else self.number(("mesh", id(array.mesh)), self.meshes, array.mesh),
+            "mesh": None if array.mesh is None else self.number_of_mesh(array.mesh),
             "looks": array.looks,
             "viewport": framebuffer.part,
             "scissor": framebuffer.scissor,
@@ -264,30 +268,40 @@ def _merged(text: str, defines: Mapping[str, int]) -> tuple[str, tuple[str, ...]
     seen is the one that lights, where it is.
     """
     merged: list[str] = []
-    if "uniform usampler2D hierarchy_triangles;" in text:
+    if _declares(text, "hierarchy_triangles"):
         merged.append("hierarchy_triangles")
-        text = text.replace("uniform usampler2D hierarchy_triangles;", "uniform int hierarchy_triangle_row;")
-        text = text.replace(
-            "texelFetch(hierarchy_triangles, ", "texelFetch(hierarchy_nodes, ivec2(0, hierarchy_triangle_row) + "
-        )
-    if "uniform sampler2D traced_bodies;" in text and "uniform sampler2D surface_table;" in text:
+        text = re.sub(r"^uniform usampler2D hierarchy_triangles;", _TRIANGLE_ROW, text, flags=re.MULTILINE)
+        found = "texelFetch(hierarchy_triangles, "
+        text = text.replace(found, "texelFetch(hierarchy_nodes, ivec2(0, hierarchy_triangle_row) + ")
+    if _declares(text, "traced_bodies") and _declares(text, "surface_table"):
         merged.append("traced_bodies")
         texels = SURFACE_ROW.dtype.itemsize // 16
-        text = _declared_first(text.replace("uniform sampler2D traced_bodies;\n", ""), "surface_table")
+        text = _declared_first(_without(text, "traced_bodies"), "surface_table")
         text = re.sub(
             r"texelFetch\(traced_bodies, ivec2\((\d+), row\), 0\)",
             lambda found: f"texelFetch(surface_table, ivec2({int(found[1]) + texels}, row), 0)",
             text,
         )
-    if defines.get("SEEN_LIGHTS") and "uniform sampler2D light_map;" in text:
-        text = text.replace("uniform sampler2D seen_map;", "#define seen_map light_map")
-        text = _declared_first(text, "light_map")
+    if defines.get("SEEN_LIGHTS") and _declares(text, "light_map") and _declares(text, "seen_map"):
+        text = _declared_first(_without(text, "seen_map"), "light_map", "#define seen_map light_map\n")
     return text, tuple(merged)
 
 
-def _declared_first(text: str, sampler: str) -> str:
-    """A shader with the declaration of a sampler before all others."""
-    line = f"uniform sampler2D {sampler};\n"
-    last = list(re.finditer(r"^precision highp \w+;\n", text, re.MULTILINE))[-1]
-    without = text.replace(line, "")
-    return without[: last.end()] + line + without[last.end() :]
+_TRIANGLE_ROW = "uniform int hierarchy_triangle_row;"
+
+
+def _declares(text: str, sampler: str) -> bool:
+    """Whether a shader declares a sampler."""
+    return re.search(rf"^uniform u?sampler2D {sampler};", text, re.MULTILINE) is not None
+
+
+def _without(text: str, sampler: str) -> str:
+    """A shader without the declaration of a sampler."""
+    return re.sub(rf"^uniform sampler2D {sampler};.*\n", "", text, flags=re.MULTILINE)
+
+
+def _declared_first(text: str, sampler: str, more: str = "") -> str:
+    """A shader with the declaration of a sampler before all others, and more behind it."""
+    text = _without(text, sampler)
+    last = list(re.finditer(r"^precision highp \w+;\n", text, re.MULTILINE))[-1].end()
+    return f"{text[:last]}uniform sampler2D {sampler};\n{more}{text[last:]}"

@@ -130,6 +130,7 @@ class FrameRecorder:
         if job.features.has_surfaces:
             found["sound"] = picture.color_attachments[1]
         frame.targets = {name: self.gl.number_of_texture(cast(Any, texture)) for name, texture in found.items()}
+        frame.targets["average_target"] = self.gl.number_of_framebuffer(cast(Any, average))
         return frame
 
     def _run(self, job: RecordedJob, once: list[dict[str, Any]], steps: list[dict[str, Any]]) -> None:

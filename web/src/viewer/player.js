@@ -1,6 +1,7 @@
 // Plays recorded frames in WebGL2: the steps of translucent/gpu/recording, with the numbers of a camera and a material.
 
 import { fieldsOf, writeBlocks } from "./blocks.js";
+import { drawn } from "./meshes.js";
 import { sceneHierarchies } from "./hierarchy.js";
 
 const BLEND = 1, DEPTH_TEST = 2, CULL_FACE = 4;
@@ -46,6 +47,7 @@ export class Player {
     this.onces = new Map();
     this.blended = this.#blendedTargets();
     this.live = {};
+    this.drawn = [];
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.pixelStorei(gl.PACK_ALIGNMENT, 1);
   }
@@ -438,7 +440,7 @@ export class Player {
     gl.bindVertexArray(object);
     let found = { object, indexed: false, count: 3 };
     if (step.mesh != null) {
-      const mesh = this.meshes[step.mesh];
+      const mesh = (this.drawn[step.mesh] ??= drawn(this.meshes[step.mesh]));
       const shared = step.looks === "shared";
       for (const [name, location] of Object.entries(program.attributes)) {
         const [what, width] = {
