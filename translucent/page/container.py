@@ -66,6 +66,14 @@ class Container:
         return gzip.compress(whole, 9, mtime=0)
 
 
+def header_of(data: bytes) -> dict[str, Any]:
+    """Header of a packed container."""
+    whole = gzip.decompress(data)
+    start = len(MAGIC) + 8
+    header: dict[str, Any] = json.loads(whole[start : start + int.from_bytes(whole[len(MAGIC) : start], "little")])
+    return header
+
+
 def _planes(words: npt.NDArray[np.uint32], packing: str, shift: int) -> bytes:
     """Differences of words, their lowest `shift` bits rounded away, as planes of bytes."""
     rounded = (words.astype(np.uint64) + ((1 << shift) >> 1)) >> np.uint64(shift)
