@@ -55,7 +55,7 @@ details dt { color: #d6d8dc; } details dd { margin: 0; }
 .told.on { display: block; }
 .poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
 .busy { width: 100%; height: 2px; position: absolute; left: 0; bottom: 0; transform-origin: left; background: #7fb0ea; opacity: 0.8; transform: scaleX(0); }
-@container (max-width: 720px) {
+@container (max-width: 680px) {
   .layout { grid-template: minmax(0, 1fr) 30px minmax(0, 42cqh) / minmax(0, 1fr); }
   .panel { grid-column: 1; grid-row: 3; border-left: 0; border-top: 1px solid #26282c; padding: 12px 14px 16px; gap: 12px; }
   .layout.bare { grid-template: minmax(0, 1fr) 30px 0 / minmax(0, 1fr); }
