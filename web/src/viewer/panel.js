@@ -264,7 +264,8 @@ export class Panel {
     const { samples } = this.viewer.page;
     const share = this.viewer.shown === "picture" ? done / samples : 1;
     this.$(".busy").style.transform = `scaleX(${share < 1 ? share : 0})`;
-    this.$(".quality").textContent = share < 1 ? `${done} of ${samples} samples` : "";
+    const small = this.viewer.still_scale < 0.99 ? `${Math.round(100 * this.viewer.still_scale)} % of the pixels across` : "";
+    this.$(".quality").textContent = [share < 1 ? `${done} of ${samples} samples` : "", small].filter(Boolean).join(", ");
     this.#probe();
   }
 
