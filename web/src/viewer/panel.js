@@ -28,6 +28,8 @@ h1 { margin: 0; font-size: 14px; font-weight: 600; color: #f0f1f3; overflow-wrap
 .group > label, .group > .name { color: #9ea2a9; }
 .row { display: flex; gap: 6px; align-items: center; min-width: 0; }
 .row > * { min-width: 0; }
+.row > span { flex: none; }
+#unit { width: 58px; flex: none; padding: 0 2px; }
 input[type="number"], select { width: 100%; height: 28px; padding: 0 7px; background: #242629; border: 1px solid #34373c; border-radius: 5px; }
 input[type="color"] { width: 40px; height: 28px; flex: none; padding: 2px; background: #242629; border: 1px solid #34373c; border-radius: 5px; cursor: pointer; }
 input[type="range"] { flex: 1; min-width: 0; height: 28px; accent-color: #7fb0ea; cursor: pointer; }
