@@ -68,6 +68,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.presets import presets as presets
     from translucent.mesh_files import load_mesh as load_mesh
     from translucent.notebook.view import view as view
+    from translucent.page.write import write_page as write_page
     from translucent.planning.caustics import Caustics as Caustics
     from translucent.planning.interfaces import FrontInterface as FrontInterface
     from translucent.planning.interfaces import ScreenInterfaces as ScreenInterfaces
@@ -134,6 +135,7 @@ _NAMES = {
     "media.presets": "preset presets",
     "mesh_files": "load_mesh",
     "notebook.view": "view",
+    "page.write": "write_page",
     "planning.caustics": "Caustics",
     "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
     "planning.scattering": "Diffusion ScatteringLayer SingleScattering",

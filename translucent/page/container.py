@@ -45,7 +45,7 @@ class Container:
         """
         held = np.ascontiguousarray(values)
         kinds = {"f4": "float32", "f2": "float16", "u4": "uint32", "u1": "uint8"}
-        section = {"type": kinds[held.dtype.str[1:]], "shape": list(held.shape), "packing": packing}
+        section: dict[str, Any] = {"type": kinds[held.dtype.str[1:]], "shape": list(held.shape), "packing": packing}
         if packing == "plain":
             packed = held.tobytes()
         else:

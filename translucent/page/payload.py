@@ -153,9 +153,7 @@ def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
 
 def _kept_contents(gl: RecordingContext) -> frozenset[int]:
     """Contents of hierarchies, which pages build themselves."""
-    return frozenset(
-        told["content"] for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None
-    )
+    return frozenset(told["content"] for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None)
 
 
 def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
@@ -188,7 +186,7 @@ def _scene_told(scene: Scene, size: tuple[int, int], gl: RecordingContext) -> di
         "first_body": numbers[0],
         "first_throwing": throwing[0],
         "lights": [
-            {"position": list(map(float, light.position))} if isinstance(light, PositionalLight) else {}
+            {"position": np.asarray(light.position, np.float64).tolist()} if isinstance(light, PositionalLight) else {}
             for light in scene.lights
         ],
         "media": [_medium_told(scene, medium) for medium in media],
@@ -246,10 +244,16 @@ def _presets_told() -> list[dict[str, Any]]:
 def _layout(item: UniformBlock | PackedTable) -> dict[str, Any]:
     fields = {}
     for name, base, shape in item.fields:
-        offset = int((item.dtype.fields or {})[name][1])
+        offset = _offset(item, name)
         fields[name] = [offset, base, int(np.prod(shape, dtype=int))]
     binding = item.binding if isinstance(item, UniformBlock) else None
     return {"binding": binding, "size": item.dtype.itemsize, "fields": fields}
+
+
+def _offset(item: UniformBlock | PackedTable, name: str) -> int:
+    fields = item.dtype.fields
+    assert fields is not None
+    return int(fields[name][1])
 
 
 def _present_told() -> dict[str, str]:
@@ -285,7 +289,7 @@ def _variant_told(
     spectral_maps: bool,
 ) -> dict[str, Any]:
     features = FrameFeatures(scene, frame.plan)
-    roles = body_roles(features, face_counts(scene, INFO["GL_SUBPIXEL_BITS"]))
+    roles = body_roles(features, face_counts(scene, int(INFO["GL_SUBPIXEL_BITS"])))
     names = {block.binding: name for name, block in BLOCKS.items()}
     blocks = {names[binding]: into.add(_bytes(content)) for binding, content in frame.blocks.items()}
     steps = {part: [dict(step) for step in getattr(frame, part)] for part in _PARTS}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from translucent.errors import InputError
+from translucent.page.simplify import triangles
 from translucent.planning.interfaces import FrontInterface, Interfaces
 from translucent.planning.methods import DepthPeeling, Method
 from translucent.planning.notes import Note, NoteKind
@@ -63,7 +64,21 @@ class PagePlan:
     @property
     def notes(self) -> tuple[Note, ...]:
         """What the page does not show, or not exactly."""
-        return (*self.plan.limits, *self.plan.unmodelled)
+        return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled)
+
+    @property
+    def own_notes(self) -> tuple[Note, ...]:
+        """Those that are not of the plan."""
+        found = []
+        if (count := triangles(self.scene)) > MANY_TRIANGLES:
+            text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
+            found.append(Note(NoteKind.MANY_TRIANGLES, text))
+        if any(body.density is not None for body in self.scene.objects):
+            found.append(Note(NoteKind.STEPS, "media of varying density stay as they are: no panel changes them"))
+        if sum(body.covers for body in self.scene.objects) > 1:
+            text = "layers are put over each other in the order in which the first camera sees them"
+            found.append(Note(NoteKind.LAYERS, text))
+        return tuple(found)
 
     @property
     def most_layers(self) -> int:
@@ -72,9 +87,7 @@ class PagePlan:
 
     def planned(self, scene: Scene) -> RenderPlan:
         """Plan of a variant of the scene."""
-        return _planned(
-            scene, self.method, self.interfaces, self.scattering, self.shadows, self.texture_units
-        )
+        return _planned(scene, self.method, self.interfaces, self.scattering, self.shadows, self.texture_units)
 
 
 def plan_page(
@@ -92,8 +105,7 @@ def plan_page(
     InputError
         If WebGL2 cannot draw the scene, or not by what was asked for.
     """
-    faces = sum(len(mesh.faces) for mesh in {body.mesh for body in scene.objects})
-    if interfaces is None and faces > MOST_TRACED:
+    if interfaces is None and triangles(scene) > MOST_TRACED:
         interfaces = FrontInterface()
     asked = method, interfaces, scattering, shadows
     units = UNITS_WITH_SHADOWS
@@ -125,6 +137,3 @@ def _planned(
 
 def _instead(chosen: RenderPlan) -> str:
     return "use another --method" if not isinstance(chosen.method, DepthPeeling) else "leave it out"
-
-
-__all__ = ["MANY_TRIANGLES", "NoteKind", "PagePlan", "plan_page"]

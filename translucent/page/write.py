@@ -7,11 +7,12 @@ import html
 import io
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from translucent.assets import web_path
-from translucent.errors import InputError, TranslucentError
-from translucent.files.paths import write_text_atomically
+from translucent.errors import InputError
+from translucent.files.paths import require_output, write_text_atomically
+from translucent.formulas.tone import tone_curve
+from translucent.frames.frame import check_exposure
 from translucent.page.payload import payload
 from translucent.page.plans import PagePlan, plan_page
 from translucent.planning.interfaces import Interfaces
@@ -20,9 +21,7 @@ from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import ShadowMaps
 from translucent.scene.camera import check_size
 from translucent.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from translucent.renderer import Renderer
+from translucent.version import VERSION
 
 _TEMPLATE = """<!doctype html>
 <html lang="en">
@@ -49,8 +48,8 @@ html, body {{ margin: 0; height: 100%; background: #131416; }}
 </html>
 """
 
-#: Samples of a pixel that pages add up at rest, as `translucent render` does.
-SAMPLES = 16
+#: Samples of a pixel that pages add up at rest, as `translucent render` does; those of posters; and the most.
+SAMPLES, POSTER_SAMPLES, MOST_SAMPLES = 16, 4, 256
 
 
 def write_page(
@@ -102,12 +101,38 @@ def write_page(
         written there.
     """
     file = Path(path)
-    if file.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"page {str(file)!r}", "not an .html file", "name it for example viewer.html")
+    check_output(file)
     planned = plan_page(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
-    text = page_html(planned, name or title_of(scene), check_size(size), samples, exposure, tone, poster)
-    write_text_atomically(file, text)
+    picture = None if poster is None else check_poster(poster, "poster")
+    save_page(planned, file, name or title_of(scene), check_size(size), samples, exposure, tone, picture)
     return planned
+
+
+def check_output(path: Path) -> None:
+    """Raise `InputError` before any work is done if no page can be written to the path."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"page {str(path)!r}", "not an .html file", "name it for example viewer.html")
+    require_output(path, f"page {str(path)!r}")
+
+
+def save_page(
+    planned: PagePlan,
+    path: Path,
+    name: str,
+    size: tuple[int, int],
+    samples: int,
+    exposure: float,
+    tone: str,
+    poster: bytes | None,
+) -> int:
+    """Write a page; see `write_page`. Returns how many bytes it has."""
+    check_exposure(exposure)
+    tone_curve(tone)
+    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16")
+    text = page_html(planned, name, size, samples, exposure, tone, poster)
+    write_text_atomically(path, text)
+    return len(text.encode("utf-8"))
 
 
 def page_html(
@@ -120,8 +145,6 @@ def page_html(
     poster: bytes | None = None,
 ) -> str:
     """Text of a page; see `write_page`."""
-    from translucent.version import VERSION
-
     script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     data = payload(planned, name, size, samples, exposure, tone)
     picture = "" if poster is None else f'<img alt="" src="{_data_url(poster)}">'
@@ -140,30 +163,45 @@ def title_of(scene: Scene) -> str:
     return mesh.name.rpartition(".")[0] or mesh.name or "scene"
 
 
-def poster_of(renderer: Renderer, planned: PagePlan, size: tuple[int, int], exposure: float, tone: str) -> bytes:
-    """Picture of a scene as its page will show it, as JPEG."""
+def poster_of(planned: PagePlan, size: tuple[int, int], exposure: float, tone: str) -> bytes:
+    """Picture of a scene as its page will show it, as JPEG.
+
+    Raises
+    ------
+    RenderError
+        If nothing can render here.
+    """
     from PIL import Image
 
-    frame = renderer.render(
-        planned.scene,
-        size,
-        planned.method,
-        samples=SAMPLES,
-        interfaces=planned.interfaces,
-        scattering=planned.scattering,
-        shadows=planned.shadows,
-    )
+    from translucent.renderer import Renderer
+
+    with Renderer() as renderer:
+        frame = renderer.render(
+            planned.scene,
+            size,
+            planned.method,
+            samples=POSTER_SAMPLES,
+            interfaces=planned.interfaces,
+            scattering=planned.scattering,
+            shadows=planned.shadows,
+        )
     stream = io.BytesIO()
     Image.fromarray(frame.to_srgb8(exposure, tone)).save(stream, "JPEG", quality=88)
     return stream.getvalue()
 
 
+def check_poster(picture: bytes, asked: str) -> bytes:
+    """The picture; raises `InputError` if browsers show no such file."""
+    _kind(picture, asked)
+    return picture
+
+
 def _data_url(picture: bytes) -> str:
-    kinds = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp"}
-    for head, kind in kinds.items():
+    return f"data:image/{_kind(picture, 'poster')};base64,{base64.b64encode(picture).decode('ascii')}"
+
+
+def _kind(picture: bytes, asked: str) -> str:
+    for head, kind in {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp"}.items():
         if picture.startswith(head):
-            return f"data:image/{kind};base64,{base64.b64encode(picture).decode('ascii')}"
-    raise InputError("poster", "no PNG, JPEG or WebP picture", "give one of these")
-
-
-__all__ = ["SAMPLES", "TranslucentError", "page_html", "poster_of", "title_of", "write_page"]
+            return kind
+    raise InputError(asked, "no PNG, JPEG or WebP picture", "give one of these")

@@ -24,7 +24,7 @@ from translucent.gpu.recording.objects import (
 )
 
 #: What WebGL2 on machines of today has; textures of hierarchies need the first.
-INFO = {
+INFO: dict[str, int | str] = {
     "GL_MAX_TEXTURE_SIZE": 4096,
     "GL_MAX_3D_TEXTURE_SIZE": 256,
     "GL_SUBPIXEL_BITS": 8,
@@ -215,7 +215,10 @@ class RecordingContext:
             "viewport": framebuffer.part,
             "scissor": framebuffer.scissor,
             "flags": int(self._flags),
-            "blend": [[int(v) for v in np.atleast_1d(self.blend_func)], [int(v) for v in np.atleast_1d(self.blend_equation)]],
+            "blend": [
+                [int(v) for v in np.atleast_1d(self.blend_func)],
+                [int(v) for v in np.atleast_1d(self.blend_equation)],
+            ],
             "depth": self.depth_func,
             "depth_mask": framebuffer.depth_mask,
             "cull": self.cull_face,

@@ -1,4 +1,4 @@
-"""Objects of a context that records: programs, textures, framebuffers and vertex arrays that only know what they are."""
+"""Objects of a context that records: programs, textures and framebuffers that only know what they are."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh
-from translucent.gpu.std140 import UniformBlock
 
 if TYPE_CHECKING:
     from translucent.gpu.recording.context import RecordingContext
@@ -48,9 +47,7 @@ class RecordedProgram:
         Loose uniforms, samplers among them.
     """
 
-    def __init__(
-        self, vertex: str, fragment: str, constants: dict[str, str], merged: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, vertex: str, fragment: str, constants: dict[str, str], merged: tuple[str, ...] = ()) -> None:
         self.glo = next(_numbers)
         self.vertex, self.fragment = vertex, fragment
         self.inputs = frozenset(_INPUT.findall(vertex))
@@ -98,7 +95,7 @@ class RecordedBuffer:
 
     def __init__(self, gl: RecordingContext, data: Any = None, reserve: int = 0) -> None:
         self._gl = gl
-        self.content = bytearray(reserve if data is None else bytes(memoryview(np.ascontiguousarray(data)).cast("B")))
+        self.content = bytearray(reserve if data is None else _bytes_of(data))
         self.size = len(self.content)
 
     def write(self, data: bytes, offset: int = 0) -> None:
@@ -161,9 +158,13 @@ class RecordedTexture:
         """Do nothing: what was recorded stays."""
 
 
+def _bytes_of(data: Any) -> bytes:
+    return data if isinstance(data, bytes) else np.ascontiguousarray(data).tobytes()
+
+
 def _array(data: Any, dtype: str, size: Sequence[int], components: int) -> npt.NDArray[Any]:
-    kinds = {"f4": np.float32, "f2": np.float16, "u4": np.uint32, "f1": np.uint8}
-    flat = np.frombuffer(memoryview(np.ascontiguousarray(data)).cast("B"), kinds[dtype])
+    kinds: dict[str, Any] = {"f4": np.float32, "f2": np.float16, "u4": np.uint32, "f1": np.uint8}
+    flat: npt.NDArray[Any] = np.frombuffer(_bytes_of(data), kinds[dtype])
     return flat.reshape(*tuple(size)[::-1], components).copy()
 
 
@@ -188,7 +189,7 @@ class RecordedFramebuffer:
     @property
     def part(self) -> tuple[int, int, int, int] | None:
         """Viewport, unless it is all."""
-        return None if tuple(self.viewport) == self._whole else tuple(self.viewport)  # type: ignore[return-value]
+        return None if tuple(self.viewport) == self._whole else tuple(self.viewport)
 
     def clear(
         self, red: float = 0.0, green: float = 0.0, blue: float = 0.0, alpha: float = 0.0, depth: float = 1.0
@@ -259,8 +260,3 @@ class RecordedMeshes:
 
     def release(self) -> None:
         """Do nothing."""
-
-
-def block_names(blocks: dict[str, UniformBlock]) -> dict[int, str]:
-    """Names of blocks by their binding points."""
-    return {block.binding: name for name, block in blocks.items()}

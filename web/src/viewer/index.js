@@ -13,6 +13,9 @@ const SLOW = 60, FAST = 18;
 const MOST_PIXELS = 2560;
 const REST = 140;
 
+/** Milliseconds that one sample of a still picture may take; else it has fewer pixels. */
+const LONGEST = 4000;
+
 /**
  * Show a scene in an element.
  *
@@ -40,6 +43,7 @@ export class Viewer {
     this.stops = page.exposure;
     this.scale = 1;
     this.most = 1;
+    this.previews = 0;
     this.panel = new Panel(this, element, options);
     this.canvas = this.panel.canvas;
     this.ready = this.#begin();
@@ -75,6 +79,7 @@ export class Viewer {
   }
 
   #start() {
+    this.previews = 0;
     this.player = new Player(this.gl, this.page, this.meshes, this.options.half);
     this.presenter = new Presenter(this.gl, this.page);
     const { caps } = this.player;
@@ -136,9 +141,19 @@ export class Viewer {
       this.#schedule();
       return;
     }
+    if (this.previews < 2) {
+      // Small at first: it is soon there, and the second one, when all is compiled, tells what a large one would take.
+      this.scale = SCALES.at(-1);
+      this.#moving();
+      this.previews++;
+      this.#schedule();
+      return;
+    }
     if (this.done < 0) {
+      const most = Math.min(this.most, Math.max(SCALES.at(-1), Math.sqrt(LONGEST / (this.rate * this.full[0] * this.full[1]))));
       const begun = performance.now();
-      this.#draw(this.#size(this.most), null);
+      this.still_scale = most;
+      this.#draw(this.#size(most), null);
       this.#present("radiance", this.stops);
       this.player.finish();
       this.cost = performance.now() - begun;
@@ -152,7 +167,7 @@ export class Viewer {
     if (this.done < this.page.samples && this.shown === "picture") {
       const begun = performance.now();
       do {
-        this.#draw(this.#size(this.most), this.done);
+        this.#draw(this.#size(this.still_scale), this.done);
         this.done++;
         if (this.cost > 12) this.player.finish();
       } while (this.done < this.page.samples && performance.now() - begun + this.cost < 24);
@@ -172,6 +187,7 @@ export class Viewer {
     this.#present("radiance", this.stops);
     this.player.finish();
     const took = performance.now() - begun;
+    this.rate = took / (this.size[0] * this.size[1]);
     const at = SCALES.indexOf(this.scale);
     if (took > SLOW && at < SCALES.length - 1) this.scale = SCALES[at + 1];
     if (took < FAST && at > 0) this.scale = SCALES[at - 1];

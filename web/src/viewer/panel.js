@@ -28,6 +28,8 @@ h1 { margin: 0; font-size: 14px; font-weight: 600; color: #f0f1f3; overflow-wrap
 .group > label, .group > .name { color: #9ea2a9; }
 .row { display: flex; gap: 6px; align-items: center; min-width: 0; }
 .row > * { min-width: 0; }
+.row > span { flex: none; }
+#unit { width: 58px; flex: none; padding: 0 2px; }
 input[type="number"], select { width: 100%; height: 28px; padding: 0 7px; background: #242629; border: 1px solid #34373c; border-radius: 5px; }
 input[type="color"] { width: 40px; height: 28px; flex: none; padding: 2px; background: #242629; border: 1px solid #34373c; border-radius: 5px; cursor: pointer; }
 input[type="range"] { flex: 1; min-width: 0; height: 28px; accent-color: #7fb0ea; cursor: pointer; }
@@ -264,7 +266,8 @@ export class Panel {
     const { samples } = this.viewer.page;
     const share = this.viewer.shown === "picture" ? done / samples : 1;
     this.$(".busy").style.transform = `scaleX(${share < 1 ? share : 0})`;
-    this.$(".quality").textContent = share < 1 ? `${done} of ${samples} samples` : "";
+    const small = this.viewer.still_scale < 0.99 ? `${Math.round(100 * this.viewer.still_scale)} % of the pixels across` : "";
+    this.$(".quality").textContent = [share < 1 ? `${done} of ${samples} samples` : "", small].filter(Boolean).join(", ");
     this.#probe();
   }
 
