@@ -124,7 +124,8 @@ VARIANTS = """({ ball, camera, size }) => tools.withRenderer(size, (renderer) =>
     places.forEach((place, i) => instanced.setMatrixAt(i, place));
 
     const larger = tools.geometry(ball);
-    larger.morphAttributes.position = [larger.getAttribute("position").clone().applyMatrix4(new THREE.Matrix4().makeScale(3, 3, 3))];
+    const three_times = new THREE.Matrix4().makeScale(3, 3, 3);
+    larger.morphAttributes.position = [larger.getAttribute("position").clone().applyMatrix4(three_times)];
     const morphed = new THREE.Mesh(larger, new THREE.MeshBasicMaterial());
     morphed.morphTargetInfluences[0] = 0.25;
     const scaled = tools.mesh(ball);
@@ -132,8 +133,9 @@ VARIANTS = """({ ball, camera, size }) => tools.withRenderer(size, (renderer) =>
 
     const rigged = tools.geometry(ball);
     const n = rigged.getAttribute("position").count;
+    const weights = Float32Array.from({ length: 4 * n }, (_, i) => (i % 4 ? 0 : 1));
     rigged.setAttribute("skinIndex", new THREE.Uint16BufferAttribute(new Uint16Array(4 * n), 4));
-    rigged.setAttribute("skinWeight", new THREE.Float32BufferAttribute(Float32Array.from({ length: 4 * n }, (_, i) => +(i % 4 === 0)), 4));
+    rigged.setAttribute("skinWeight", new THREE.Float32BufferAttribute(weights, 4));
     const skinned = new THREE.SkinnedMesh(rigged, new THREE.MeshBasicMaterial());
     const bone = new THREE.Bone();
     skinned.add(bone);
@@ -259,7 +261,8 @@ LIFE = """({ ball, camera, size }) => tools.withRenderer(size, (renderer) => {
     scene.add(body, wall);
     renderer.render(scene, tools.camera(camera));
     const { memory, programs } = renderer.info;
-    const state = () => ({ ...memory, programs: programs.length, target: renderer.getRenderTarget(), clear: renderer.autoClear });
+    const settings = () => ({ target: renderer.getRenderTarget(), clear: renderer.autoClear });
+    const state = () => ({ ...memory, programs: programs.length, ...settings() });
     const before = state();
     const pass = new ExactThicknessPass(renderer, { bodies: [body], exits: true });
     pass.render(scene, tools.camera(camera));
@@ -285,7 +288,8 @@ def test_it_follows_the_canvas_and_frees_all_that_it_made(three_page: WebPage) -
 REFUSED = """() => tools.withRenderer([16, 16], (renderer) => {
     const { THREE, ExactThicknessPass } = translucentThree;
     const told = (use) => { try { use(); } catch (error) { return error.message; } };
-    const measure = (body) => told(() => new ExactThicknessPass(renderer, { bodies: [body] }).render(body, new THREE.PerspectiveCamera()));
+    const camera = new THREE.PerspectiveCamera();
+    const measure = (body) => told(() => new ExactThicknessPass(renderer, { bodies: [body] }).render(body, camera));
     const points = new THREE.Points(new THREE.BufferGeometry());
     points.name = "stars";
     return {
