@@ -18,6 +18,7 @@ EXTRAS = {
     "markupsafe": "report",
     "matplotlib": "report",
     "tomli_w": "ui",
+    "traitlets": "notebook",
     "xatlas": "bake",
 }
 

@@ -23,8 +23,8 @@ from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
 
-anywidget = require_package("anywidget", "tl.view")
-traitlets = require_package("traitlets", "tl.view")
+Widget: Any = require_package("anywidget", "tl.view").AnyWidget
+traitlets: Any = require_package("traitlets", "tl.view")
 
 Json = dict[str, Any]
 
@@ -34,7 +34,7 @@ MAX_IOR = 3.0
 _FLAT = ("color", "distance", "ior", "roughness")
 
 
-class SceneView(anywidget.AnyWidget):  # type: ignore[misc]
+class SceneView(Widget):  # type: ignore[misc]
     """Viewer of a scene in a notebook, from `translucent.view`.
 
     Attributes
