@@ -219,7 +219,10 @@ def test_a_medium_that_the_viewer_keeps_is_told(script: Path, data: bytes, monke
     milk = tl.Object(mesh, medium=tl.Medium(absorption=1, scattering=50), transform=moved)
     view = tl.view(tl.Scene([tl.Object(mesh, medium=WINE), milk], tl.Camera.look_at((0, 0, 1), (0, 0, 0))), SIZE)
     view.color = "#7b1e3a"
+    assert view._media[0] != told[0]
+    assert view._media[1] == told[1]
     view.medium = 1
+    assert view.color == to_hex(tl.Medium(absorption=51).transmittance(0.01))
     with pytest.raises(tl.InputError, match=r"medium 1 of a view; This medium scatters light"):
         view.color = "#7b1e3a"
     view.close()

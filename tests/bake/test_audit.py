@@ -135,11 +135,17 @@ def test_a_shell_that_is_taken_for_a_solid(tmp_path: Path) -> None:
     found = tl.check_materials(model(tmp_path / "shell.glb", 0.02, shell)).findings
     assert [(one.severity, one.code) for one in found] == [("error", "shell-as-solid")]
     assert "walls of 0.000988" in found[0].text
-    assert codes(model(tmp_path / "right.glb", 0.001, shell)) == set()
+    right = tl.check_materials(model(tmp_path / "right.glb", 0.001, shell))
+    assert right.findings == ()
+    # Along a view that passes the center at s radii: both walls, and only those views that come from outside.
+    s2 = (np.arange(10000) + 0.5) / 10000
+    chords = np.sqrt(1 - s2) - np.sqrt(np.maximum(0.81 - s2, 0))
+    assert right.bodies[0]["along_views"]["median"] == pytest.approx(0.02 * np.median(chords), rel=SAGITTA + 0.05)
+    assert right.bodies[0]["along_views"]["p95"] == pytest.approx(0.02 * np.percentile(chords, 95), rel=0.05)
 
 
 def textured(path: Path, image: np.ndarray) -> Path:
-    """A slim box, thick along x, with a thickness texture over (x, 0)."""
+    """A slim wedge that thickens along x, with a thickness texture whose rows go from thin to thick."""
     import io
 
     from PIL import Image
@@ -149,7 +155,7 @@ def textured(path: Path, image: np.ndarray) -> Path:
         box.vertices * np.column_stack([np.ones(8), *[1 + box.vertices[:, 0] * 1.8] * 2]), box.faces
     )
     wedge = wedge.subdivide().subdivide().subdivide()
-    uv = np.column_stack([wedge.vertices[:, 0] + 0.5, np.full(len(wedge.vertices), 0.5)])
+    uv = np.column_stack([np.full(len(wedge.vertices), 0.5), wedge.vertices[:, 0] + 0.5])  # v downwards
     writer, stream = Writer(), io.BytesIO()
     Image.fromarray(image).save(stream, format="PNG")
     view = writer.view(stream.getvalue())
@@ -165,12 +171,12 @@ def textured(path: Path, image: np.ndarray) -> Path:
 
 
 def test_an_inverted_map_is_told_from_a_right_one(tmp_path: Path) -> None:
-    ramp = np.zeros((4, 256, 3), np.uint8)
-    ramp[..., 1] = np.linspace(20, 240, 256)
+    ramp = np.zeros((256, 4, 3), np.uint8)
+    ramp[..., 1] = np.linspace(20, 240, 256)[:, None]
     assert codes(textured(tmp_path / "right.glb", ramp)) == set()
-    assert "thickness-map-inverted" in codes(textured(tmp_path / "inverted.glb", ramp[:, ::-1]))
+    assert "thickness-map-inverted" in codes(textured(tmp_path / "inverted.glb", ramp[::-1]))
     half = ramp.copy()
-    half[:, 128:] = 0
+    half[128:] = 0
     assert "thickness-map-empty" in codes(textured(tmp_path / "empty.glb", half))
     red = ramp[..., [1, 0, 2]]  # only G counts
     assert "thickness-map-empty" in codes(textured(tmp_path / "red.glb", red))
@@ -268,6 +274,16 @@ def test_bodies_that_share_space(tmp_path: Path, away: float, code: str | None) 
     writer.add("nodes", mesh=0, name="Outer")
     writer.add("nodes", mesh=1, name="Inner", translation=[away, 0, 0])
     assert codes(writer.save(tmp_path / "two.glb")) == ({code} if code else set())
+
+
+def test_what_takes_too_long_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("translucent.bake.audit.mesh_rules.MOST_WORK", 1000)
+    writer = Writer()
+    material = writer.material(pbrMetallicRoughness=MATT, extensions=SOUND)
+    writer.mesh(writer.primitive(BALL, material=material))
+    for away in (0.0, 0.012):
+        writer.add("nodes", mesh=0, translation=[away, 0, 0])
+    assert codes(writer.save(tmp_path / "two.glb")) == {"overlap-unchecked"}
 
 
 def test_a_body_in_two_primitives_is_one(tmp_path: Path) -> None:

@@ -19,8 +19,8 @@ from translucent.gltf.scene_media import primitives
 #: Share of rays without an exit from which on a hole is an error.
 LEAKS = 0.02
 
-#: Pairs of bodies whose boxes meet that are looked at, and points of each.
-MOST_PAIRS, POINTS = 200, 48
+#: Points of each of two bodies whose boxes meet, and most winding numbers, times triangles, that are worked out.
+POINTS, MOST_WORK = 48, 5e7
 
 #: Winding numbers between these are those of points on a surface; shares of points that make bodies cross.
 ON_SURFACE, CROSSING = (0.2, 0.8), 0.05
@@ -71,16 +71,23 @@ def overlap_findings(bodies: Sequence[Body]) -> Iterator[MaterialFinding]:
     placed = [(body, one) for body in bodies if body.material.thickness > 0 for one in body.placements]
     vertices = [body.placed(one) for body, one in placed]
     boxes = [(points.min(axis=0), points.max(axis=0)) for points in vertices]
-    looked = 0
+    work = 0.0
     for i, j in combinations(range(len(placed)), 2):
         if (boxes[i][0] >= boxes[j][1]).any() or (boxes[i][1] <= boxes[j][0]).any():
             continue
         if placed[i][0].mesh is placed[j][0].mesh and placed[i][1] is placed[j][1]:
             continue  # primitives that bound one body
-        looked += 1
-        if looked > MOST_PAIRS:
+        work += POINTS * (len(placed[i][0].mesh.faces) + len(placed[j][0].mesh.faces))
+        if work > MOST_WORK:
+            yield _unchecked(placed[i][0])
             return
         yield from _pair(*placed[i], *placed[j])
+
+
+def _unchecked(body: Body) -> MaterialFinding:
+    text = "many or large bodies are near each other: whether the later ones cross was not looked at"
+    do = "check them in parts, if it matters"
+    return MaterialFinding("note", "overlap-unchecked", body.where, text, do, body.material.index, body.key)
 
 
 def _pair(one: Body, at: Placement, other: Body, there: Placement) -> Iterator[MaterialFinding]:

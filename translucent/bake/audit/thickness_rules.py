@@ -145,7 +145,7 @@ def _compared(body: Body, stated: float, ratio: float) -> str:
 
 def _advice(body: Body, code: str, low: float, high: float) -> str:
     span = f"{low:.3g}" if high < 1.05 * low else f"{low:.3g} to {high:.3g}"
-    do = f"write thicknessFactor {span} (--fix bakes a map)"
+    do = f"write thicknessFactor {span}" + (" (--fix bakes a map)" if body.mesh.diagnosis.closed else "")
     if code == "thickness-too-small":
         return f"{do}; if a hollow body is meant, its mesh lacks the inner surface, and ray tracers fill it"
     return do
