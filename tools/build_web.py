@@ -14,6 +14,9 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import trimesh
+
+from translucent.assets import mesh_path
 from translucent.errors import InputError
 from translucent.gpu.balance import COVERAGE_FLOOR, OPEN_WEIGHTS, ROUNDING
 from translucent.gpu.constants import CONSTANTS
@@ -28,6 +31,7 @@ STAMP = WEB / "node_modules" / ".package-lock.sha256"
 #: What web/src imports from generated/shaders.ts: a shader with its switches decided.
 SHADERS: dict[str, tuple[str, dict[str, int]]] = {
     "bodyVertex": ("geometry/body.vert", {"WITH_NORMAL": 0, "WITH_POSITION": 0}),
+    "bodyVertexWithNormal": ("geometry/body.vert", {"WITH_NORMAL": 1, "WITH_POSITION": 0}),
     "signedDepth": ("thickness/signed_depth.frag", {"OPAQUE": 0, "SPECTRAL": 0}),
     "signedDepthBeforeOpaque": ("thickness/signed_depth.frag", {"OPAQUE": 1, "SPECTRAL": 0}),
     "spectralDepth": ("thickness/signed_depth.frag", {"OPAQUE": 0, "SPECTRAL": 1}),
@@ -36,6 +40,7 @@ SHADERS: dict[str, tuple[str, dict[str, int]]] = {
         "shade/opaque.frag",
         {"DEPTH_ONLY": 1, "SURFACE": 0, "LIGHT_MAP": 0, "SHADOW_MAPS": 0},
     ),
+    "recentered": ("thickness/recentered.glsl", {}),
     "thickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 0}),
     "spectralThickness": ("thickness/signed_thickness.frag", {"SPECTRAL": 1}),
 }
@@ -83,10 +88,12 @@ def generate() -> None:
 
 
 def library() -> str:
-    """The functions of the library, each once."""
+    """The functions of the library, each once, called tl_NAME: three.js has an `opacity` of its own."""
     texts = [for_three(lift(file, {}, "webgl2").text) for file in LIBRARY]
     parts = [part for text in texts for part in re.split(r"(?<=^}\n)|(?=^#)", text, flags=re.M) if part]
-    return "".join(dict.fromkeys(parts))
+    text = "".join(part for part in dict.fromkeys(parts) if not part.startswith("#define PI "))
+    names = re.findall(r"^\w+ (\w+)\(", text, flags=re.M)
+    return re.sub(rf"\b({'|'.join(names)})\b(?=\()", r"tl_\1", text)
 
 
 def _write(path: Path, text: str) -> None:
@@ -101,6 +108,13 @@ def install() -> None:
     if not STAMP.is_file() or STAMP.read_text(encoding="utf-8") != lock:
         _run("npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
         STAMP.write_text(lock, encoding="utf-8")
+
+
+def write_example() -> None:
+    """The model of the example page, which has no other."""
+    path = WEB / "dist" / "knot.glb"
+    if not path.is_file():
+        path.write_bytes(trimesh.load_mesh(mesh_path("knot")).export(file_type="glb", include_normals=True))
 
 
 def _run(*command: str) -> None:
@@ -128,6 +142,7 @@ def main() -> None:
                 return print(f"web/dist is not built, so that tests in a browser may skip: {error}")
             raise
         _run("node", "build.mjs")
+        write_example()
         if arguments.types:
             _run("npx", "tsc", "-p", ".")
     except InputError as error:

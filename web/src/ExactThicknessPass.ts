@@ -16,13 +16,14 @@ import {
   Vector3,
   WebGLRenderTarget,
 } from "three";
-import type { Color, Material, Object3D, Texture, WebGLRenderer } from "three";
+import type { Material, Object3D, Texture, WebGLRenderer } from "three";
 import { StandIn, checkBody, visibleMeshes } from "./bodies.js";
 import { TranslucentError } from "./errors.js";
+import { extinctionOf } from "./extinction.js";
 import { COVERAGE_FLOOR, NOTHING, OPEN_WEIGHTS, ROUNDING } from "./generated/shaders.js";
 import { expectedCount, place, seesFrom } from "./placement.js";
 import type { DepthRange, View } from "./placement.js";
-import { nearest, resolveUniforms, resolving, summing } from "./programs.js";
+import { last, nearest, resolveUniforms, resolving, summing } from "./programs.js";
 import { isClosed } from "./topology.js";
 
 /** Numbers that paths are added up in. */
@@ -39,6 +40,8 @@ export interface ExactThicknessOptions {
   precision?: Precision;
   /** Optical depth per channel beside the metres: where media differ ("auto"), always, or never. */
   opticalDepth?: "auto" | boolean;
+  /** Where rays leave bodies, for materials that bend them: where one has an ior above 1 ("auto"), always, or never. */
+  exits?: "auto" | boolean;
 }
 
 /** What `read` gives; row 0 is the top one. */
@@ -69,8 +72,11 @@ const LARGEST_16 = 65504;
 export class ExactThicknessPass {
   readonly renderer: WebGLRenderer;
   options: ExactThicknessOptions;
+  /** Of the box around all bodies at the last `render`, in metres. */
+  diagonal = 1;
   private standIns = new Map<Mesh, StandIn>();
   private sums: WebGLRenderTarget | null = null;
+  private last: WebGLRenderTarget | null = null;
   private ends: WebGLRenderTarget | null = null;
   private result: WebGLRenderTarget | null = null;
   private readonly resolve = resolveUniforms();
@@ -123,6 +129,11 @@ export class ExactThicknessPass {
     return this.ends?.texture ?? null;
   }
 
+  /** Last surface of bodies on each ray: its normal in the world (rgb), metres along the camera's axis (a); 0 where none is. */
+  get exits(): Texture | null {
+    return this.last?.texture ?? null;
+  }
+
   /** Measure what a camera sees of a scene. False, with nothing drawn, while the context is lost. */
   render(scene: Object3D, camera: Camera): boolean {
     const { renderer } = this;
@@ -131,7 +142,9 @@ export class ExactThicknessPass {
     if (scene.matrixWorldAutoUpdate) scene.updateMatrixWorld();
     if (camera.parent === null && camera.matrixWorldAutoUpdate) camera.updateMatrixWorld();
     const [bodies, opaque] = this.sort(scene, camera);
-    const view = seesFrom(camera);
+    const [width, height] = this.size();
+    const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
+    const view = seesFrom(camera, width, height, subpixel);
     const media = new Box3();
     for (const one of bodies) {
       one.measure();
@@ -139,14 +152,16 @@ export class ExactThicknessPass {
     }
     for (const one of opaque) one.measure();
     const spectral = this.isSpectral(bodies);
-    this.prepare(spectral, opaque.length > 0);
+    const bending = this.options.exits ?? "auto";
+    const exits = bending === "auto" ? bodies.some((one) => bends(one.mesh)) : bending;
+    this.prepare(width, height, spectral, opaque.length > 0, exits);
 
     const diagonal = media.isEmpty() ? 1 : Math.max(media.getSize(new Vector3()).length(), Number.MIN_VALUE);
+    this.diagonal = diagonal;
     const range = view.range(media);
-    const subpixel = 0.5 ** (gl.getParameter(gl.SUBPIXEL_BITS) as number);
     const saved = this.save();
     try {
-      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one)), this.nothing);
+      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one)), [this.nothing, 0, 0, 0]);
       const expected = [0, 0];
       const sound = bodies.every((one) => isClosed(one.mesh.geometry));
       let open = 0;
@@ -157,15 +172,16 @@ export class ExactThicknessPass {
         expected[1] += weight * most;
         const { uniforms } = one;
         uniforms.count_weight.value = weight;
-        uniforms.snapping_share.value = sound && this.precision === "float32" ? subpixel / diagonal : 0;
+        uniforms.snapping_share.value = sound && this.precision === "float32" ? 1 / diagonal : 0;
         uniforms.opaque_axial_depth.value = this.ends?.texture ?? null;
         setExtinction(one, diagonal);
         const blocked = this.ends !== null;
         const key = `sum ${spectral} ${blocked} ${one.instanced !== null}`;
         return one.use(key, () => summing(uniforms, spectral, blocked, one.instanced !== null));
       });
-      this.draw(this.sums!, meshes, 0);
-      this.finish(view, spectral, diagonal, expected);
+      this.draw(this.sums!, meshes, [0, 0, 0, 0]);
+      if (this.last) this.leave(bodies);
+      this.finish(view, media, spectral, diagonal, expected);
     } finally {
       this.restore(saved);
     }
@@ -197,6 +213,15 @@ export class ExactThicknessPass {
     return found;
   }
 
+  /** Metres inside bodies at a pixel of the last `render`, from the top left; null where there is no number to trust. */
+  at(x: number, y: number): number | null {
+    if (!this.result) return null;
+    const texel = new Float32Array(4);
+    const up = this.result.height - 1 - Math.floor(y);
+    this.renderer.readRenderTargetPixels(this.result, Math.floor(x), up, 1, 1, texel);
+    return texel[2] > 0 ? texel[0] : null;
+  }
+
   /** Free all that is on the graphics card; the pass may be used again. */
   dispose(): void {
     for (const one of this.standIns.values()) one.dispose();
@@ -206,8 +231,8 @@ export class ExactThicknessPass {
       delete this.resolvers[key];
     }
     this.screen.geometry.dispose();
-    for (const target of [this.sums, this.ends, this.result]) target?.dispose();
-    this.sums = this.ends = this.result = null;
+    for (const target of [this.sums, this.ends, this.last, this.result]) target?.dispose();
+    this.sums = this.ends = this.last = this.result = null;
     this.layout = "";
   }
 
@@ -237,7 +262,7 @@ export class ExactThicknessPass {
   private isSpectral(bodies: StandIn[]): boolean {
     const asked = this.options.opticalDepth ?? "auto";
     if (asked !== "auto") return asked;
-    const media = new Set(bodies.map((one) => extinctionOf(one.mesh).join()));
+    const media = new Set(bodies.map((one) => extinctionOf(materials(one.mesh)[0]).join()));
     return media.size > 1;
   }
 
@@ -266,14 +291,17 @@ export class ExactThicknessPass {
     });
   }
 
-  /** Make the targets, where they are not there yet in this size. */
-  private prepare(spectral: boolean, opaque: boolean): void {
+  private size(): number[] {
     const size = this.options.size ?? this.renderer.getDrawingBufferSize(new Vector2()).toArray();
-    const [width, height] = size.map((n) => Math.max(1, Math.floor(n)));
+    return size.map((n) => Math.max(1, Math.floor(n)));
+  }
+
+  /** Make the targets, where they are not there yet in this size. */
+  private prepare(width: number, height: number, spectral: boolean, opaque: boolean, exits: boolean): void {
     const type = this.precision === "float32" ? FloatType : HalfFloatType;
-    const layout = [width, height, type, spectral, opaque].join();
+    const layout = [width, height, type, spectral, opaque, exits].join();
     if (layout === this.layout) return;
-    for (const target of [this.sums, this.ends, this.result]) target?.dispose();
+    for (const target of [this.sums, this.ends, this.last, this.result]) target?.dispose();
     const common = {
       depthBuffer: false,
       stencilBuffer: false,
@@ -286,13 +314,26 @@ export class ExactThicknessPass {
     if (spectral) this.sums.textures[1].format = RedFormat;
     this.ends = opaque ? new WebGLRenderTarget(width, height, { ...common, type, format: RedFormat }) : null;
     const precise = this.renderer.extensions.has("EXT_color_buffer_float") ? FloatType : HalfFloatType;
+    const filled = { ...common, depthBuffer: true, type: precise, format: RGBAFormat };
+    this.last = exits ? new WebGLRenderTarget(width, height, filled) : null;
     this.result = new WebGLRenderTarget(width, height, { ...common, type: precise, format: RGBAFormat, count });
     this.result.textures[0].name = "thickness";
     this.layout = layout;
   }
 
+  /** Where rays leave the bodies. */
+  private leave(bodies: StandIn[]): void {
+    const { buffers } = this.renderer.state;
+    const reversed = buffers.depth.getReversed();
+    const leaving = (one: StandIn): Mesh => {
+      const instanced = one.instanced !== null;
+      return one.use(`exit ${instanced} ${reversed}`, () => last(one.uniforms, instanced, reversed));
+    };
+    this.draw(this.last!, bodies.map(leaving), [0, 0, 0, 0], reversed ? 1 : 0);
+  }
+
   /** Sums to metres. */
-  private finish(view: View, spectral: boolean, diagonal: number, expected: number[]): void {
+  private finish(view: View, media: Box3, spectral: boolean, diagonal: number, expected: number[]): void {
     const { resolve, sums, result } = this;
     const precise = this.precision === "float32";
     resolve.accumulated.value = sums!.textures[0];
@@ -305,17 +346,30 @@ export class ExactThicknessPass {
     resolve.coverage_floor.value = (precise ? COVERAGE_FLOOR : ROUNDING_16) * diagonal;
     this.resolvers[String(spectral)] ??= resolving(resolve, spectral);
     this.screen.material = this.resolvers[String(spectral)];
+    // Where no body is, no number has to be found.
+    const everywhere = expected[0] !== 0 || expected[1] !== 0;
+    const [x, y, w, h] = everywhere ? [0, 0, result!.width, result!.height] : view.rectangle(media);
+    this.draw(result!, [], [0, 0, 1, 0]);
+    if (w <= 0 || h <= 0) return;
+    result!.scissor.set(x, y, w, h);
+    result!.scissorTest = true;
     this.draw(result!, [this.screen], null);
+    result!.scissorTest = false;
   }
 
-  private draw(target: WebGLRenderTarget, meshes: Mesh[], cleared: number | null): void {
+  private draw(target: WebGLRenderTarget, meshes: Mesh[], cleared: number[] | null, depth?: number): void {
     const { renderer, stage } = this;
     renderer.setRenderTarget(target);
     if (cleared !== null) {
       renderer.state.buffers.color.setMask(true);
       const gl = renderer.getContext() as WebGL2RenderingContext;
-      target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, [cleared, cleared, cleared, cleared]));
+      target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, i ? [0, 0, 0, 0] : cleared));
     }
+    if (depth !== undefined) {
+      renderer.state.buffers.depth.setMask(true);
+      (renderer.getContext() as WebGL2RenderingContext).clearBufferfv(0x1801, 0, [depth]); // gl.DEPTH
+    }
+    if (!meshes.length) return;
     stage.children = meshes; // none of them is anybody else's child
     renderer.render(stage, this.eye);
     stage.children = [];
@@ -346,21 +400,14 @@ export class ExactThicknessPass {
   }
 }
 
-/** Extinction of a mesh's medium in 1/m: what its material's attenuation says. */
-export function extinctionOf(mesh: Mesh): [number, number, number] {
-  const material = (Array.isArray(mesh.material) ? mesh.material[0] : mesh.material) as {
-    attenuationColor?: Color;
-    attenuationDistance?: number;
-  };
-  const { attenuationColor: color, attenuationDistance: distance = Infinity } = material;
-  if (!color || distance === Infinity) return [0, 0, 0];
-  return [color.r, color.g, color.b].map((c) => -Math.log(Math.min(c, 1)) / distance + 0) as [number, number, number];
-}
-
 /** Denser than this is opaque anyway, and its products stay finite. */
 function setExtinction(one: StandIn, diagonal: number): void {
-  const [r, g, b] = extinctionOf(one.mesh).map((sigma) => Math.min(sigma, NOTHING / diagonal));
+  const [r, g, b] = extinctionOf(materials(one.mesh)[0]).map((sigma) => Math.min(sigma, NOTHING / diagonal));
   one.uniforms.extinction.value.set(r, g, b, 0);
+}
+
+function bends(mesh: Mesh): boolean {
+  return materials(mesh).some((one) => ((one as { ior?: number }).ior ?? 1) > 1);
 }
 
 function below(roots: Object3D[], camera: Camera): Mesh[] {

@@ -12,7 +12,7 @@ export class StandIn {
   readonly worldBox = new Box3();
   private drawn: Mesh | null = null;
   private geometry: BufferGeometry | null = null;
-  private material: { key: string; made: Material } | null = null;
+  private readonly made = new Map<string, Material>();
 
   constructor(readonly mesh: Mesh) {}
 
@@ -43,12 +43,10 @@ export class StandIn {
 
   /** The stand-in, with this material; it is made once for each `key`. */
   use(key: string, make: () => Material): Mesh {
-    if (this.material?.key !== key) {
-      this.material?.made.dispose();
-      this.material = { key, made: make() };
-    }
     const standIn = this.object();
-    standIn.material = this.material.made;
+    const material = this.made.get(key) ?? make();
+    this.made.set(key, material);
+    standIn.material = material;
     return standIn;
   }
 
@@ -81,8 +79,8 @@ export class StandIn {
   }
 
   dispose(): void {
-    this.material?.made.dispose();
-    this.material = null;
+    for (const material of this.made.values()) material.dispose();
+    this.made.clear();
     this.drawn = null;
   }
 }

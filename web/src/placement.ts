@@ -1,9 +1,10 @@
 /** Where bodies are before a camera: in float64, rounded to float32 only relative to each body's center. */
-import { Box3, Matrix4, Vector3, Vector4 } from "three";
+import { Box3, Matrix4, Vector2, Vector3, Vector4 } from "three";
 import type { Camera } from "three";
 import { sumOfInstances } from "./bodies.js";
 import type { StandIn } from "./bodies.js";
 import { NEAR_SURFACE, NOTHING } from "./generated/shaders.js";
+import type { BodyUniforms } from "./programs.js";
 import { isClosed, windingNumber } from "./topology.js";
 
 /** Distances along the camera's axis that media span. */
@@ -16,15 +17,22 @@ export interface DepthRange {
 export interface View {
   camera: Camera;
   orthographic: boolean;
+  /** Pixels of the picture. */
+  width: number;
+  height: number;
+  /** Step of the grid onto which the rasterizer moves vertices, in pixels. */
+  subpixel: number;
   /** Metres ahead of the camera at which rays start. */
   start: number;
   eye: Vector3;
   range(box: Box3): DepthRange;
+  /** Left, bottom, width and height of a box in the picture, in pixels. */
+  rectangle(box: Box3): [number, number, number, number];
   /** Rays of pixels, which advance 1 m along the camera's axis. */
   setRays(right: Vector4, up: Vector4, forward: Vector4): void;
 }
 
-export function seesFrom(camera: Camera): View {
+export function seesFrom(camera: Camera, width: number, height: number, subpixel: number): View {
   const p = camera.projectionMatrix.elements;
   const orthographic = p[15] === 1;
   const start = orthographic ? ((camera as { near?: number }).near ?? 0) : 0;
@@ -32,6 +40,9 @@ export function seesFrom(camera: Camera): View {
   return {
     camera,
     orthographic,
+    width,
+    height,
+    subpixel,
     start,
     eye: new Vector3().setFromMatrixPosition(camera.matrixWorld),
     range(box) {
@@ -45,6 +56,23 @@ export function seesFrom(camera: Camera): View {
       }
       near = Math.max(near, start);
       return { near, length: Math.max(far, start) - near || 1 };
+    },
+    rectangle(box) {
+      const whole: [number, number, number, number] = [0, 0, width, height];
+      const [least, most] = [new Vector2(Infinity, Infinity), new Vector2(-Infinity, -Infinity)];
+      for (let i = 0; i < 8; i++) {
+        corner.set((i & 1 ? box.max : box.min).x, (i & 2 ? box.max : box.min).y, (i & 4 ? box.max : box.min).z);
+        corner.applyMatrix4(camera.matrixWorldInverse);
+        if (!orthographic && !(corner.z < 0)) return whole;
+        corner.applyMatrix4(camera.projectionMatrix);
+        const pixel = new Vector2((corner.x + 1) * (width / 2), (corner.y + 1) * (height / 2));
+        least.min(pixel);
+        most.max(pixel);
+      }
+      if (![least.x, least.y, most.x, most.y].every(Number.isFinite)) return box.isEmpty() ? [0, 0, 0, 0] : whole;
+      const [left, bottom] = [Math.max(Math.floor(least.x) - 1, 0), Math.max(Math.floor(least.y) - 1, 0)];
+      const [right, top] = [Math.min(Math.ceil(most.x) + 1, width), Math.min(Math.ceil(most.y) + 1, height)];
+      return [left, bottom, right - left, top - bottom];
     },
     setRays(right, up, forward) {
       right.set(orthographic ? 0 : 1 / p[0], 0, 0, 0);
@@ -72,9 +100,26 @@ export function place(one: StandIn, view: View, range: DepthRange): void {
   const e = viewFromOffset.elements;
   const cut = isCut(one, view);
   uniforms.axis.value.set(-e[2], -e[6], -e[10], cut ? -e[14] : 0);
+  setAnchor(uniforms, view, [clip[12], clip[13]], -e[14], cut);
   uniforms.axial_start.value = view.orthographic && cut ? view.start : -NOTHING;
+  uniforms.ahead.value = cut ? 0 : -e[14];
+  uniforms.world_from_normal.value.copy(mesh.matrixWorld).invert().transpose();
   uniforms.axial_depth_scale.value = 1 / range.length;
   uniforms.axial_depth_start.value = ((cut ? 0 : -e[14]) - range.near) / range.length;
+}
+
+/** Where in the picture places count from: the center of the body, or of the picture if that has no place. */
+function setAnchor(uniforms: BodyUniforms, view: View, clip: [number, number], ahead: number, cut: boolean): void {
+  const { orthographic, width, height } = view;
+  const weight = orthographic || cut ? 1 : ahead;
+  const [x, y] = cut && !orthographic ? [0, 0] : clip.map((c) => c / weight);
+  const [right, up] = [(x + 1) * (width / 2), (y + 1) * (height / 2)];
+  uniforms.anchor_pixel.value.set(Math.fround(right), Math.fround(up));
+  uniforms.anchor_rest.value.set(right - Math.fround(right), up - Math.fround(up));
+  uniforms.anchor_slope.value.set(orthographic ? 0 : x, orthographic ? 0 : y);
+  uniforms.across_start.value.set(cut && !orthographic ? clip[0] : 0, cut && !orthographic ? clip[1] : 0);
+  uniforms.subpixel.value = view.subpixel;
+  uniforms.half_size.value.set(width / 2, height / 2);
 }
 
 /** Whether rays may start within the bounds of a body: distances then count from there. */

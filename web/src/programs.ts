@@ -3,6 +3,7 @@ import {
   AddEquation,
   CustomBlending,
   DoubleSide,
+  GreaterDepth,
   GLSL3,
   Matrix4,
   MinEquation,
@@ -16,29 +17,52 @@ import {
 import type { BlendingEquation, IUniform, Texture } from "three";
 import * as generated from "./generated/shaders.js";
 
+const NORMALS = `
+  #include <beginnormal_vertex>
+  #include <morphinstance_vertex>
+  #include <morphnormal_vertex>
+  #include <skinbase_vertex>
+  #include <skinnormal_vertex>
+  #ifdef USE_INSTANCING
+  mat3 turned = mat3(instanceMatrix);
+  objectNormal = turned * (objectNormal / vec3(dot(turned[0], turned[0]), dot(turned[1], turned[1]), dot(turned[2], turned[2])));
+  #endif
+`;
+
 // Vertices as three.js moves them, then as body.vert places them.
-const VERTEX = `
+const vertex = (body: string, normals: boolean): string => `
 #include <morphtarget_pars_vertex>
 #include <skinning_pars_vertex>
 uniform vec3 center;
+uniform vec2 half_size;
+uniform vec2 anchor_slope;
+uniform vec2 anchor_rest;
+uniform vec2 across_start;
+out vec2 across;
 #ifdef USE_INSTANCING
 flat out float mirrored;
 #endif
-${generated.bodyVertex.replace("in vec3 offset;", "vec3 offset;").replace("void main()", "void place_vertex()")}
+${body.replace(/^in (vec3 (offset|normal);)/gm, "$1").replace("void main()", "void place_vertex()").replace(/\b(axial|normal)\b/g, "$1_shown")}
 void main() {
+  ${normals ? NORMALS : ""}
   #include <begin_vertex>
-  #include <morphinstance_vertex>
+  ${normals ? "" : "#include <morphinstance_vertex>\n  #include <skinbase_vertex>"}
   #include <morphtarget_vertex>
-  #include <skinbase_vertex>
   #include <skinning_vertex>
   #ifdef USE_INSTANCING
   mirrored = sign(determinant(mat3(instanceMatrix)));
   transformed = (instanceMatrix * vec4(transformed, 1.0)).xyz;
   #endif
+  ${normals ? "normal_shown = objectNormal;" : ""}
   offset = transformed - center;
   place_vertex();
+  vec2 apart = (clip_from_offset * vec4(offset, 0.0)).xy + across_start - anchor_slope * axial_shown;
+  across = half_size * apart + anchor_rest * gl_Position.w;
 }
 `;
+
+const VERTEX = vertex(generated.bodyVertex, false);
+const VERTEX_WITH_NORMAL = vertex(generated.bodyVertexWithNormal, true);
 
 // An instance that is mirrored shows its other side; three.js turns only whole objects.
 const SIDE = `
@@ -48,6 +72,21 @@ flat in float mirrored;
 #else
 #define FRONT_FACING gl_FrontFacing
 #endif
+`;
+
+// Where the interpolated point is in the picture, and from that where the ray of the pixel meets its face.
+const RECENTERED = `
+in float axial_shown;
+in vec2 across;
+uniform vec2 anchor_pixel;
+uniform float subpixel;
+float axial;
+${generated.recentered}
+`;
+
+const FIND_AXIAL = `
+  vec2 on_ray = recentered(axial_shown, (gl_FragCoord.xy - anchor_pixel) - across * gl_FragCoord.w, subpixel);
+  axial = on_ray.x;
 `;
 
 const FULLSCREEN = `
@@ -62,6 +101,13 @@ export interface BodyUniforms {
   [name: string]: IUniform;
   clip_from_offset: IUniform<Matrix4>;
   axis: IUniform<Vector4>;
+  half_size: IUniform<Vector2>;
+  /** Pixel from which places in the picture count, and what its float32 leaves out. */
+  anchor_pixel: IUniform<Vector2>;
+  anchor_rest: IUniform<Vector2>;
+  subpixel: IUniform<number>;
+  anchor_slope: IUniform<Vector2>;
+  across_start: IUniform<Vector2>;
   center: IUniform<Vector3>;
   axial_start: IUniform<number>;
   axial_depth_scale: IUniform<number>;
@@ -72,12 +118,21 @@ export interface BodyUniforms {
   extinction: IUniform<Vector4>;
   opaque_axial_depth: IUniform<Texture | null>;
   opaque_range: IUniform<Vector2>;
+  world_from_normal: IUniform<Matrix4>;
+  /** Metres ahead of the eye that `axial` counts from. */
+  ahead: IUniform<number>;
 }
 
 export function bodyUniforms(): BodyUniforms {
   return {
     clip_from_offset: { value: new Matrix4() },
     axis: { value: new Vector4() },
+    half_size: { value: new Vector2() },
+    anchor_pixel: { value: new Vector2() },
+    anchor_rest: { value: new Vector2() },
+    subpixel: { value: 0 },
+    anchor_slope: { value: new Vector2() },
+    across_start: { value: new Vector2() },
     center: { value: new Vector3() },
     axial_start: { value: -generated.NOTHING },
     axial_depth_scale: { value: 1 },
@@ -88,14 +143,24 @@ export function bodyUniforms(): BodyUniforms {
     extinction: { value: new Vector4() },
     opaque_axial_depth: { value: null },
     opaque_range: { value: new Vector2(0, 1) },
+    world_from_normal: { value: new Matrix4() },
+    ahead: { value: 0 },
   };
+}
+
+function recentering(fragment: string): string {
+  return fragment
+    .replace("gl_FrontFacing", "FRONT_FACING")
+    .replace("in float axial;\n", "")
+    .replace("snapping(axial, snapping_share)", "on_ray.y * snapping_share")
+    .replace("void main() {", `void main() {${FIND_AXIAL}`);
 }
 
 function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
   return new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: VERTEX,
-    fragmentShader: SIDE + fragment.replace("gl_FrontFacing", "FRONT_FACING"),
+    fragmentShader: SIDE + RECENTERED + recentering(fragment),
     defines: instanced ? { WITH_INSTANCES: 1 } : {},
     uniforms,
     side: DoubleSide,
@@ -120,6 +185,32 @@ export function summing(uniforms: BodyUniforms, spectral: boolean, opaque: boole
 /** Keeps the nearest opaque surface, as a share of the depth of the media; without a depth buffer, which would round it. */
 export function nearest(uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
   return drawn(generated.opaqueDepth, MinEquation, uniforms, instanced);
+}
+
+// The last surface of bodies on each ray: its normal, outwards, and metres along the camera's axis.
+const EXIT = `
+in vec3 world_normal;
+uniform float ahead;
+uniform float axial_depth_scale;
+uniform float axial_depth_start;
+layout(location = 0) out vec4 normal_and_axial;
+void main() {
+  if (FRONT_FACING) { discard; }
+  float size = length(world_normal);
+  normal_and_axial = vec4(size > 0.0 ? world_normal / size : vec3(0.0), axial_shown + ahead);
+  gl_FragDepth = clamp(axial_shown * axial_depth_scale + axial_depth_start, 0.0, 1.0);
+}
+`;
+
+/** Keeps the last surface that rays leave through; `reversed` as the renderer's depth buffer is. */
+export function last(uniforms: BodyUniforms, instanced: boolean, reversed: boolean): ShaderMaterial {
+  const made = drawn("", AddEquation, uniforms, instanced);
+  made.fragmentShader = `${SIDE}\nin float axial_shown;\n${reversed ? EXIT.replace("clamp", "1.0 - clamp") : EXIT}`;
+  made.vertexShader = VERTEX_WITH_NORMAL;
+  made.blending = NoBlending;
+  made.depthTest = made.depthWrite = true;
+  made.depthFunc = GreaterDepth;
+  return made;
 }
 
 /** Uniforms of the pass over the pixels: fields of the blocks View and Shade. */
