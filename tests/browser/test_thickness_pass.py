@@ -111,8 +111,10 @@ def test_holes_of_two_bodies_do_not_balance_each_other(three_page: WebPage) -> N
 
 VARIANTS = """({ ball, camera, size }) => tools.withRenderer(size, (renderer) => {
     const { THREE, ExactThicknessPass } = translucentThree;
-    const places = [[-1.2, 0, 0, 1], [1.2, 0.3, 0, -0.5]].map(([x, y, z, s]) =>
-        new THREE.Matrix4().makeTranslation(x, y, z).multiply(new THREE.Matrix4().makeScale(s, Math.abs(s), Math.abs(s))));
+    const place = (x, y, scale, mirror) => new THREE.Matrix4()
+        .makeTranslation(x, y, 0)
+        .multiply(new THREE.Matrix4().makeScale(mirror * scale, scale, scale));
+    const places = [place(-1.2, 0, 1, 1), place(1.2, 0.3, 0.5, -1)];
     const plain = new THREE.Group();
     for (const place of places) {
         const one = tools.mesh(ball);

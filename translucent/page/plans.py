@@ -73,6 +73,9 @@ class PagePlan:
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
             text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
             found.append(Note(NoteKind.MANY_TRIANGLES, text))
+        if self.plan.method.peels:
+            text = f"rays are followed through {self.most_layers} surfaces; beyond, pixels are marked"
+            found.append(Note(NoteKind.LAYER_LIMIT, text))
         if any(body.density is not None for body in self.scene.objects):
             found.append(Note(NoteKind.STEPS, "media of varying density stay as they are: no panel changes them"))
         if sum(body.covers for body in self.scene.objects) > 1:
