@@ -57,6 +57,7 @@ def read_scene(
     stage: str | None = "none",
     *,
     allow_outside: bool = False,
+    draft_extensions: bool = False,
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show.
 
@@ -71,7 +72,8 @@ def read_scene(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
     if is_scene_file(model):
-        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, allow_outside)
+        loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
+        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, loaded)
     else:
         scene, chosen = _mesh_scene(model, unit, medium, options, size, environment, stage, allow_outside)
     scene = with_roughness(scene, roughness)
@@ -115,7 +117,7 @@ def _file_scene(
     size: tuple[int, int],
     environment: Environment | None,
     stage: str | None,
-    allow_outside: bool,
+    loaded: dict[str, bool],
 ) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled
@@ -123,7 +125,7 @@ def _file_scene(
     from translucent.scene.staging import has_ground
 
     camera = None if options.defining else options.camera or 0
-    scene = load_scene(model, unit, camera, size, allow_outside=allow_outside)
+    scene = load_scene(model, unit, camera, size, **loaded)
     if medium is not None:
         scene = filled(scene, medium)
     bare = not (scene.has_camera or scene.lights or has_ground(scene)) and environment is None

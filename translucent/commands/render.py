@@ -10,6 +10,7 @@ import click
 
 from translucent.commands.common import (
     common_options,
+    draft_option,
     interface_options,
     look_options,
     medium_options,
@@ -62,6 +63,7 @@ from translucent.errors import InputError
 @scattering_medium_options
 @unit_option
 @outside_option
+@draft_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
 @click.option(
     "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
@@ -105,6 +107,7 @@ def render(
     mean_free_path: str | None,
     unit: str,
     allow_outside: bool,
+    draft_extensions: bool,
     size: str,
     camera: int | None,
     eye: str | None,
@@ -170,7 +173,8 @@ def render(
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
     stage = NO_STAGE if opaque_with is not None else stage
-    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, allow_outside=allow_outside)
+    loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
+    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, **loaded)
     if tone is None and len(scene.shown) < len(scene.objects):
         pictures = pictures._replace(tone=STAGED_TONE)
     scene = with_environment_shadows(scene, environment_shadows)

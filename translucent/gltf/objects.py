@@ -38,7 +38,9 @@ BLENDED = (
 _METAL = 0.1
 
 
-def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Object]:
+def scene_objects(
+    file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut, draft_extensions: bool = False
+) -> list[Object]:
     """Objects of a scene, one per node and primitive, with their materials.
 
     Parameters
@@ -50,13 +52,15 @@ def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, l
         Per unit of the file.
     left_out : LeftOut
         Gets what the objects do not hold.
+    draft_extensions : bool
+        Whether extensions that are drafts count.
 
     Raises
     ------
     InputError
         If there is no object, or something about one is wrong.
     """
-    finish_of = finish_reader(file, metres, left_out)
+    finish_of = finish_reader(file, metres, left_out, draft_extensions)
     scale = np.diag([metres, metres, metres, 1.0])
     objects: list[Object] = []
     finishes: list[Finish] = []

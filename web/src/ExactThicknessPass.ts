@@ -213,6 +213,15 @@ export class ExactThicknessPass {
     return found;
   }
 
+  /** Metres inside bodies at a pixel of the last `render`, from the top left; null where there is no number to trust. */
+  at(x: number, y: number): number | null {
+    if (!this.result) return null;
+    const texel = new Float32Array(4);
+    const up = this.result.height - 1 - Math.floor(y);
+    this.renderer.readRenderTargetPixels(this.result, Math.floor(x), up, 1, 1, texel);
+    return texel[2] > 0 ? texel[0] : null;
+  }
+
   /** Free all that is on the graphics card; the pass may be used again. */
   dispose(): void {
     for (const one of this.standIns.values()) one.dispose();

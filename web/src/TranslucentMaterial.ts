@@ -137,6 +137,11 @@ const TRANSMITTED = `
   #ifdef USE_TRANSMISSIONMAP
   material.transmission *= texture2D(transmissionMap, vTransmissionMapUv).r;
   #endif
+  // What three.js mirrors by Schlick's approximation, as Fresnel has it: at ior 1, nothing.
+  float exactCosine = clamp(dot(normal, isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(vViewPosition)), 0.0, 1.0);
+  float exactRatio = (material.ior - 1.0) / (material.ior + 1.0);
+  float exactSchlick = mix(pow(1.0 - exactCosine, 5.0), 1.0, exactRatio * exactRatio);
+  totalSpecular *= tl_fresnel_dielectric(exactCosine, material.ior) / max(exactSchlick, 1e-6);
   vec3 exactLight = exactTransmitted(-vViewPosition, normal, material.roughness, material.ior, thickness);
   totalDiffuse = mix(totalDiffuse, exactLight * diffuseColor.rgb, material.transmission);
 #endif
