@@ -352,5 +352,5 @@ def test_whatever_the_depth_buffer_is(three_page: WebPage) -> None:
     # Pixels of the whole lie between four of the part.
     between = part.thickness.reshape(32, 2, 32, 2).mean(axis=(1, 3))
     deep = whole.thickness[:32, 32:] > 0.8
-    assert deep.sum() > 300
+    assert deep.sum() > 200
     assert between[deep] == pytest.approx(whole.thickness[:32, 32:][deep], abs=SAGITTA + 0.01)
