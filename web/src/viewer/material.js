@@ -84,12 +84,12 @@ export class Materials {
 
   #editable(object) {
     const { medium } = this.page.scene.objects[object];
-    return medium != null && this.page.scene.media[medium].editable && this.media[medium].changed ? medium : null;
+    return medium != null && this.page.scene.media[medium].editable ? medium : null;
   }
 
   roughness(object) {
     const medium = object == null ? null : this.#editable(object);
-    return medium == null ? null : this.media[medium].roughness;
+    return medium == null || !this.media[medium].changed ? null : this.media[medium].roughness;
   }
 
   /** Write the blocks of a frame. */
@@ -150,7 +150,7 @@ export class Materials {
     const metres = row.kind[0] === 1 || row.kind[0] === 4 ? this.page.scene.objects[object].sheet ?? 1 : 1;
     row.extinction.set(this.#bounded(medium).map((x) => metres * x));
     row.ior[0] = ior;
-    row.roughness[0] = roughness;
+    if (this.media[medium].changed) row.roughness[0] = roughness;
   }
 }
 
