@@ -17,13 +17,16 @@ import numpy as np
 from translucent.errors import InputError
 from translucent.files.paths import require_file
 from translucent.files.reading import open_file, require_room, shown
-from translucent.geometry.mesh import Mesh, mended
+from translucent.geometry.mesh import Mesh, adopted, mended
 from translucent.geometry.triangles import Triangles, joined
 from translucent.gltf.whole import read_whole
 from translucent.units import metres_per_unit
 
 #: Formats of trimesh that are archives.
 _ARCHIVES = {"zae", "zip"}
+
+#: Formats that trimesh reads into arrays of vertices and faces, without transforms.
+_PLAIN = {"obj", "off", "ply", "stl"}
 
 #: Suffixes of the native files of programs that can all export .glb.
 _SCENES_OF_PROGRAMS = (
@@ -68,7 +71,7 @@ def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False)
     path = Path(path)
     scale = metres_per_unit(unit)
     vertices, faces, uv = _read(path, allow_outside)
-    raw = Mesh(vertices * scale, faces, uv, name=path.name)
+    raw = adopted(vertices if scale == 1 else vertices * scale, faces, uv, path.name)
     raw.require_finite()
     return mended(raw)
 
@@ -109,27 +112,51 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
     """
     if path.suffix.lower() in (".glb", ".gltf"):
         return read_whole(path, allow_outside)
-    import trimesh
-
     with open_file(path, asked) as stream, warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         _require_archive_room(stream, asked)
         try:
-            kind = path.suffix[1:].lower()
-            known = {"skip_materials": True} if kind in ("obj", "ply") else {}
-            scene = trimesh.load_scene(stream, file_type=kind, resolver=_NoLinks(), process=False, **known)
-            parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
-            return joined([_part(part) for part in parts if len(part.faces)], asked)
+            return joined([part for part in _parts(stream, path.suffix[1:].lower()) if len(part[1])], asked)
         except InputError:
             raise
         except Exception as error:  # each of trimesh's readers raises its own kinds
             raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
 
 
-def _part(part: Any) -> Triangles:
-    vertices, faces = np.array(part.vertices, dtype=np.float64), np.array(part.faces, dtype=np.int32)
-    found = getattr(part.visual, "uv", None)
-    return vertices, faces, None if found is None or len(found) != len(vertices) else np.array(found, dtype=np.float64)
+def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
+    """Triangles of each part of a file, by trimesh."""
+    import trimesh
+    from trimesh.exchange.load import mesh_loaders
+
+    known = {"skip_materials": True} if kind in ("obj", "ply") else {}
+    if kind in _PLAIN:
+        # Copying what they hold into a scene and out of it takes longer than reading.
+        content = mesh_loaders[kind](stream, file_type=kind, resolver=_NoLinks(), **known)
+        listed = list(content["geometry"].values()) if kind == "obj" and "geometry" in content else [content]
+        if all(_is_plain(one) for one in listed):
+            return [_triangles(one["vertices"], one["faces"], one.get("visual")) for one in listed]
+        stream.seek(0)
+    scene = trimesh.load_scene(stream, file_type=kind, resolver=_NoLinks(), process=False, **known)
+    parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
+    return [_triangles(part.vertices, part.faces, part.visual) for part in parts]
+
+
+def _is_plain(content: dict[str, Any]) -> bool:
+    """Whether a part is a mesh of triangles as they are stored."""
+    vertices, faces = content.get("vertices"), content.get("faces")
+    return (
+        isinstance(vertices, np.ndarray)
+        and isinstance(faces, np.ndarray)
+        and faces.dtype.kind in "iu"
+        and (vertices.ndim, faces.ndim) == (2, 2)
+        and (vertices.shape[1], faces.shape[1]) == (3, 3)
+    )
+
+
+def _triangles(vertices: Any, faces: Any, visual: Any) -> Triangles:
+    vertices, faces = np.array(vertices, dtype=np.float64, order="C"), np.array(faces, dtype=np.int32, order="C")
+    uv = getattr(visual, "uv", None)
+    return vertices, faces, None if uv is None or len(uv) != len(vertices) else np.array(uv, dtype=np.float64)
 
 
 def _require_archive_room(stream: BinaryIO, asked: str) -> None:

@@ -5,10 +5,14 @@ Nothing here invents geometry. A hole stays a hole, and what is ambiguous stays 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
-from translucent.geometry.grouping import equal_rows, shared_edges, side_ends
+from translucent.arrays import Integers, Mask
+from translucent.geometry.grouping import SortedSides, equal_rows, sorted_sides
+from translucent.geometry.nearness import near_points
 from translucent.geometry.winding import inside_out_parts
 
 Vertices = npt.NDArray[np.float64]
@@ -22,7 +26,19 @@ WELD_TOLERANCE = 1e-6
 WELD_EDGE_SHARE = 1e-2
 
 
-def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
+#: Vertices at the beginning of a mesh that tell whether it is a soup of triangles, each with corners of its own.
+_SAMPLE = 3000
+
+
+def all_apart(vertices: Vertices, distance: float) -> bool:
+    """Whether no two vertices are within a distance of each other; all have to be finite."""
+    sample = vertices[:_SAMPLE]
+    return len(equal_rows(sample).first) == len(sample) and len(near_points(vertices, distance)) == 0
+
+
+def weld(
+    vertices: Vertices, tolerance: float, limit: Callable[[], float] | None = None
+) -> npt.NDArray[np.int64]:
     """Index, for each vertex, of the vertex that replaces all those within `tolerance` of one another.
 
     Parameters
@@ -31,27 +47,31 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
         Finite positions in metres.
     tolerance : float
         Distance in metres; neighbors of neighbors are joined too.
+    limit : callable, optional
+        Gives another distance that the tolerance must not exceed; asked for only where it matters.
 
     Returns
     -------
     (n,) int64
         Index of the first vertex of each group.
     """
+    positions = equal_rows(vertices)
+    near = near_points(vertices[positions.first], tolerance)
+    if len(near) == 0:
+        return positions.first[positions.of]
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    positions = equal_rows(vertices)
-    points = vertices[positions.first]
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    if len(pairs) == 0:
-        return np.asarray(positions.first[positions.of])
-    count = len(points)
+    if limit is not None:
+        tolerance = min(tolerance, limit())
+    pairs = near[cKDTree(vertices[positions.first[near]]).query_pairs(tolerance, output_type="ndarray")]
+    count = len(positions.first)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     groups, label = connected_components(graph, directed=False)
     representative = np.full(groups, len(vertices), dtype=np.int64)
     np.minimum.at(representative, label, positions.first)
-    return np.asarray(representative[label][positions.of])
+    return representative[label][positions.of]
 
 
 def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
@@ -75,15 +95,41 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
         Closed parts turned outwards as a whole.
     """
     part, flip = spread_winding(faces)
-    oriented = np.where(flip[:, None], faces[:, ::-1], faces)
+    oriented = np.where(flip[:, None], faces[:, ::-1], faces) if flip.any() else faces
     turned = inside_out_parts(vertices, oriented, part)
-    mine = np.isin(part, turned)
-    oriented[mine] = oriented[mine][:, ::-1]
-    return oriented.astype(np.int32), int(flip.sum()), len(turned)
+    if len(turned):
+        oriented = np.where(np.isin(part, turned)[:, None], oriented[:, ::-1], oriented)
+    return oriented.astype(np.int32, copy=False), int(flip.sum()), len(turned)
 
 
-def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
-    """Part of each face, and whether the face must be flipped to agree with the majority of its part.
+def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask]:
+    """Part of each face, and whether the face must be flipped to agree with the majority of its part."""
+    sides = sorted_sides(faces)
+    one = np.arange(0, len(sides.edge), 2) if sides.paired else sides.begins[sides.sizes == 2]
+    disagree = sides.ascending[one] == sides.ascending[one + 1]
+    if not disagree.any():
+        return joined_faces(len(faces), sides, one), np.zeros(len(faces), dtype=bool)
+    return _flips(len(faces), sides.face[one], sides.face[one + 1], disagree)
+
+
+def joined_faces(count: int, sides: SortedSides, one: Integers) -> Integers:
+    """(m,): part of each face, from 0: those that are joined over edges of two sides, of which the first are given."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    # Four neighbors of each face: those over its sides, and itself.
+    place, face = (sides.side >> np.uint64(1)).astype(np.int32), (sides.side >> np.uint64(3)).astype(np.int32)
+    neighbor = np.arange(4 * count, dtype=np.int32) >> 2
+    neighbor[place[one]], neighbor[place[one + 1]] = face[one + 1], face[one]
+    links, starts = np.broadcast_to(1.0, 4 * count), np.arange(0, 4 * count + 1, 4, dtype=np.int32)
+    graph = csr_array((links, neighbor, starts), shape=(count, count))
+    if len(breadth_first_order(graph, 0, return_predecessors=False)) == count:
+        return np.zeros(count, dtype=np.int64)
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _flips(count: int, one: Integers, other: Integers, disagree: Mask) -> tuple[Integers, Mask]:
+    """Part of each face, and whether it must be flipped, from pairs of neighbors of which some disagree.
 
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice
     is one connected component of that graph.
@@ -91,13 +137,6 @@ def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    count = len(faces)
-    start, _ = side_ends(faces)
-    edges = shared_edges(faces)
-    order = np.argsort(edges.of, kind="stable")
-    pairs = order[(edges.sizes[edges.of] == 2)[order]].reshape(-1, 2)
-    one, other = pairs[:, 0] // 3, pairs[:, 1] // 3
-    disagree = start[pairs[:, 0]] == start[pairs[:, 1]]
     rows = np.concatenate([one, one + count])
     columns = np.concatenate([np.where(disagree, other + count, other), np.where(disagree, other, other + count)])
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(2 * count, 2 * count))

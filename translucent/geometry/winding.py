@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.geometry.grouping import shared_edges, side_ends
+from translucent.geometry.grouping import CHUNK, sorted_sides
 
 #: Smallest negative volume of an inside-out part, as a share of its cubed size: less is rounding.
 _FLAT = 1e-12
@@ -56,20 +56,43 @@ def inside_out_parts(
         Their numbers.
     """
     count = int(part.max()) + 1
+    volume = part_volumes(vertices, faces, part, count)
+    if not (volume < 0).any():
+        return np.empty(0, dtype=np.int64)
     corners = vertices[faces]
     order = np.argsort(part, kind="stable")
     starts = np.searchsorted(part[order], np.arange(count))
     low = np.minimum.reduceat(corners.min(axis=1)[order], starts)
     high = np.maximum.reduceat(corners.max(axis=1)[order], starts)
-    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
-        relative = corners - corners[order[starts], 0][part][:, None]
-        triple = np.einsum("ij,ij->i", relative[:, 0], np.cross(relative[:, 1], relative[:, 2]))
-        flat = -_FLAT * np.linalg.norm(high - low, axis=1) ** 3
-        negative = np.bincount(part, weights=triple, minlength=count) / 6.0 < flat
+    with np.errstate(under="ignore", over="ignore"):
+        negative = volume < -_FLAT * np.linalg.norm(high - low, axis=1) ** 3
     if not negative.any():
         return np.empty(0, dtype=np.int64)
     suspects = np.flatnonzero(negative & _balanced_parts(faces, part, count))
     return np.array([p for p in suspects if not _is_cavity(corners, part, low, high, int(p))], dtype=np.int64)
+
+
+def part_volumes(
+    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int
+) -> Array:
+    """(count,): signed volumes of the parts of a mesh; meaningful for closed ones.
+
+    By the divergence theorem, about a corner of each part, so that far-away ones lose no digits.
+    """
+    first = np.zeros(count, dtype=np.int64)
+    first[part[::-1]] = np.arange(len(part) - 1, -1, -1)
+    origins = vertices[faces[first, 0]]
+    volume = np.zeros(count)
+    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
+        for begin in range(0, len(faces), CHUNK):
+            of = part[begin : begin + CHUNK]
+            corners = vertices.take(faces[begin : begin + CHUNK].T, axis=0)
+            x, y, z = (corners - (origins[of] if count > 1 else origins)).transpose(2, 0, 1)
+            triple = x[0] * (y[1] * z[2] - z[1] * y[2])
+            triple += y[0] * (z[1] * x[2] - x[1] * z[2])
+            triple += z[0] * (x[1] * y[2] - y[1] * x[2])
+            volume += np.bincount(of, weights=triple, minlength=count) if count > 1 else triple.sum()
+    return volume / 6.0
 
 
 def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Array, p: int) -> bool:
@@ -83,9 +106,9 @@ def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Ar
 
 def _balanced_parts(faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:
     """Whether every directed edge of a part has its opposite."""
-    start, end = side_ends(faces)
-    edge = shared_edges(faces).of
-    net = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
+    sides = sorted_sides(faces)
     unbalanced = np.zeros(count, dtype=bool)
-    unbalanced[np.repeat(part, 3)[net[edge] != 0]] = True
+    if not sides.paired:
+        net = np.add.reduceat(np.where(sides.ascending, 1, -1), sides.begins)
+        unbalanced[part[sides.face[np.repeat(net != 0, sides.sizes)]]] = True
     return ~unbalanced
