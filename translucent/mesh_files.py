@@ -25,6 +25,9 @@ from translucent.units import metres_per_unit
 #: Formats of trimesh that are archives.
 _ARCHIVES = {"zae", "zip"}
 
+#: Formats of glTF, which trimesh is not asked for: importing it takes longer than reading a small file.
+_GLTF = {"glb", "gltf"}
+
 #: Formats that trimesh reads into arrays of vertices and faces, without transforms.
 _PLAIN = {"obj", "off", "ply", "stl"}
 
@@ -79,7 +82,7 @@ def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False)
 def _read(path: Path, allow_outside: bool) -> Triangles:
     asked = f"mesh {str(path)!r}"
     require_file(path, asked)
-    if path.suffix[1:].lower() not in mesh_formats():
+    if path.suffix[1:].lower() not in _GLTF and path.suffix[1:].lower() not in mesh_formats():
         do = (
             "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
@@ -110,7 +113,7 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
     InputError
         If the file cannot be read, or has no triangles.
     """
-    if path.suffix.lower() in (".glb", ".gltf"):
+    if path.suffix[1:].lower() in _GLTF:
         return read_whole(path, allow_outside)
     with open_file(path, asked) as stream, warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")

@@ -22,7 +22,7 @@ Keys = npt.NDArray[np.uint64]
 _SPREAD = np.uint64(0x9E3779B97F4A7C15)
 
 #: Elements that are compared at a time, so that what is made in between stays in the cache.
-CHUNK = 1 << 15
+CHUNK = 1 << 13
 
 
 @dataclass(frozen=True)
@@ -219,8 +219,29 @@ def used_vertices(faces: npt.NDArray[np.integer]) -> Integers:
 def use_mask(faces: npt.NDArray[np.integer], count: int) -> Mask:
     """(count,): whether faces use a vertex."""
     used = np.zeros(count, dtype=bool)
-    used[faces] = True
+    for begin in range(0, len(faces), CHUNK):
+        used[faces[begin : begin + CHUNK]] = True
     return used
+
+
+def connected(count: int, one: Integers, other: Integers) -> Integers:
+    """(count,): number of the component of each node, from 0, where edges join the nodes `one` and `other` (k,).
+
+    Every node points to its lowest neighbor, so that those of a tree lead to one root; what still joins roots is a
+    smaller graph (Sollin's algorithm, in JaJa 1992, section 5.1).
+    """
+    node = np.arange(count, dtype=one.dtype)
+    root = node.copy()
+    np.minimum.at(root, np.maximum(one, other), np.minimum(one, other))
+    while ((above := root[root]) != root).any():
+        root = above
+    roots = np.flatnonzero(root == node)
+    number = np.zeros(count, dtype=one.dtype)
+    number[roots] = np.arange(len(roots))
+    number = number[root]
+    one, other = number[one], number[other]
+    apart = one != other
+    return connected(len(roots), one[apart], other[apart])[number] if apart.any() else number
 
 
 def extent(points: Array) -> Array:

@@ -27,6 +27,9 @@ MAX_COORDINATE = 1e18
 #: Smallest diagonal in metres whose square is not lost in float32.
 MIN_DIAGONAL = 1e-18
 
+#: Key under which `mended` notes what `diagnose` then need not find out again; no field, since copies may differ.
+_ONE_CLOSED_PART = "_one_closed_part"
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Frozen):
@@ -117,7 +120,7 @@ class Mesh(Frozen):
     @cached_property
     def diagnosis(self) -> Diagnosis:
         """Diagnosis of the mesh: its defects, and whether it bounds a solid."""
-        return diagnose(self.vertices, self.faces)
+        return diagnose(self.vertices, self.faces, self.__dict__.get(_ONE_CLOSED_PART, False))
 
     @cached_property
     def bounds(self) -> Array:
@@ -231,7 +234,7 @@ def mended(raw: Mesh) -> Mesh:
     """Weld `raw` and wind it consistently, with its repairs on record."""
     same = _welded(raw)
     welded = raw.faces if same is None else same[raw.faces].astype(np.int32)
-    faces, flipped, turned = orient(raw.vertices, welded)
+    faces, flipped, turned, one_closed_part = orient(raw.vertices, welded)
     split_faces = raw.faces
     if flipped or turned:
         split_faces = np.where((faces != welded).any(axis=1)[:, None], raw.faces[:, ::-1], raw.faces)
@@ -240,7 +243,9 @@ def mended(raw: Mesh) -> Mesh:
         groups = equal_rows(np.column_stack([same, *carried]))
         index = groups.first[groups.of]
     kept = np.flatnonzero(use_mask(split_faces if same is None else index[split_faces], len(index)))
+    one_closed_part &= same is None or index is same
     if (unchanged := len(kept) == len(index)) and not flipped and not turned:
+        raw.__dict__[_ONE_CLOSED_PART] = one_closed_part
         return raw
     repairs = []
     if (merged := len(raw.vertices) - len(kept)) > 0:
@@ -262,7 +267,9 @@ def mended(raw: Mesh) -> Mesh:
     # Of vertices that are welded to one, its position is the first one's.
     positions = raw.vertices[kept if same is None else same[kept]]
     uv, colors = (None if values is None else values[kept] for values in (raw.uv, raw.colors))
-    return adopted(positions, split_faces, uv, raw.name, repairs=tuple(repairs), colors=colors)
+    mesh = adopted(positions, split_faces, uv, raw.name, repairs=tuple(repairs), colors=colors)
+    mesh.__dict__[_ONE_CLOSED_PART] = one_closed_part
+    return mesh
 
 
 def _welded(raw: Mesh) -> npt.NDArray[np.int64] | None:

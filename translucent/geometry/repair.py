@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers, Mask
-from translucent.geometry.grouping import SortedSides, equal_rows, sorted_sides
+from translucent.geometry.grouping import SortedSides, connected, equal_rows, sorted_sides
 from translucent.geometry.nearness import near_points
 from translucent.geometry.winding import inside_out_parts
 
@@ -59,22 +59,18 @@ def weld(
     near = near_points(vertices[positions.first], tolerance)
     if len(near) == 0:
         return positions.first[positions.of]
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     if limit is not None:
         tolerance = min(tolerance, limit())
     pairs = near[cKDTree(vertices[positions.first[near]]).query_pairs(tolerance, output_type="ndarray")]
-    count = len(positions.first)
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    groups, label = connected_components(graph, directed=False)
-    representative = np.full(groups, len(vertices), dtype=np.int64)
+    label = connected(len(positions.first), *pairs.T)
+    representative = np.full(len(label), len(vertices), dtype=np.int64)
     np.minimum.at(representative, label, positions.first)
     return representative[label][positions.of]
 
 
-def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
+def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int, bool]:
     """Wind the faces of each edge-connected part consistently, and flip parts that are inside out.
 
     A part is turned outwards only if it is closed and lies inside no other part: a shell within another is a cavity,
@@ -93,39 +89,35 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
         Faces turned because their neighbors disagreed.
     turned : int
         Closed parts turned outwards as a whole.
+    one_closed_part : bool
+        Whether every edge had two faces from the beginning, which agreed, and joined all faces.
     """
-    part, flip = spread_winding(faces)
+    sides = sorted_sides(faces)
+    paired = sides.paired
+    part, flip = _spread(len(faces), sides, paired)
     oriented = np.where(flip[:, None], faces[:, ::-1], faces) if flip.any() else faces
     turned = inside_out_parts(vertices, oriented, part)
     if len(turned):
         oriented = np.where(np.isin(part, turned)[:, None], oriented[:, ::-1], oriented)
-    return oriented.astype(np.int32, copy=False), int(flip.sum()), len(turned)
+    one = paired and not part.any()
+    return oriented.astype(np.int32, copy=False), int(flip.sum()), len(turned), one
 
 
 def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask]:
     """Part of each face, and whether the face must be flipped to agree with the majority of its part."""
     sides = sorted_sides(faces)
-    one = np.arange(0, len(sides.edge), 2) if sides.paired else sides.begins[sides.sizes == 2]
-    disagree = sides.ascending[one] == sides.ascending[one + 1]
+    return _spread(len(faces), sides, sides.paired)
+
+
+def _spread(count: int, sides: SortedSides, paired: bool) -> tuple[Integers, Mask]:
+    first = slice(0, None, 2) if paired else sides.begins[sides.sizes == 2]
+    second = slice(1, None, 2) if paired else first + 1
+    face = (sides.side >> np.uint64(3)).astype(np.int32)
+    one, other = face[first], face[second]
+    disagree = sides.ascending[first] == sides.ascending[second]
     if not disagree.any():
-        return joined_faces(len(faces), sides, one), np.zeros(len(faces), dtype=bool)
-    return _flips(len(faces), sides.face[one], sides.face[one + 1], disagree)
-
-
-def joined_faces(count: int, sides: SortedSides, one: Integers) -> Integers:
-    """(m,): part of each face, from 0: those that are joined over edges of two sides, of which the first are given."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    # Four neighbors of each face: those over its sides, and itself.
-    place, face = (sides.side >> np.uint64(1)).astype(np.int32), (sides.side >> np.uint64(3)).astype(np.int32)
-    neighbor = np.arange(4 * count, dtype=np.int32) >> 2
-    neighbor[place[one]], neighbor[place[one + 1]] = face[one + 1], face[one]
-    links, starts = np.broadcast_to(1.0, 4 * count), np.arange(0, 4 * count + 1, 4, dtype=np.int32)
-    graph = csr_array((links, neighbor, starts), shape=(count, count))
-    if len(breadth_first_order(graph, 0, return_predecessors=False)) == count:
-        return np.zeros(count, dtype=np.int64)
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+        return connected(count, one, other), np.zeros(count, dtype=bool)
+    return _flips(count, one, other, disagree)
 
 
 def _flips(count: int, one: Integers, other: Integers, disagree: Mask) -> tuple[Integers, Mask]:
@@ -134,13 +126,9 @@ def _flips(count: int, one: Integers, other: Integers, disagree: Mask) -> tuple[
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice
     is one connected component of that graph.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     rows = np.concatenate([one, one + count])
     columns = np.concatenate([np.where(disagree, other + count, other), np.where(disagree, other, other + count)])
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(2 * count, 2 * count))
-    _, label = connected_components(graph, directed=False)
+    label = connected(2 * count, rows, columns)
     as_is, turned = label[:count], label[count:]
     _, part = np.unique(np.minimum(as_is, turned), return_inverse=True)
     part = part.ravel()

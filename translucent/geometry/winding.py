@@ -84,13 +84,15 @@ def part_volumes(
     origins = vertices[faces[first, 0]]
     volume = np.zeros(count)
     with np.errstate(under="ignore", over="ignore", invalid="ignore"):
+        x, y, z = (vertices - origins if count == 1 else vertices).T.copy()
         for begin in range(0, len(faces), CHUNK):
-            of = part[begin : begin + CHUNK]
-            corners = vertices.take(faces[begin : begin + CHUNK].T, axis=0)
-            x, y, z = (corners - (origins[of] if count > 1 else origins)).transpose(2, 0, 1)
-            triple = x[0] * (y[1] * z[2] - z[1] * y[2])
-            triple += y[0] * (z[1] * x[2] - x[1] * z[2])
-            triple += z[0] * (x[1] * y[2] - y[1] * x[2])
+            corners, of = faces[begin : begin + CHUNK].T.copy(), part[begin : begin + CHUNK]
+            a, b, c = x.take(corners), y.take(corners), z.take(corners)
+            if count > 1:
+                a, b, c = a - origins[of, 0], b - origins[of, 1], c - origins[of, 2]
+            triple = a[0] * (b[1] * c[2] - c[1] * b[2])
+            triple += b[0] * (c[1] * a[2] - a[1] * c[2])
+            triple += c[0] * (a[1] * b[2] - b[1] * a[2])
             volume += np.bincount(of, weights=triple, minlength=count) if count > 1 else triple.sum()
     return volume / 6.0
 
