@@ -7,6 +7,7 @@ their keys, takes five to fifty times as long.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,6 +24,9 @@ _SPREAD = np.uint64(0x9E3779B97F4A7C15)
 
 #: Elements that are compared at a time, so that what is made in between stays in the cache.
 CHUNK = 1 << 13
+
+#: Sides of faces that are sorted at a time: this takes 16 bytes for each, and as much again meanwhile.
+BLOCK = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -111,13 +115,53 @@ def sorted_sides(faces: npt.NDArray[np.integer]) -> SortedSides:
     side = np.empty((3, len(faces)), dtype=np.uint64)
     for begin in range(0, len(faces), CHUNK):
         part = slice(begin, begin + CHUNK)
-        corners = faces[part].T.astype(np.int64)
-        number = np.arange(begin, begin + corners.shape[1]) << 3
-        for i in range(3):
-            start, end = corners[i], corners[(i + 1) % 3]
-            key[i, part] = np.minimum(start, end) * count + np.maximum(start, end)
-            side[i, part] = number + (2 * i + (start < end))
+        lower, higher, number = _sides(faces[part], begin)
+        key[:, part], side[:, part] = lower * count + higher, number
     return SortedSides(*sorted_pairs(key.ravel(), side.ravel(), (count * count - 1).bit_length()), count)
+
+
+def side_blocks(faces: npt.NDArray[np.integer], most: int = BLOCK) -> Iterator[SortedSides]:
+    """Sort the sides of faces (m, 3) in blocks, each with all sides of some edges; those of an edge in any order.
+
+    More than `most` are sorted about so many at a time, which takes less memory.
+    """
+    if 3 * len(faces) <= most:
+        yield sorted_sides(faces)
+        return
+    count = int(faces.max()) + 1
+    shift = max(count.bit_length() - 12, 0)
+    sides = np.zeros((count >> shift) + 1, dtype=np.int64)
+    for begin in range(0, len(faces), CHUNK):
+        lower, _, _ = _sides(faces[begin : begin + CHUNK], begin)
+        sides += np.bincount((lower >> shift).ravel(), minlength=len(sides))
+    block = (np.cumsum(sides) - 1) // most
+    for number in np.unique(block):
+        mine = np.flatnonzero(block == number)
+        yield _block(faces, int(mine[0]) << shift, (int(mine[-1]) + 1) << shift, int(sides[mine].sum()), count)
+
+
+def _block(faces: npt.NDArray[np.integer], low: int, high: int, size: int, count: int) -> SortedSides:
+    """Sort the sides whose lower vertex is at least `low` and below `high`, of which there are `size`."""
+    key, side = np.empty(size, dtype=np.uint64), np.empty(size, dtype=np.uint64)
+    end = 0
+    for begin in range(0, len(faces), CHUNK):
+        lower, higher, number = _sides(faces[begin : begin + CHUNK], begin)
+        mine = (lower >= low) & (lower < high)
+        begun, end = end, end + int(np.count_nonzero(mine))
+        key[begun:end] = (lower[mine] - low) * count + higher[mine]
+        side[begun:end] = number[mine]
+    place = np.arange(size, dtype=np.uint64)
+    key, place = sorted_pairs(key, place, ((high - low) * count - 1).bit_length())
+    key += np.uint64(low * count)
+    return SortedSides(key, side.take(place.view(np.int64)), count)
+
+
+def _sides(faces: npt.NDArray[np.integer], begin: int) -> tuple[Integers, Integers, Integers]:
+    """(3, k): lower vertex, higher vertex and number, as in `SortedSides`, of the sides of faces from `begin` on."""
+    start = faces.T.astype(np.int64)
+    end = start[[1, 2, 0]]
+    number = (np.arange(begin, begin + len(faces)) << 3) + np.array([[0], [2], [4]])
+    return np.minimum(start, end), np.maximum(start, end), number + (start < end)
 
 
 def sorted_pairs(key: Keys, tail: Keys, bits: int) -> tuple[Keys, Keys]:

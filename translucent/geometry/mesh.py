@@ -238,17 +238,17 @@ def mended(raw: Mesh) -> Mesh:
     split_faces = raw.faces
     if flipped or turned:
         split_faces = np.where((faces != welded).any(axis=1)[:, None], raw.faces[:, ::-1], raw.faces)
-    index = np.arange(len(raw.vertices)) if same is None else same
+    index = same
     if same is not None and (carried := [values for values in (raw.uv, raw.colors) if values is not None]):
         groups = equal_rows(np.column_stack([same, *carried]))
         index = groups.first[groups.of]
-    kept = np.flatnonzero(use_mask(split_faces if same is None else index[split_faces], len(index)))
-    one_closed_part &= same is None or index is same
-    if (unchanged := len(kept) == len(index)) and not flipped and not turned:
+    used = use_mask(split_faces if index is None else index[split_faces], len(raw.vertices))
+    one_closed_part &= index is same
+    if used.all() and not flipped and not turned:
         raw.__dict__[_ONE_CLOSED_PART] = one_closed_part
         return raw
-    repairs = []
-    if (merged := len(raw.vertices) - len(kept)) > 0:
+    kept, repairs = np.flatnonzero(used), []
+    if (merged := len(used) - len(kept)) > 0:
         repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
     if flipped:
         repairs.append(f"turned {flipped} of {len(faces)} faces to agree with their neighbors")
@@ -260,10 +260,9 @@ def mended(raw: Mesh) -> Mesh:
             TranslucentWarning,
             stacklevel=3,
         )
-    if not unchanged:
-        renumbered = np.zeros(len(index), dtype=np.int32)
-        renumbered[kept] = np.arange(len(kept))
-        split_faces = renumbered[index[split_faces]]
+    if merged:
+        renumbered = np.cumsum(used, dtype=np.int32) - np.int32(1)
+        split_faces = renumbered[split_faces if index is None else index[split_faces]]
     # Of vertices that are welded to one, its position is the first one's.
     positions = raw.vertices[kept if same is None else same[kept]]
     uv, colors = (None if values is None else values[kept] for values in (raw.uv, raw.colors))

@@ -32,7 +32,8 @@ def near_points(points: Array, distance: float) -> Integers:
     with np.errstate(under="ignore"):
         along, across = points @ _FIRST, points @ _SECOND
     order = np.argsort(along)
-    along, across = along[order], across[order]
+    along = along[order]
+    across = across[order]
     found: list[Integers] = []
     one = np.flatnonzero(along[1:] - along[:-1] <= reach)
     tested, lag = len(one), 1

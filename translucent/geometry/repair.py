@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers, Mask
-from translucent.geometry.grouping import SortedSides, connected, equal_rows, sorted_sides
+from translucent.geometry.grouping import SortedSides, connected, equal_rows, side_blocks, sorted_sides
 from translucent.geometry.nearness import near_points
 from translucent.geometry.winding import inside_out_parts
 
@@ -92,9 +92,7 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int, bool]:
     one_closed_part : bool
         Whether every edge had two faces from the beginning, which agreed, and joined all faces.
     """
-    sides = sorted_sides(faces)
-    paired = sides.paired
-    part, flip = _spread(len(faces), sides, paired)
+    part, flip, paired = _spread(faces)
     oriented = np.where(flip[:, None], faces[:, ::-1], faces) if flip.any() else faces
     turned = inside_out_parts(vertices, oriented, part)
     if len(turned):
@@ -105,19 +103,29 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int, bool]:
 
 def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask]:
     """Part of each face, and whether the face must be flipped to agree with the majority of its part."""
-    sides = sorted_sides(faces)
-    return _spread(len(faces), sides, sides.paired)
+    part, flip, _ = _spread(faces)
+    return part, flip
 
 
-def _spread(count: int, sides: SortedSides, paired: bool) -> tuple[Integers, Mask]:
-    first = slice(0, None, 2) if paired else sides.begins[sides.sizes == 2]
-    second = slice(1, None, 2) if paired else first + 1
+def _spread(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask, bool]:
+    """The same, and whether every edge has two faces, which agree."""
+    part, paired = np.arange(len(faces), dtype=np.int32), True
+    for sides in side_blocks(faces):
+        one, other, disagree = _neighbors(sides)
+        if disagree.any():
+            return *_flips(len(faces), *_neighbors(sorted_sides(faces))), False
+        paired &= 2 * len(one) == len(sides.edge)
+        del sides  # before the next block is made
+        part = connected(int(part.max()) + 1, part[one], part[other])[part]
+    return part, np.zeros(len(faces), dtype=bool), paired
+
+
+def _neighbors(sides: SortedSides) -> tuple[Integers, Integers, Mask]:
+    """(k,): the faces on either side of the edges with two of them, and whether these disagree about the winding."""
+    first = slice(0, None, 2) if sides.paired else sides.begins[sides.sizes == 2]
+    second = slice(1, None, 2) if sides.paired else first + 1
     face = (sides.side >> np.uint64(3)).astype(np.int32)
-    one, other = face[first], face[second]
-    disagree = sides.ascending[first] == sides.ascending[second]
-    if not disagree.any():
-        return connected(count, one, other), np.zeros(count, dtype=bool)
-    return _flips(count, one, other, disagree)
+    return face[first], face[second], sides.ascending[first] == sides.ascending[second]
 
 
 def _flips(count: int, one: Integers, other: Integers, disagree: Mask) -> tuple[Integers, Mask]:

@@ -80,11 +80,12 @@ def part_volumes(
     By the divergence theorem, about a corner of each part, so that far-away ones lose no digits.
     """
     first = np.zeros(count, dtype=np.int64)
-    first[part[::-1]] = np.arange(len(part) - 1, -1, -1)
+    if count > 1:
+        first[part[::-1]] = np.arange(len(part) - 1, -1, -1)
     origins = vertices[faces[first, 0]]
     volume = np.zeros(count)
     with np.errstate(under="ignore", over="ignore", invalid="ignore"):
-        x, y, z = (vertices - origins if count == 1 else vertices).T.copy()
+        x, y, z = (vertices[:, i] - origins[0, i] if count == 1 else vertices[:, i].copy() for i in range(3))
         for begin in range(0, len(faces), CHUNK):
             corners, of = faces[begin : begin + CHUNK].T.copy(), part[begin : begin + CHUNK]
             a, b, c = x.take(corners), y.take(corners), z.take(corners)
