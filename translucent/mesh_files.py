@@ -7,6 +7,7 @@ meaning for a mesh. Archives are no meshes, though trimesh unpacks them.
 from __future__ import annotations
 
 import os
+import re
 import warnings
 import zipfile
 from pathlib import Path
@@ -15,12 +16,20 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from translucent.errors import InputError
+from translucent.files.memory import require_memory
 from translucent.files.paths import require_file
-from translucent.files.reading import open_file, require_room, shown
-from translucent.geometry.mesh import Mesh, adopted, mended
+from translucent.files.reading import open_file, require_room, shown, size_text
+from translucent.geometry.mesh import PER_TRIANGLE, Mesh, adopted, mended
 from translucent.geometry.triangles import Triangles, joined
 from translucent.gltf.whole import read_whole
 from translucent.units import metres_per_unit
+
+#: Bytes of memory that loading and diagnosing take at most for each byte of a text file, and for each triangle of a
+#: binary file that brings its own corners (measured by tools/measure_loading.py; see geometry/mesh.py for the others).
+_PER_BYTE, PER_SOUP_TRIANGLE = 8, 350
+
+#: Bytes at the beginning of a file in which its numbers of vertices and faces are looked for.
+_HEADER = 1 << 13
 
 #: Formats of trimesh that are archives.
 _ARCHIVES = {"zae", "zip"}
@@ -69,7 +78,8 @@ def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False)
     Raises
     ------
     InputError
-        If the file is missing, unreadable, has no faces, or has coordinates that are not finite.
+        If the file is missing, unreadable, has no faces, has coordinates that are not finite, or would take more memory
+        than is free.
     """
     path = Path(path)
     scale = metres_per_unit(unit)
@@ -118,6 +128,7 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
     with open_file(path, asked) as stream, warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         _require_archive_room(stream, asked)
+        _require_free(stream, path.suffix[1:].lower(), asked)
         try:
             return joined([part for part in _parts(stream, path.suffix[1:].lower()) if len(part[1])], asked)
         except InputError:
@@ -171,6 +182,21 @@ def _require_archive_room(stream: BinaryIO, asked: str) -> None:
             raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
         require_room(asked, "its parts", size, os.fstat(stream.fileno()).st_size)
     stream.seek(0)
+
+
+def _require_free(stream: BinaryIO, kind: str, asked: str) -> None:
+    """Raise `InputError` where a mesh takes more memory than is free, by what the header of its file says."""
+    size = os.fstat(stream.fileno()).st_size
+    found, needed = f"its {size_text(size)} of text", _PER_BYTE * size
+    head = stream.read(_HEADER)
+    if kind == "stl" and len(head) >= 84 and 84 + 50 * (count := int.from_bytes(head[80:84], "little")) == size:
+        found, needed = f"its {count} triangles", PER_SOUP_TRIANGLE * count
+    elif kind == "ply" and (stated := re.search(rb"element face (\d{1,18})\s", head)) and b"format binary" in head:
+        # No face takes less than 13 bytes: of a count that is not true, the reader tells.
+        count = min(int(stated[1]), size // 13)
+        found, needed = f"its {count} faces", PER_TRIANGLE * count
+    stream.seek(0)
+    require_memory(asked, found, needed, "close other programs, or decimate the mesh")
 
 
 class _NoLinks:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers, Mask
+from translucent.arrays import Array, Mask
 from translucent.geometry.grouping import CHUNK, SortedSides, connected, equal_rows, extent, sorted_sides, use_mask
 from translucent.geometry.repair import spread_winding
 from translucent.geometry.sample_lines import winds_negatively

@@ -1,8 +1,8 @@
 """Grouping of equal elements of a mesh: vertices at one position, edges that several faces share.
 
 All of it sorts single 64-bit integers, which NumPy does with vector instructions: a key above the index of the element,
-so that one sort of values gives the order, too, and of equal elements the first comes first. Sorting rows, or indices by
-their keys, takes five to fifty times as long.
+so that one sort of values gives the order, too, and of equal elements the first comes first. Sorting rows, or indices
+by their keys, takes five to fifty times as long.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ import numpy.typing as npt
 from translucent.arrays import Array, Integers, Mask
 
 Keys = npt.NDArray[np.uint64]
+
+#: Indices that may be of 32 bits, which take half the time.
+Numbers = npt.NDArray[np.signedinteger[Any]]
 
 #: Odd multiplier that spreads the bits of a hash: 2^64 over the golden ratio (Knuth 1973, section 6.4).
 _SPREAD = np.uint64(0x9E3779B97F4A7C15)
@@ -59,7 +62,7 @@ class SortedSides:
     edge : (s,) uint64
         Key of each side's edge: its lower vertex times `vertices`, plus the higher one.
     side : (s,) uint64
-        Its face times 8, plus the corner where it starts times 2, plus 1 if it runs from the lower vertex to the higher.
+        Its face times 8, plus the corner where it starts times 2, plus 1 if it runs from the lower vertex upwards.
     vertices : int
         More than the largest vertex.
     """
@@ -194,8 +197,8 @@ def equal_rows(rows: npt.NDArray[Any]) -> Groups:
         rows = (rows.astype(np.float64, copy=False) + 0.0).view(np.int64)
     below = len(rows).bit_length()
     index = np.arange(len(rows), dtype=np.uint64)
-    key, order = sorted_pairs(_hashes(rows) >> np.uint64(below), index, 64 - below)
-    order = order.astype(np.int64)
+    key, index = sorted_pairs(_hashes(rows) >> np.uint64(below), index, 64 - below)
+    order = index.view(np.int64)
     equal = key[1:] == key[:-1]
     differ = _differ(rows, order, equal)
     if differ.any():
@@ -268,7 +271,7 @@ def use_mask(faces: npt.NDArray[np.integer], count: int) -> Mask:
     return used
 
 
-def connected(count: int, one: Integers, other: Integers) -> Integers:
+def connected(count: int, one: Numbers, other: Numbers) -> Numbers:
     """(count,): number of the component of each node, from 0, where edges join the nodes `one` and `other` (k,).
 
     Every node points to its lowest neighbor, so that those of a tree lead to one root; what still joins roots is a

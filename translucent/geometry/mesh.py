@@ -27,6 +27,9 @@ MAX_COORDINATE = 1e18
 #: Smallest diagonal in metres whose square is not lost in float32.
 MIN_DIAGONAL = 1e-18
 
+#: Bytes of memory that welding, winding and diagnosing take at most for each triangle, with the mesh itself.
+PER_TRIANGLE = 150
+
 #: Key under which `mended` notes what `diagnose` then need not find out again; no field, since copies may differ.
 _ONE_CLOSED_PART = "_one_closed_part"
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Integers, Mask
-from translucent.geometry.grouping import SortedSides, connected, equal_rows, side_blocks, sorted_sides
+from translucent.arrays import Mask
+from translucent.geometry.grouping import Numbers, SortedSides, connected, equal_rows, side_blocks, sorted_sides
 from translucent.geometry.nearness import near_points
 from translucent.geometry.winding import inside_out_parts
 
@@ -36,9 +36,7 @@ def all_apart(vertices: Vertices, distance: float) -> bool:
     return len(equal_rows(sample).first) == len(sample) and len(near_points(vertices, distance)) == 0
 
 
-def weld(
-    vertices: Vertices, tolerance: float, limit: Callable[[], float] | None = None
-) -> npt.NDArray[np.int64]:
+def weld(vertices: Vertices, tolerance: float, limit: Callable[[], float] | None = None) -> npt.NDArray[np.int64]:
     """Index, for each vertex, of the vertex that replaces all those within `tolerance` of one another.
 
     Parameters
@@ -101,15 +99,16 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int, bool]:
     return oriented.astype(np.int32, copy=False), int(flip.sum()), len(turned), one
 
 
-def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask]:
+def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Numbers, Mask]:
     """Part of each face, and whether the face must be flipped to agree with the majority of its part."""
     part, flip, _ = _spread(faces)
     return part, flip
 
 
-def _spread(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask, bool]:
+def _spread(faces: npt.NDArray[np.integer]) -> tuple[Numbers, Mask, bool]:
     """The same, and whether every edge has two faces, which agree."""
-    part, paired = np.arange(len(faces), dtype=np.int32), True
+    part: Numbers = np.arange(len(faces), dtype=np.int32)
+    paired = True
     for sides in side_blocks(faces):
         one, other, disagree = _neighbors(sides)
         if disagree.any():
@@ -120,15 +119,16 @@ def _spread(faces: npt.NDArray[np.integer]) -> tuple[Integers, Mask, bool]:
     return part, np.zeros(len(faces), dtype=bool), paired
 
 
-def _neighbors(sides: SortedSides) -> tuple[Integers, Integers, Mask]:
+def _neighbors(sides: SortedSides) -> tuple[Numbers, Numbers, Mask]:
     """(k,): the faces on either side of the edges with two of them, and whether these disagree about the winding."""
-    first = slice(0, None, 2) if sides.paired else sides.begins[sides.sizes == 2]
-    second = slice(1, None, 2) if sides.paired else first + 1
-    face = (sides.side >> np.uint64(3)).astype(np.int32)
-    return face[first], face[second], sides.ascending[first] == sides.ascending[second]
+    face, ascending = (sides.side >> np.uint64(3)).astype(np.int32), sides.ascending
+    if sides.paired:
+        return face[::2], face[1::2], ascending[::2] == ascending[1::2]
+    first = sides.begins[sides.sizes == 2]
+    return face[first], face[first + 1], ascending[first] == ascending[first + 1]
 
 
-def _flips(count: int, one: Integers, other: Integers, disagree: Mask) -> tuple[Integers, Mask]:
+def _flips(count: int, one: Numbers, other: Numbers, disagree: Mask) -> tuple[Numbers, Mask]:
     """Part of each face, and whether it must be flipped, from pairs of neighbors of which some disagree.
 
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -38,7 +40,7 @@ def winding_number(corners: Array, point: npt.ArrayLike) -> float:
 
 
 def inside_out_parts(
-    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64]
+    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]]
 ) -> npt.NDArray[np.int64]:
     """Closed parts that face inwards without being a cavity: they lie inside no other part.
 
@@ -73,7 +75,7 @@ def inside_out_parts(
 
 
 def part_volumes(
-    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int
+    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]], count: int
 ) -> Array:
     """(count,): signed volumes of the parts of a mesh; meaningful for closed ones.
 
@@ -98,7 +100,7 @@ def part_volumes(
     return volume / 6.0
 
 
-def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Array, p: int) -> bool:
+def _is_cavity(corners: Array, part: npt.NDArray[np.signedinteger[Any]], low: Array, high: Array, p: int) -> bool:
     around = (low <= low[p]).all(axis=1) & (high >= high[p]).all(axis=1)
     around[p] = False
     if not around.any():
@@ -107,7 +109,9 @@ def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Ar
     return round(winding_number(corners[around[part]], inside)) != 0
 
 
-def _balanced_parts(faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:
+def _balanced_parts(
+    faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]], count: int
+) -> npt.NDArray[np.bool_]:
     """Whether every directed edge of a part has its opposite."""
     sides = sorted_sides(faces)
     unbalanced = np.zeros(count, dtype=bool)

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.geometry.grouping import use_mask
-from translucent.geometry.mesh import Mesh, adopted, mended
 from translucent.arrays import Array, Integers
+from translucent.files.memory import require_memory
+from translucent.geometry.grouping import use_mask
+from translucent.geometry.mesh import PER_TRIANGLE, Mesh, adopted, mended
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import refused
 from translucent.gltf.file import Json
@@ -54,6 +55,9 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
     if corners.max(initial=0) >= len(positions):
         found = f"{name!r}: index {corners.max()} points outside the {len(positions)} vertices"
         raise refused(accessors.file, found)
+    count = len(corners) // 3 if mode == _TRIANGLES else len(corners)
+    asked, do = f"glTF {str(accessors.file.path)!r}", "close other programs, or decimate the mesh"
+    require_memory(asked, f"the {count} triangles of {name!r}", PER_TRIANGLE * count, do)
     faces = _faces(accessors, mode, corners, name)
     stored = len(positions)
     positions, faces, kept = _compact(positions, faces)
