@@ -18,10 +18,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import translucent as tl
-from tests.values.handmade import CORNERS, CUBE, ball, cube, inverted, joined, moebius
-from translucent.geometry import grouping, repair
+from tests.values.handmade import CORNERS, CUBE, ball, changed, cube, inverted, joined, moebius
+from translucent.geometry import grouping, repair, sample_lines
 from translucent.geometry.diagnosis import FIRST, Finding, diagnose
 from translucent.geometry.grouping import connected, equal_rows, extent, side_blocks, sorted_pairs, sorted_sides
+from translucent.geometry.line_crossings import line_crossings
 from translucent.geometry.mesh import Mesh, mended
 from translucent.geometry.nearness import near_points
 from translucent.geometry.repair import spread_winding
@@ -126,6 +127,14 @@ def test_what_loading_has_found_out_spares_work_and_is_true(monkeypatch: pytest.
         _ = ball(2).diagnosis
 
 
+def test_seams_of_texture_coordinates_are_no_edges() -> None:
+    uv = np.repeat(np.arange(12.0), 3)[:, None] * [1.0, 0.5]
+    split = mended(Mesh(CORNERS[CUBE].reshape(-1, 3), np.arange(36).reshape(-1, 3), uv))
+    assert len(split.vertices) == 36
+    assert split.diagnosis == diagnose(split.vertices, split.faces)
+    assert split.diagnosis.convex
+
+
 def test_a_clean_mesh_is_mended_without_a_copy() -> None:
     mesh = ball(1)
     assert mended(mesh) is mesh
@@ -170,6 +179,7 @@ def test_paired_sides_are_those_of_a_closed_surface_that_agrees(faces: npt.NDArr
 def test_paired_sides_of_a_cube_and_of_one_that_lacks_a_face() -> None:
     assert sorted_sides(CUBE).paired
     assert not sorted_sides(CUBE[1:]).paired
+    assert not sorted_sides(changed(CUBE, flip=4)).paired
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 2**40 - 1)), unique=True, min_size=1, max_size=30))
@@ -236,3 +246,21 @@ def test_the_volumes_of_parts_are_those_of_each_alone() -> None:
     mesh = joined(*bodies)
     volumes = part_volumes(mesh.vertices, mesh.faces, np.repeat([2, 0, 1], 12), 3)
     assert volumes == pytest.approx([-0.125, 8.0, 1.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_faces_that_are_left_out_meet_no_line(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Corners on lines, between them, and beyond all of them."""
+    monkeypatch.setattr(sample_lines, "_FEW", 0)
+    rng = np.random.default_rng(seed)
+    scaled, faces = rng.integers(-6, 16, size=(300, 2)) / 2.0, rng.integers(300, size=(400, 3))
+    scaled[150:] += rng.uniform(-0.4, 0.4, size=(150, 2))
+    heights = rng.random(300)
+    near = sample_lines._near_lines(scaled, faces, 5)
+    found = [
+        np.concatenate([np.stack(part) for part in line_crossings(scaled, heights, chosen, (5, 5))], axis=1)
+        for chosen in (faces, faces[near])
+    ]
+    assert found[0].tolist() == found[1].tolist()
+    assert found[0].size > 0
+    assert len(near) < len(faces)

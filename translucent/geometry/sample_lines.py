@@ -66,10 +66,10 @@ def _near_lines(scaled: Array, faces: npt.NDArray[np.integer], lines: int) -> In
         return near
     for column in scaled.T:
         held = column.clip(-0.5, lines - 0.5)
-        # Odd between two lines, and even on one.
+        # Odd between two lines, and even on one; a face that lies on one has no area across the lines.
         step = (np.ceil(held) + np.floor(held)).astype(np.int16)
         a, b, c = (step.take(faces[near, i]) for i in range(3))
-        near = near[(a != b) | (b != c) | (a % 2 == 0)]
+        near = near[(a != b) | (b != c)]
     return near
 
 
