@@ -274,21 +274,20 @@ def use_mask(faces: npt.NDArray[np.integer], count: int) -> Mask:
 def connected(count: int, one: Numbers, other: Numbers) -> Numbers:
     """(count,): number of the component of each node, from 0, where edges join the nodes `one` and `other` (k,).
 
-    Every node points to its lowest neighbor, so that those of a tree lead to one root; what still joins roots is a
-    smaller graph (Sollin's algorithm, in JaJa 1992, section 5.1).
+    Every node points to a lower neighbor, so that those of a tree lead to one root; what still joins roots is a smaller
+    graph (Sollin's algorithm, in JaJa 1992, section 5.1).
     """
     node = np.arange(count, dtype=one.dtype)
     root = node.copy()
-    np.minimum.at(root, np.maximum(one, other), np.minimum(one, other))
-    while ((above := root[root]) != root).any():
+    root[np.maximum(one, other)] = np.minimum(one, other)
+    while not np.array_equal(above := root.take(root), root):
         root = above
-    roots = np.flatnonzero(root == node)
-    number = np.zeros(count, dtype=one.dtype)
-    number[roots] = np.arange(len(roots))
-    number = number[root]
-    one, other = number[one], number[other]
+    number = np.cumsum(root == node, dtype=one.dtype) - one.dtype.type(1)
+    roots = int(number[-1]) + 1
+    number = number.take(root)
+    one, other = number.take(one), number.take(other)
     apart = one != other
-    return connected(len(roots), one[apart], other[apart])[number] if apart.any() else number
+    return connected(roots, one[apart], other[apart]).take(number) if apart.any() else number
 
 
 def extent(points: Array) -> Array:
