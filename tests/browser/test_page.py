@@ -63,9 +63,10 @@ def ball(medium: tl.Medium, **more: Any) -> tl.Object:
 
 def scene_of(body: tl.Object, **more: Any) -> tl.Scene:
     camera = tl.Camera.look_at((0.03, 0.03, 0.09), (0, 0, 0), fov_y=30)
-    return tl.Scene([body], camera, environment=tl.Environment.gradient((0.3, 0.4, 0.5), (1.0, 0.9, 0.8)), **more)
+    return tl.Scene([body], camera, environment=SKY, **more)
 
 
+SKY = tl.Environment.gradient((0.3, 0.4, 0.5), (1.0, 0.9, 0.8))
 RED = tl.Medium.from_color((0.7, 0.2, 0.1), 0.02)
 GLASS = tl.Medium.from_color((0.5, 0.8, 0.6), 0.02, ior=1.5)
 
