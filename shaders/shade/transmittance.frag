@@ -61,13 +61,11 @@ struct Path {
 
 // advance: metres along the ray per metre along the camera's forward axis.
 #if SPECTRAL
-Path read_path(sampler2D depths, sampler2D lengths, ivec2 texel, float advance) {
-    vec4 sum = texelFetch(depths, texel, 0);
-    return Path(texelFetch(lengths, texel, 0).r * advance, sum.rgb * advance, sum.a);
+Path path_of(vec4 sum, float lengths, float advance) {
+    return Path(lengths * advance, sum.rgb * advance, sum.a);
 }
 #else
-Path read_path(sampler2D sums, ivec2 texel, float advance) {
-    vec2 sum = texelFetch(sums, texel, 0).rg;
+Path path_of(vec2 sum, float advance) {
     return Path(sum.r * advance, sum.r * advance * extinction.rgb, sum.g);
 }
 #endif
@@ -86,9 +84,9 @@ void main() {
 
 #if ACCUMULATED
 #if SPECTRAL
-    Path path = read_path(accumulated, accumulated_path, texel, advance);
+    Path path = path_of(texelFetch(accumulated, texel, 0), texelFetch(accumulated_path, texel, 0).r, advance);
 #else
-    Path path = read_path(accumulated, texel, advance);
+    Path path = path_of(texelFetch(accumulated, texel, 0).rg, advance);
 #endif
 #else
     Path path = Path(0.0, vec3(0.0), 0.0);
@@ -112,9 +110,9 @@ void main() {
     if (!valid) {
 #if FALLBACK
 #if SPECTRAL
-        path = read_path(fallback, fallback_path, texel, advance);
+        path = path_of(texelFetch(fallback, texel, 0), texelFetch(fallback_path, texel, 0).r, advance);
 #else
-        path = read_path(fallback, texel, advance);
+        path = path_of(texelFetch(fallback, texel, 0).rg, advance);
 #endif
 #else
         path = Path(0.0, vec3(0.0), 0.0);

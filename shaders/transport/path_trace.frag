@@ -30,8 +30,8 @@ uniform ivec2 tile_origin;   // of the texels in the picture, from its top left 
 uniform uint last_path;      // how many paths of each pixel are to end
 uniform int events;          // that are followed in this pass
 uniform float pass_number;
-uniform bool spread;         // paths start all over their pixels, and not at one place in them
-uniform bool all_closed;     // no solid has holes: what seems to leave through one passes an edge by rounding
+uniform int spread;          // 1: paths start all over their pixels, and not at one place in them
+uniform int all_closed;      // 1: no solid has holes: what seems to leave through one passes an edge by rounding
 
 const int CHANNEL = 1;             // whose indices of refraction count
 const float ROULETTE = 0.1;       // share of light below which paths end by Russian roulette, or go on with this share
@@ -45,7 +45,7 @@ const float EYE_MARGIN = 1e-3;    // axial depth before the media at which paths
 // quasirandom sequences").
 vec2 pixel_of(ivec2 texel, uint path) {
     vec2 share = vec2(uvec2(path * 3242174889u, path * 2447445414u) >> 8u) / 16777216.0;
-    return vec2(texel) + (spread ? fract(share + 0.5) : 0.5 + frame_size.zw);
+    return vec2(texel) + (spread == 1 ? fract(share + 0.5) : 0.5 + frame_size.zw);
 }
 
 float largest_share(vec3 share) {
@@ -318,7 +318,7 @@ void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
     bool collides = flight < surface;
     vec3 at = path.origin + max(min(flight - path.skipped, meets ? hit.path - margin : NOTHING), 0.0) * path.direction;
     bool astray = path.record.x != 0u && !meets && (!collides || length(at) > surface_reach);
-    if (astray && all_closed) {
+    if (astray && all_closed == 1) {
         path.record = uvec4(0u);
     } else {
         path.lost = astray;
@@ -353,7 +353,7 @@ void follow(inout Path path, vec2 pixel, ivec2 texel, inout Draws draws) {
     bool sound = true;
     Place place = place_at(path.origin, path.direction, path.record, hit, before, CHANNEL, sound);
     TracedBody body = traced_body(place.object);
-    path.lost = !sound && (!all_closed || is_full(path.record));
+    path.lost = !sound && (all_closed == 0 || is_full(path.record));
     path.light += path.share * place.glow;
     path.share *= place.coat;
     if (int(body.kind) == KIND_OPAQUE && (place.outside || body.one_sided == 0.0)) {
@@ -408,7 +408,7 @@ void main() {
         if (path.ends || broken) {
             if (broken) { path.light = vec3(0.0); }
             // Where nothing was left to chance, all paths are the same.
-            uint count = draws.count == 0u && !spread ? last_path - known.count : 1u;
+            uint count = draws.count == 0u && spread == 0 ? last_path - known.count : 1u;
             known.lost += path.lost || broken ? float(count) : 0.0;
             add_paths(known, path.light, count);
             path.flags = 0u;

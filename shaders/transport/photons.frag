@@ -26,7 +26,7 @@ uniform vec3 aim_right;      // half its sides; 0: all directions from the light
 uniform vec3 aim_up;
 uniform vec3 photon_power;   // of a photon; times cosine over squared distance where a point light aims at a rectangle
 uniform uvec4 light_record;  // the bodies that the light is in
-uniform bool all_closed;
+uniform int all_closed;
 
 layout(location = 0) out vec4 out_point;   // from the center of the media; w: 1 landed, 0 not, -1 given up
 layout(location = 1) out vec4 out_power;
@@ -166,7 +166,7 @@ void main() {
         photon.share *= transmittance(filling_of(photon.record, before).extinction * (hit.path + photon.skipped));
         bool sound = true;
         Place place = place_at(photon.origin, photon.direction, photon.record, hit, before, channel, sound);
-        if (!sound && (!all_closed || is_full(place.record))) { return; }
+        if (!sound && (all_closed == 0 || is_full(place.record))) { return; }
         TracedBody body = traced_body(place.object);
         photon.share *= place.coat;
         if (photon.share == vec3(0.0)) { return; }

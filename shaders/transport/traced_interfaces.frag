@@ -29,7 +29,7 @@ uniform sampler2D entered;           // interface towards the eye: normal, axial
 uniform sampler2D surface_finish;    // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 uniform int most_interfaces;
-uniform bool all_closed;             // no solid has holes: what seems to leave through one passes an edge by rounding
+uniform int all_closed;              // 1: no solid has holes: what seems to leave through one passes an edge by rounding
 uniform float faintest_share;        // of the light, its three channels together: fainter rays are not followed
 #if MICROFACETS
 uniform int sample_number;           // of a pixel
@@ -182,7 +182,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             continue;
         }
         reach = NOTHING;
-        if (hit.object < 0 && all_closed) { ray.record = uvec4(0u); }
+        if (hit.object < 0 && all_closed == 1) { ray.record = uvec4(0u); }
         int before = dominant_body(ray.record);
         passed = vec3(1.0);
         if (ray.record.x != 0u) {
@@ -227,7 +227,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             continue;
         }
 #endif
-        if (!sound && (!all_closed || is_full(ray.record))) { sum.lost += strength(ray.share) / 3.0; }
+        if (!sound && (all_closed == 0 || is_full(ray.record))) { sum.lost += strength(ray.share) / 3.0; }
         vec3 smooth_normal = place.smooth_normal;
         bool first = ray.met == 0 && place.object == seen.object && distance(point, seen.point) < 1e-3 * surface_reach;
         if (first) { smooth_normal = seen.normal; }

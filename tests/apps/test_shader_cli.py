@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from functools import partial
 
 import pytest
@@ -39,6 +40,33 @@ def test_a_name_prints_one_text(run: Run) -> None:
     assert told["files"][-1] == "thickness/signed_depth.frag" or "thickness/signed_depth.frag" in told["files"]
 
 
+def test_a_target_is_the_language_of_the_text(run: Run) -> None:
+    assert run(*SIGNED, "--target", "glsl") == run(*SIGNED)
+    code, out, err = run(*SIGNED, "--target", "webgl2")
+    assert (code, err) == (0, "")
+    assert out.startswith("#version 300 es\n")
+    told = strict_json(run(*SIGNED, "--target", "webgl2", "--json").out)
+    assert (told["text"], told["target"], told["version"]) == (out, "webgl2", 300)
+    assert run(*SIGNED, "--target", "vulkan").out.startswith("#version 450 core\n")
+
+
+def test_json_says_where_the_members_of_uniform_blocks_are(run: Run) -> None:
+    (block,) = strict_json(run(*SIGNED, "--json").out)["blocks"]
+    assert (block["name"], block["binding"], block["bytes"] % 16) == ("Body", 1, 0)
+    assert block["offsets"]["clip_from_offset"] == 0
+    assert block["offsets"]["axis"] == 128
+    assert strict_json(run("optics", "--json").out)["blocks"] == []
+
+
+def test_a_language_by_translators_has_no_version_of_glsl(run: Run) -> None:
+    if shutil.which("glslangValidator") is None or shutil.which("spirv-cross") is None:
+        pytest.skip("glslang or SPIRV-Cross is absent: apt-get install glslang-tools spirv-cross")
+    told = strict_json(run(*SIGNED, "--target", "hlsl", "--json").out)
+    assert (told["target"], told["version"], told["defines"]) == ("hlsl", None, {"OPAQUE": 0, "SPECTRAL": 1})
+    assert told["text"] == run(*SIGNED, "--target", "hlsl").out
+    assert "float4 optical_depth_and_count : SV_Target0;" in told["text"]
+
+
 def test_a_switch_without_a_value_is_on(run: Run) -> None:
     assert run("signed_depth", "--define", "SPECTRAL", "--define", "OPAQUE=0") == run(*SIGNED)
 
@@ -55,6 +83,10 @@ def test_a_switch_without_a_value_is_on(run: Run) -> None:
         (["--define", "OPAQUE=1"], "--define OPAQUE=1; no shader is named; add its NAME"),
         (["../README.md"], "no such shader"),
         (["opticz"], "did you mean optics?"),
+        (["--target", "wgsl"], "--target wgsl; no shader is named; add its NAME"),
+        ([*SIGNED, "--target", "cg"], "'cg' is not one of 'glsl', 'webgl2', 'vulkan', 'hlsl', 'msl', 'wgsl'"),
+        (["k_buffer", "--define", "OPAQUE=0", "--target", "webgl2"], "it writes to buffers, which WebGL2 has none of"),
+        (["hierarchy", "--define", "ONE_OBJECT=1", "--target", "msl"], "it is a part of stages"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
 )

@@ -311,3 +311,46 @@ def test_what_has_no_inside_is_refused(three_page: WebPage) -> None:
     assert "its geometry has no positions" in told["empty"]
     assert "use three's WebGLRenderer" in told["renderer"]
     assert "call render(scene, camera) first" in told["unread"]
+
+
+DEPTHS = """({ ball, wall, camera, size }) => {
+    const { THREE, ExactThicknessPass } = translucentThree;
+    const measured = (options, change) => tools.withRenderer(size, (renderer) => {
+        const scene = new THREE.Scene();
+        const body = tools.mesh(ball);
+        body.geometry.computeVertexNormals();
+        scene.add(body, tools.mesh(wall));
+        const pass = new ExactThicknessPass(renderer, { bodies: [body], exits: true });
+        const seen = tools.camera(camera);
+        change(seen);
+        pass.render(scene, seen);
+        const exits = new Float32Array(4 * size[0] * size[1]);
+        renderer.readRenderTargetPixels(pass.last, 0, 0, ...size, exits);
+        return { ...tools.pixels(pass), exits: tools.base64(exits) };
+    }, options);
+    const as_is = () => {};
+    return {
+        plain: measured({}, as_is),
+        reversed: measured({ reversedDepthBuffer: true }, as_is),
+        logarithmic: measured({ logarithmicDepthBuffer: true }, as_is),
+        part: measured({}, (seen) => seen.setViewOffset(2 * size[0], 2 * size[1], size[0], 0, ...size)),
+    };
+}"""
+
+
+def test_whatever_the_depth_buffer_is(three_page: WebPage) -> None:
+    """And of an off-axis view, the same as in the part of the picture that it shows."""
+    wall = Box((0.0, -2.0, -0.01), (2.0, 2.0, 0.0)).tessellate()
+    camera = described_camera(seen_from(5.0, fov_y=30.0), (64, 64))
+    asked = {"ball": described(BALL), "wall": described(wall), "camera": camera, "size": (64, 64)}
+    found = three_page.run(DEPTHS, asked)
+    assert found["reversed"] == found["plain"]
+    assert found["logarithmic"] == found["plain"]
+    exits = decoded(found["plain"]["exits"]).reshape(64, 64, 4)[32, 32]
+    assert exits == pytest.approx([0.0, 0.0, -1.0, 6.0], abs=0.05)
+    whole, part = Measured.of(found["plain"]), Measured.of(found["part"])
+    # Pixels of the whole lie between four of the part.
+    between = part.thickness.reshape(32, 2, 32, 2).mean(axis=(1, 3))
+    deep = whole.thickness[:32, 32:] > 0.8
+    assert deep.sum() > 200
+    assert between[deep] == pytest.approx(whole.thickness[:32, 32:][deep], abs=SAGITTA + 0.01)

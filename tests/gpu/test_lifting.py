@@ -14,7 +14,7 @@ from translucent.frames.frame import ARRAYS
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import shaders
 from translucent.gpu.constants import CONSTANTS
-from translucent.gpu.dialects import PLAIN, WITH_STORAGE
+from translucent.gpu.dialects import ES, PLAIN, VULKAN, WITH_STORAGE, Dialect
 from translucent.gpu.lifting import find_shader, lift, switches
 from translucent.gpu.shaders import ShaderSource, gather
 
@@ -47,16 +47,21 @@ SCENES: Mapping[str, tuple[tl.Scene, tl.SignedDepth | tl.DepthPeeling | None]] =
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    ("name", "target"), [*((name, "glsl") for name in SCENES), ("sum", "webgl2"), ("peeling", "webgl2")]
+)
 def test_a_picture_is_the_same_with_lifted_shaders(
-    name: str, renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+    name: str, target: Dialect, renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, method = SCENES[name]
     lifted: set[str] = set()
+    with renderer.gpu.context.current() as gl:
+        if target == "webgl2" and "GL_ARB_ES3_compatibility" not in gl.extensions:
+            pytest.skip("this OpenGL does not compile GLSL ES 3.00: no GL_ARB_ES3_compatibility")
 
     def text_of(file: str, defines: Mapping[str, int], version: int) -> ShaderSource:
         asked = gather(file).switches
-        found = lift(file, {key: int(value) for key, value in defines.items() if key in asked})
+        found = lift(file, {key: int(value) for key, value in defines.items() if key in asked}, target)
         assert found.version <= version
         lifted.add(file)
         # Whoever builds a program wants to know which stage asks for a switch and which declares a sampler.
@@ -115,6 +120,63 @@ def test_the_version_is_that_which_the_text_needs() -> None:
     lists = "intervals/fragment_lists.frag"
     assert lift(lists, values(lists)).version == WITH_STORAGE
     assert lift("lib/optics.glsl", {}).version == PLAIN
+
+
+@pytest.mark.parametrize("name", shader_names())
+def test_all_but_shaders_with_buffers_are_there_in_glsl_es(name: str) -> None:
+    given = values(name)
+    plain = lift(name, given)
+    if plain.version == WITH_STORAGE:
+        with pytest.raises(tl.InputError, match=r"writes to buffers, .*; use the shaders of a method .*signed_depth"):
+            lift(name, given, "webgl2")
+        return
+    lifted = lift(name, given, "webgl2")
+    assert lifted.version == ES
+    assert lifted.text.startswith("#version 300 es\n")
+    kinds = set(re.findall(r"\b[iu]?sampler\w+", re.sub(r"//.*", "", lifted.text)))
+    assert {kind for kind in kinds if f"precision highp {kind};" not in lifted.text} == set()
+    # But for the lines that say what it is, it is what desktops get.
+    own = ("#version", "#extension", "precision highp", "#define precise")
+    texts = (lifted.text, plain.text)
+    code = [[line for line in text.splitlines() if not line.startswith(own)] for text in texts]
+    assert code[0] == code[1]
+
+
+def test_a_target_that_is_none_is_told() -> None:
+    with pytest.raises(tl.InputError, match=r"target 'metal'; unknown; use one of glsl, webgl2, vulkan"):
+        lift("lib/optics.glsl", {}, "metal")  # type: ignore[arg-type]
+    with pytest.raises(tl.InputError, match=r"for other languages; it writes to buffers, which are not translated"):
+        lift("intervals/k_buffer.frag", values("intervals/k_buffer.frag"), "vulkan")
+
+
+@pytest.mark.parametrize("name", [name for name in shader_names() if not name.endswith(".glsl")])
+def test_every_stage_is_there_for_vulkan(name: str) -> None:
+    if lift(name, values(name)).version == WITH_STORAGE:
+        return
+    code = re.sub(r"//.*", "", lift(name, values(name), "vulkan").text)
+    assert re.findall(r"^(?:flat )?(?:uniform|in|out) .*", code, re.MULTILINE) == []
+    places = re.findall(r"binding = (\d+)\)", code)
+    assert len(places) == len(set(places))
+
+
+def test_for_vulkan_everything_has_its_place() -> None:
+    name = "shade/paint.frag"
+    text = lift(name, dict.fromkeys(switches(name), 1), "vulkan").text
+    assert text.startswith(f"#version {VULKAN} core\n")
+    code = re.sub(r"//.*", "", text)
+    assert re.findall(r"^(?:flat )?(?:uniform|in|out) .*", code, re.MULTILINE) == []
+    places = re.findall(r"set = 0, binding = (\d+)", code)
+    assert len(places) == len(set(places)) >= 3
+    assert "row_major" not in code
+    # What stages hand on is at the same place in both.
+    handed = dict(re.findall(r"layout\(location = (\d+)\) out \w+ (\w+);", lift_stage("geometry/interface.vert")))
+    taken = dict(re.findall(r"layout\(location = (\d+)\) in \w+ (\w+);", code))
+    assert taken
+    assert taken.items() <= handed.items()
+
+
+def lift_stage(name: str) -> str:
+    return lift(name, dict.fromkeys(switches(name), 1), "vulkan").text
 
 
 def test_only_switches_that_decide_something_are_asked_for() -> None:

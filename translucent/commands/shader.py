@@ -1,4 +1,4 @@
-"""``translucent shader``: the GLSL of the toolkit, to be used elsewhere."""
+"""``translucent shader``: the shaders of the toolkit, to be used elsewhere."""
 
 from __future__ import annotations
 
@@ -12,44 +12,67 @@ from translucent.commands.console import echo
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
+    from translucent.commands.translating import Language
     from translucent.gpu.dialects import Dialect
+    from translucent.gpu.std140 import UniformBlock
 
 
-@click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0")
+@click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target wgsl")
 @click.argument("name", required=False)
 @click.option("--define", "defines", multiple=True, metavar="X=1", help="Value of a switch, once for each that it has.")
 @click.option(
     "--target",
-    type=click.Choice(["glsl", "webgl2"]),
+    type=click.Choice(["glsl", "webgl2", "vulkan", "hlsl", "msl", "wgsl"]),
     default="glsl",
     show_default=True,
     help="Language to write it in.",
 )
 @common_options
-def shader(name: str | None, defines: tuple[str, ...], target: Dialect, as_json: bool) -> None:
+def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Language, as_json: bool) -> None:
     """Print the shader NAME as one text, with its constants and includes in place and without what it does not use.
 
     NAME is a file under shaders/, or its name alone where no other has it. Without NAME, all are listed, with the
     switches that they ask for.
+
+    glsl is that of OpenGL 3.3, webgl2 that of WebGL2 and OpenGL ES 3.0, vulkan that of Vulkan. hlsl, msl (Metal) and
+    wgsl (WebGPU) are made from the last by translators, which have to be installed: glslang and SPIRV-Cross, or naga.
     """
+    from translucent.commands.translating import translate
     from translucent.gpu.lifting import find_shader, lift
 
     given = dict(map(_define, defines))
     if name is None:
-        if given:
-            raise InputError(f"--define {defines[0]}", "no shader is named", "add its NAME")
+        if given or target != "glsl":
+            option = f"--define {defines[0]}" if defines else f"--target {target}"
+            raise InputError(option, "no shader is named", "add its NAME")
         return _list(as_json)
-    lifted = lift(find_shader(name), given, target)
+    found = find_shader(name)
+    if target == "hlsl" or target == "msl" or target == "wgsl":
+        translated = translate(found, given, target)
+        lifted, text, version = translated.lifted, translated.text, None
+    else:
+        lifted = lift(found, given, target)
+        text, version = lifted.text, lifted.version
     if not as_json:
-        return echo(lifted.text, nl=False)
+        return echo(text, nl=False)
     told = {
         "name": lifted.name,
         "target": target,
-        "version": lifted.version,
+        "version": version,
         "defines": lifted.defines,
         "files": lifted.files,
+        "blocks": [_placed(block) for block in lifted.blocks],
+        "text": text,
     }
-    return echo(json.dumps({**told, "text": lifted.text}))
+    return echo(json.dumps(told))
+
+
+def _placed(block: UniformBlock) -> dict[str, object]:
+    """Where a uniform block is bound, and where its members are in it."""
+    fields = block.dtype.fields
+    assert fields is not None
+    offsets = {name: place for name, (_, place, *_) in fields.items()}
+    return {"name": block.name, "binding": block.binding, "bytes": block.dtype.itemsize, "offsets": offsets}
 
 
 def _list(as_json: bool) -> None:

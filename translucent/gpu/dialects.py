@@ -8,15 +8,15 @@ from typing import Literal, get_args
 
 from translucent.errors import InputError
 
-#: GLSL of desktops, and that of WebGL2, which is GLSL ES 3.00.
-Dialect = Literal["glsl", "webgl2"]
+#: GLSL of desktops, that of WebGL2, which is GLSL ES 3.00, and that of Vulkan.
+Dialect = Literal["glsl", "webgl2", "vulkan"]
 
 #: Identifiers that need a newer GLSL version.
 _STORAGE = re.compile(r"\bstd430\b|\batomic\w+\s*\(")
 _SAMPLER = re.compile(r"\b[iu]?sampler\w+")
 
-#: Versions of GLSL: for all shaders, for those that write to buffers, and for WebGL2.
-PLAIN, WITH_STORAGE, ES = 330, 430, 300
+#: Versions of GLSL: for all shaders, for those that write to buffers, for WebGL2, and for Vulkan.
+PLAIN, WITH_STORAGE, ES, VULKAN = 330, 430, 300, 450
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def head_of(name: str, code: str, dialect: Dialect) -> Head:
         File under ``shaders/``.
     code : str
         Without comments.
-    dialect : {"glsl", "webgl2"}
+    dialect : {"glsl", "webgl2", "vulkan"}
 
     Raises
     ------
@@ -71,10 +71,13 @@ def head_of(name: str, code: str, dialect: Dialect) -> Head:
         return Head(version, (f"#version {version} core", told, *asked))
     if stores:
         raise InputError(
-            f"shader {name!r} for WebGL2",
-            "it writes to buffers, which WebGL2 has none of",
+            f"shader {name!r} for {'WebGL2' if dialect == 'webgl2' else 'other languages'}",
+            f"it writes to buffers, which {'WebGL2 has none of' if dialect == 'webgl2' else 'are not translated'}",
             "use the shaders of a method that does not: signed_depth for sums, peel and peel_fold for ordered segments",
         )
+    if dialect == "vulkan":
+        asked = ["#extension GL_EXT_samplerless_texture_functions : require"] if "texelFetch" in code else []
+        return Head(VULKAN, (f"#version {VULKAN} core", told, *asked))
     # Fragment shaders have no precision by default, and most samplers a low one in both stages.
     samplers = sorted(set(_SAMPLER.findall(code)))
     highp = [f"precision highp {kind};" for kind in ("float", "int", *samplers)]

@@ -16,7 +16,10 @@ from translucent.assets import shader_names
 from translucent.errors import InputError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.dialects import Dialect, check_dialect, head_of
+from translucent.gpu.layout import BLOCKS
 from translucent.gpu.shaders import Gathered, gather
+from translucent.gpu.std140 import UniformBlock
+from translucent.gpu.vulkan_glsl import in_vulkan
 from translucent.suggestions import close_names, did_you_mean
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -28,6 +31,7 @@ _WORDS = re.compile(
     r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
 )
 _LINE = re.compile(r"#line \d+ (\d+)$")
+_BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
 _DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
 
 
@@ -39,13 +43,15 @@ class Lifted:
     ----------
     name : str
         File under ``shaders/``.
-    dialect : {"glsl", "webgl2"}
+    dialect : {"glsl", "webgl2", "vulkan"}
     version : int
         Of GLSL that it needs.
     defines : dict of str to int
         By which its switches are decided.
     files : tuple of str
         Those of which something is in it.
+    blocks : tuple of UniformBlock
+        Uniform blocks in it.
     text : str
     """
 
@@ -54,6 +60,7 @@ class Lifted:
     version: int
     defines: Mapping[str, int]
     files: tuple[str, ...]
+    blocks: tuple[UniformBlock, ...]
     text: str
 
 
@@ -119,8 +126,9 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         As `find_shader` gives it.
     defines : dict of str to int
         Values of its switches; those in parts that others leave out may be missing.
-    target : {"glsl", "webgl2"}
-        GLSL 3.30 core, or 4.30 where it writes to buffers; or GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take.
+    target : {"glsl", "webgl2", "vulkan"}
+        GLSL 3.30 core, or 4.30 where it writes to buffers; GLSL ES 3.00, which WebGL2 and OpenGL ES 3.0 take; or
+        GLSL 4.50 for Vulkan (`translucent.gpu.vulkan_glsl`), which translators to other languages read.
 
     Raises
     ------
@@ -135,13 +143,17 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     parts = list(_parts(_decided(name, gathered, defines)))
     kept = _reached(parts)
     used = set().union(*(part.names for part in kept))
-    body = "\n\n".join(part.text.strip("\n") for part in kept)
-    head = head_of(name, "\n".join(part.code for part in kept), target)
+    texts = [part.text.strip("\n") for part in kept]
+    code = "\n".join(part.code for part in kept)
+    head = head_of(name, code, target)
+    body = "\n\n".join(in_vulkan(name, texts, code) if target == "vulkan" else texts)
     decided = {key: int(value) for key, value in defines.items()}
     defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
     defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
     files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
-    return Lifted(name, target, head.version, decided, files, "\n".join([*head.lines, *defined, "", body, ""]))
+    blocks = tuple(BLOCKS[key] for key in _BLOCK.findall(code))
+    text = "\n".join([*head.lines, *defined, "", body, ""])
+    return Lifted(name, target, head.version, decided, files, blocks, text)
 
 
 def _decided(name: str, gathered: Gathered, defines: Mapping[str, int]) -> Iterator[tuple[int, str]]:

@@ -58,7 +58,7 @@ def run_function(
     """
     arrays = [np.ascontiguousarray(argument, dtype=np.float32) for argument in arguments]
     count, width = len(arrays[0]), _width(signature.returns)
-    program = gl.program(vertex_shader=_program(preprocess(library).text, signature), varyings=["result"])
+    program = gl.program(vertex_shader=feedback_program(preprocess(library).text, signature), varyings=["result"])
     content: list[tuple[moderngl.Buffer, str, str]] = []
     tables: list[moderngl.Texture] = []
     for array, (kind, name, length) in zip(arrays, signature.parameters, strict=True):
@@ -88,7 +88,7 @@ def _width(kind: str) -> int:
     return _WIDTH[name] * int(length or 1)
 
 
-def _program(source: str, signature: Signature) -> str:
+def feedback_program(source: str, signature: Signature) -> str:
     """Vertex shader that calls the function: arrays are rows of textures, of which there is one for each."""
     inputs: list[str] = []
     before: list[str] = []

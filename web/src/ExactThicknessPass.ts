@@ -1,11 +1,11 @@
 /** One unsorted, additive pass: metres of every ray inside bodies. shaders/thickness/signed_depth.frag is what it draws. */
 import {
   Box3,
-  Camera,
   FloatType,
   HalfFloatType,
   Mesh,
   NearestFilter,
+  OrthographicCamera,
   BufferGeometry,
   BufferAttribute,
   RGFormat,
@@ -16,7 +16,7 @@ import {
   Vector3,
   WebGLRenderTarget,
 } from "three";
-import type { Material, Object3D, Texture, WebGLRenderer } from "three";
+import type { Camera, Material, Object3D, Texture, WebGLRenderer } from "three";
 import { StandIn, checkBody, visibleMeshes } from "./bodies.js";
 import { TranslucentError } from "./errors.js";
 import { extinctionOf } from "./extinction.js";
@@ -83,7 +83,8 @@ export class ExactThicknessPass {
   private readonly resolvers: Record<string, Material> = {};
   private readonly screen: Mesh;
   private readonly stage = new Scene();
-  private readonly eye = new Camera();
+  // Any: the shaders place bodies themselves. One of these knows reversed and logarithmic depth.
+  private readonly eye = new OrthographicCamera();
   private layout = "";
 
   constructor(renderer: WebGLRenderer, options: ExactThicknessOptions = {}) {

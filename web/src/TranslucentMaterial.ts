@@ -57,11 +57,10 @@ vec3 exactPoint(vec2 place, float axial) {
 vec3 exactBehind(vec3 p, vec3 direction, float roughness, float ior) {
   vec2 place = exactPlace(p);
   vec4 seen = getTransmissionSample(place, roughness, ior);
-#ifdef ENVMAP_TYPE_CUBE_UV
+#ifdef USE_ENVMAP
   bool opaque = exactUse[2] && exactTexel(exactEnds, place).r < 1e4 && all(equal(place, clamp(place, 0.0, 1.0)));
-  vec3 outwards = normalize((vec4(direction, 0.0) * viewMatrix).xyz);
-  vec3 far = textureCubeUV(envMap, envMapRotation * outwards, applyIorToRoughness(roughness, ior)).rgb * envMapIntensity;
-  return opaque ? seen.rgb : far;
+  // What a mirror that faces this way would show.
+  return opaque ? seen.rgb : getIBLRadiance(direction, direction, applyIorToRoughness(roughness, ior));
 #else
   return seen.rgb;
 #endif
