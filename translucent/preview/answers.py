@@ -13,6 +13,7 @@ from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
 from translucent.preview.exports import write_picture, write_turntable
 from translucent.preview.scenes import medium_of, method_of, scattering_of
+from translucent.preview.staging import tone_of
 
 
 def take_answers(desk: Desk) -> None:
@@ -51,11 +52,11 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
 
 
 def _export(desk: Desk, kind: str, path: str) -> None:
-    scene, document = desk.work.scene(), desk.work.document
+    scene, document = desk.work.picture(), desk.work.document
     if scene is None:
         return
     method, size = method_of(document.display.method, document.material), desk.stage.viewport.size
-    look, scattering = (document.look.exposure, document.look.tone), scattering_of(document.display.scattering)
+    look, scattering = (document.look.exposure, tone_of(document.look, scene)), scattering_of(document.display.scattering)
     if kind == "turntable":
         desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], scattering)
     else:

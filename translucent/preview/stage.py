@@ -19,11 +19,13 @@ from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
+from translucent.planning.shadow_maps import ShadowMaps
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
 from translucent.preview.diffusing import Diffusing
 from translucent.preview.measuring import Truth
 from translucent.preview.scenes import method_of, scattering_of
+from translucent.preview.staging import tone_of
 from translucent.preview.tasks import Task
 from translucent.preview.timing import Timing, kind
 from translucent.preview.workspace import Workspace
@@ -39,6 +41,9 @@ FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
 #: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
 COARSEST_TRACED = 3.0
+
+#: Shadows of a picture that moves: those of a few directions of the environment.
+QUICK_SHADOWS = ShadowMaps(directions=8)
 
 #: Seconds between checks of the shader files.
 WATCH = 0.5
@@ -177,21 +182,33 @@ class Stage:
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
         look, interfaces, scattering = workspace.document.look, self._quick_interfaces(self.plans[0]), self._scattering
-        if interfaces is not None:
-            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, scattering=self._scattering)
+        shadows = QUICK_SHADOWS if scene.environment_shadows else None
+        if interfaces is not None or shadows is not None:
+            self._moving = self.renderer.plan(
+                scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
+            )
         begun, factor = time.perf_counter(), self._factor(self._moving or self.plans[0], FACTORS)
         try:
             with self.viewport.at_once(factor) as framebuffer:
                 plan = self.renderer.draw(
-                    scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces, scattering=scattering
+                    scene,
+                    framebuffer,
+                    method,
+                    look.exposure,
+                    tone_of(look, scene),
+                    interfaces=interfaces,
+                    scattering=scattering,
+                    shadows=shadows,
                 )
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
-        if self._moving is not None:
+        if interfaces is not None:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
+        elif shadows is not None:
+            self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
         self._presented = ()
         return True
 
@@ -263,7 +280,7 @@ class Stage:
             self.thickest(workspace),
             self.worst(workspace),
             look.exposure,
-            look.tone,
+            tone_of(look, scene),
         )
         wanted = (shown, self._shown)
         if changed or wanted != self._presented:

@@ -23,4 +23,4 @@ class Timing:
 
 def kind(plan: RenderPlan) -> tuple[str, ...]:
     """Key of plans that take about the same time."""
-    return (str(plan.method), *(step.name for step in plan.passes))
+    return (str(plan.method), str(plan.shadows.directions), *(step.name for step in plan.passes))

@@ -7,8 +7,16 @@ from imgui_bundle import imgui
 from translucent.formulas.tone import TONES
 from translucent.preview.actions import Change, SetOrbit
 from translucent.preview.desk import FAINT, Desk, begin_rows, check, choice, fact, row, slider, wrapped
+from translucent.preview.document import AUTO, STAGE_WORDS
 
 ENVIRONMENTS = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
+
+STAGE_TIP = (
+    "A ground that catches shadows, lamps and soft boxes, as --stage of translucent render; auto: studio, unless the\n"
+    "model brings a camera, lights or a ground, or an environment is chosen. Quantities and the reference go without."
+)
+ROTATION_TIP = "Of the environment; of a stage with its lamps. Or drag with E held."
+TONE_TIP = "auto: neutral on a stage, where light sources are brighter than white, else none."
 
 
 def look_panel(desk: Desk) -> None:
@@ -25,11 +33,12 @@ def look_panel(desk: Desk) -> None:
     if imgui.button("Reset") and orbit is not None:
         desk.work.do(SetOrbit(None))
         desk.work.reframe()
-    imgui.separator_text("Environment")
+    imgui.separator_text("Stage and environment")
     if begin_rows("environment"):
-        _environment(desk, "lights with", "look.environment", "the model's own")
+        choice(desk, "stage", "look.stage", STAGE_WORDS, tip=STAGE_TIP)
+        _environment(desk, "lights with", "look.environment", "the stage's, or the model's own")
         _environment(desk, "background", "look.background", "the same")
-        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
+        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg", tip=ROTATION_TIP)
         imgui.end_table()
     imgui.separator_text("Light")
     if begin_rows("light"):
@@ -42,7 +51,7 @@ def look_panel(desk: Desk) -> None:
     imgui.separator_text("Picture")
     if begin_rows("picture"):
         slider(desk, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
-        choice(desk, "tone curve", "look.tone", TONES)
+        choice(desk, "tone curve", "look.tone", (AUTO, *TONES), tip=TONE_TIP)
         imgui.end_table()
 
 
