@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack
 
-import moderngl
 import numpy as np
 import numpy.typing as npt
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.gltf.write import write_medium
+from translucent.planning.caustics import Caustics
 from translucent.preview.actions import Change
 from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer
@@ -14,6 +15,7 @@ from translucent.preview.document import Model
 from translucent.preview.exports import write_picture, write_turntable
 from translucent.preview.scenes import medium_of, method_of, scattering_of
 from translucent.preview.staging import tone_of
+from translucent.scene.scene import Scene
 
 
 def take_answers(desk: Desk) -> None:
@@ -56,11 +58,27 @@ def _export(desk: Desk, kind: str, path: str) -> None:
     if scene is None:
         return
     method, size = method_of(document.display.method, document.material), desk.stage.viewport.size
-    look, scattering = (document.look.exposure, tone_of(document.look, scene)), scattering_of(document.display.scattering)
+    look = document.look.exposure, tone_of(document.look, scene)
+    ways = scattering_of(document.display.scattering), caustics_of(desk, scene)
     if kind == "turntable":
-        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], scattering)
+        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], *ways)
     else:
-        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"], scattering)
+        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"], *ways)
+
+
+def caustics_of(desk: Desk, scene: Scene) -> Caustics | None:
+    """Photons of a file: as many as the picture on show has, and what ``translucent render`` follows at least."""
+    document = desk.work.document
+    if not document.display.caustics:
+        return None
+    light, method = desk.stage.photons.light, method_of(document.display.method, document.material)
+    caustics = Caustics(max(light.photons if light is not None else 0, Caustics().photons))
+    try:
+        desk.stage.renderer.plan(scene, method, caustics=caustics)
+    except InputError as error:
+        desk.work.tell("warning", f"without caustics: {error}")
+        return None
+    return caustics
 
 
 def _save_medium(desk: Desk, path: str) -> None:

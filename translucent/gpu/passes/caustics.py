@@ -63,7 +63,7 @@ class CausticsPass:
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the photons of this sample, and add their light to the opaque objects."""
         if job.averaged:
-            return
+            return None
         if job.photon_light is not None:
             return self._add_known(job, *job.photon_light)
         with ExitStack() as stack:
