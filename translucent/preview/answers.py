@@ -13,6 +13,7 @@ from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
 from translucent.preview.exports import write_picture, write_turntable
+from translucent.preview.recipes import Shot, command_line, python_code
 from translucent.preview.scenes import medium_of, method_of, scattering_of
 from translucent.preview.staging import tone_of
 from translucent.scene.scene import Scene
@@ -64,6 +65,26 @@ def _export(desk: Desk, kind: str, path: str) -> None:
         desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], *ways)
     else:
         desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"], *ways)
+
+
+def recipe(desk: Desk, kind: str) -> str | None:
+    """Text of a command, or of ``python``, that makes the picture from here; None before there is one."""
+    work = desk.work
+    if (scene := work.picture()) is None or work.loaded is None:
+        return None
+    if work.shown_bake is not None:
+        work.refuse(InputError("a recipe", "the model is painted with a map", "clear 'show on the model' first"))
+        return None
+    shot = Shot(work.document, work.loaded, scene, desk.stage.viewport.size, caustics_of(desk, scene))
+    if kind == "python":
+        work.tell("info", "copied as Python")
+        return python_code(shot)
+    text, left_out = command_line(shot)
+    if left_out:
+        work.tell("warning", f"no option of the copied command says: {', '.join(left_out)}; Python does")
+    else:
+        work.tell("info", "copied as a command")
+    return text
 
 
 def caustics_of(desk: Desk, scene: Scene) -> Caustics | None:

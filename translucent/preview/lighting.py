@@ -11,7 +11,7 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.solids import Box
 from translucent.preview.document import Document
-from translucent.preview.scenes import Loaded
+from translucent.preview.loaded import Loaded
 from translucent.preview.staging import environment_of, prepare_stage, stage_name
 from translucent.preview.tasks import Lane, Task
 from translucent.scene.environment_files import READERS

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from translucent.media.medium import Medium
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
 from translucent.preview.document import AUTO, Document, Look, Material, Model
+from translucent.preview.loaded import Loaded
 from translucent.preview.orbiting import camera_of
 from translucent.preview.staging import environment_of, stage_name, standing
 from translucent.scene.environment import Environment
@@ -26,25 +26,6 @@ from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable
 from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """Loaded model: its scene, and the material that its bodies came with."""
-
-    model: Model
-    scene: Scene
-    material: Material
-
-    @property
-    def bare(self) -> bool:
-        """Whether the model is a mesh, and no scene of a file."""
-        return not hasattr(self.scene, "has_camera")
-
-    @property
-    def triangles(self) -> int:
-        """Number of triangles that are drawn."""
-        return sum(len(item.mesh.faces) for item in self.scene.objects)
 
 
 def load(model: Model, allow_outside: bool = False) -> Loaded:

@@ -13,7 +13,7 @@ from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
-from translucent.gpu.viewport import Probe, Shown, Viewport
+from translucent.gpu.viewport import Probe, Viewport
 from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
@@ -23,9 +23,8 @@ from translucent.planning.shadow_maps import ShadowMaps
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
 from translucent.preview.diffusing import Diffusing
-from translucent.preview.measuring import Truth
 from translucent.preview.photons import Photons
-from translucent.preview.scales import thickest, worst
+from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of, scattering_of
 from translucent.preview.staging import tone_of
 from translucent.preview.tasks import Task
@@ -100,10 +99,9 @@ class Stage:
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._asked: Task | None = None
-        self._presented: tuple[object, ...] = ()
+        self._presenting = Presenting()
         self._pace = Pace()
         self._strides = [4, 4]
-        self._truth: Truth | None = None
         self._scattering: Scattering | None = None
         self._diffusing, self.converging, self.photons = Diffusing(), Converging(), Photons()
         self._watched, self._newest = time.monotonic(), newest_shader()
@@ -167,7 +165,7 @@ class Stage:
             ]
             self._shown = wanted
             self.viewport.restart()
-            self._truth = None
+            self._presenting.truth = None
             self._strides = [self._pace.factor(plan, STRIDES, BUDGET) for plan in self.plans]
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
@@ -185,7 +183,7 @@ class Stage:
             more, drawn = self._light_by_photons(scene, methods[0], display.antialias)
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
-        self._present(workspace, scene, changed=drawn)
+        self._presenting.present(workspace, scene, self.viewport, self._shown, changed=drawn)
         return more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
@@ -218,7 +216,7 @@ class Stage:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
             self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
-        self._presented = ()
+        self._presenting.shown = ()
         return True
 
     def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
@@ -278,38 +276,9 @@ class Stage:
         self._pace.note(plan, wall * stride * stride)
         self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
-    def _present(self, workspace: Workspace, scene: Scene, changed: bool) -> None:
-        display, look = workspace.document.display, workspace.document.look
-        wanted_method = method_of(display.method, workspace.document.material)
-        if display.compare in ("reference", "error"):
-            truth = workspace.truth
-            straight = display.compare == "error"
-            if self._truth is not None and straight and not self._truth.straight:
-                self._truth = None
-            fits = truth is not None and truth.scene is scene and truth.method == wanted_method
-            if fits and truth is not None and truth is not self._truth and truth.straight >= straight:
-                self.viewport.put(truth.frame)
-                self._truth, changed = truth, True
-        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
-        if display.compare in ("reference", "error") and self._truth is None:
-            right = "same"
-        shown = Shown(
-            display.mode,
-            right,
-            display.split,
-            thickest(workspace),
-            worst(workspace),
-            look.exposure,
-            tone_of(look, scene),
-        )
-        wanted = (shown, self._shown)
-        if changed or wanted != self._presented:
-            self.viewport.present(shown)
-            self._presented = wanted
-
     def has_truth(self) -> bool:
         """Whether the split shows the reference."""
-        return self._truth is not None
+        return self._presenting.truth is not None
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
         """Values of a pixel of a side, once it is final."""
@@ -414,7 +383,7 @@ class Stage:
         self.renderer = fresh
         self.viewport = Viewport(fresh.gpu)
         self.viewport.resize(size)
-        self._shown = self._presented = ()
+        self._shown = self._presenting.shown = ()
 
     def close(self) -> None:
         """Free all resources."""

@@ -6,9 +6,10 @@ import dataclasses
 import math
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from translucent.preview.document import AUTO, Document, Look, Material
+from translucent.preview.loaded import Loaded
+from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
 from translucent.scene.shadow_directions import shadow_directions
@@ -16,10 +17,6 @@ from translucent.scene.showcase import LIGHT_TABLE, STAGED_IOR, framing, named_e
 from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, STAGED_TONE, stage_named
 from translucent.scene.staging import ENVIRONMENT_SHADOWS, has_ground, staged, view_axes
 from translucent.scene.turntable import on_stage
-
-if TYPE_CHECKING:
-    from translucent.preview.scenes import Loaded
-    from translucent.scene.camera import Camera
 
 
 def stage_name(look: Look, loaded: Loaded) -> str:

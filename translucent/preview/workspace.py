@@ -22,8 +22,9 @@ from translucent.preview.document import Display, Document, Model, Orbit
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
+from translucent.preview.loaded import Loaded
 from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
-from translucent.preview.scenes import Loaded, load, medium_of, scene_of
+from translucent.preview.scenes import load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.staging import own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
@@ -200,7 +201,6 @@ class Workspace:
         if self._scene is not None:
             known, model, scene = self._scene
             same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))
-            same = same and known.display.pictured == document.display.pictured
             if same and model is loaded and _lit_alike(known, document):
                 return scene
         scene = scene_of(document, loaded)
@@ -395,6 +395,6 @@ def _first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
 
 
 def _lit_alike(first: Document, second: Document) -> bool:
-    """Whether two looks differ only in exposure and tone curve."""
+    """Whether two looks differ only in exposure and tone curve, before the same kind of backdrop."""
     developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
-    return developed == second.look
+    return developed == second.look and first.display.pictured == second.display.pictured

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from translucent.formulas.tone import TONES
 from translucent.preview.actions import Change, SetOrbit
+from translucent.preview.answers import recipe
 from translucent.preview.desk import FAINT, Desk, begin_rows, check, choice, fact, row, slider, wrapped
 from translucent.preview.document import AUTO, STAGE_WORDS
 
@@ -17,6 +18,11 @@ STAGE_TIP = (
 )
 ROTATION_TIP = "Of the environment; of a stage with its lamps. Or drag with E held."
 TONE_TIP = "auto: neutral on a stage, where light sources are brighter than white, else none."
+
+RECIPES = (
+    ("Copy command", "command", "translucent render with options for this picture, its stage and caustics"),
+    ("Copy Python", "python", "A script that makes this picture, with all that no option says"),
+)
 
 
 def look_panel(desk: Desk) -> None:
@@ -79,6 +85,13 @@ def files_panel(desk: Desk) -> None:
         imgui.same_line()
     if imgui.button("Turntable ..."):
         desk.ask_file("turntable")
+    for label, kind, tip in RECIPES:
+        if imgui.button(label):
+            _copy(desk, kind)
+        if imgui.is_item_hovered():
+            imgui.set_tooltip(tip)
+        imgui.same_line()
+    imgui.new_line()
     imgui.separator_text("Session")
     if imgui.button("Open session ..."):
         desk.ask_file("open session")
@@ -93,6 +106,12 @@ def files_panel(desk: Desk) -> None:
 
     if hasattr(tl, "bake_thickness"):
         _bake(desk)
+
+
+def _copy(desk: Desk, kind: str) -> None:
+    """Copy how to make this picture without the window."""
+    if (text := recipe(desk, kind)) is not None:
+        imgui.set_clipboard_text(text)
 
 
 def _bake(desk: Desk) -> None:
