@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from translucent.formulas.brdf_table import brdf_table
@@ -40,12 +40,14 @@ class Lighting:
     begun: bool = False
     _ready: Names = ("", "", NO_STAGE)
     _asked: Names | None = None
+    #: Stages whose light is known.
+    _made: set[str] = field(default_factory=lambda: {NO_STAGE})
 
     def lit(self, document: Document, loaded: Loaded) -> Document:
         """Document with the last environments and the last stage in place of its own, if these are not ready."""
         look = document.look
         wanted = look.environment, look.background, stage_name(look, loaded)
-        if not any(map(_is_file, wanted[:2])) and wanted[2] == NO_STAGE:
+        if not any(map(_is_file, wanted[:2])) and wanted[2] in self._made:
             self._ready, self._asked = wanted, None
         elif wanted != self._asked and (self.begun or wanted[2] == NO_STAGE):
             self._asked = wanted
@@ -58,6 +60,8 @@ class Lighting:
 
     def _take(self, names: Names) -> None:
         self._ready = names
+        if not any(names[:2]):
+            self._made.add(names[2])
 
 
 def prepare(_: Task) -> None:

@@ -17,6 +17,9 @@ from translucent.scene.scene import Scene
 #: Photons of a round, rounds after which they are first shown, and photons after which a picture is done.
 ROUND, FIRST_ROUNDS, MOST_PHOTONS = 1 << 14, 4, 1 << 26
 
+#: Seconds of following photons for each second of drawing, at least.
+SHARE = 0.5
+
 #: Noise of the picture, as a share of its mean radiance, at which it is done, too.
 QUIET = 1e-3
 
@@ -24,7 +27,7 @@ QUIET = 1e-3
 class Photons:
     """Photons of the scene on show, and pictures with their light: the next is drawn aside, and then takes over.
 
-    Each picture has twice the photons of the one before at least, and drawing takes no more of the time than following.
+    Each picture has twice the photons of the one before at least, and more where drawing it takes long.
 
     Attributes
     ----------
@@ -47,6 +50,7 @@ class Photons:
         self.plan: RenderPlan | None = None
         self.light: PhotonLight | None = None
         self.drawing, self.side, self._on_show = False, 1, False
+        self._in_texture = self._in_picture = 0  # photons
         self._scene: Scene | None = None
         self._noise, self._next = float("inf"), FIRST_ROUNDS
         self._following = self._drawing = self._begun = 0.0  # seconds spent, and when drawing began
@@ -59,8 +63,12 @@ class Photons:
         method: Method | None,
         scattering: Scattering | None,
         seconds: float,
+        drawing: float,
     ) -> bool:
-        """Follow photons for about so many seconds, unless a picture is being drawn; whether any are to be followed."""
+        """Follow photons for about so many seconds, unless a picture is being drawn; whether any are to be followed.
+
+        Pictures are expected to take `drawing` seconds.
+        """
         try:
             if self._scene is not scene:
                 self.stop(viewport)
@@ -79,8 +87,9 @@ class Photons:
             begun = time.perf_counter()
             self.light.step(seconds)
             self._following += time.perf_counter() - begun
-            if self.light.rounds >= self._next and self._following >= self._drawing:
+            if self.light.rounds >= self._next and self._following >= SHARE * max(self._drawing, drawing):
                 self.light.show()
+                self._in_texture = self.light.photons
                 viewport.restart(1)
                 self.drawing, self.side, self._begun = True, 1, time.perf_counter()
             self._tell()
@@ -103,6 +112,7 @@ class Photons:
         if over := self.side == 1 and drawn == (whole if stride > 1 else last):
             viewport.swap()
             self.side, self._on_show = 0, True
+            self._in_picture = self._in_texture
             mean = viewport.mean_radiance()
             self._noise = self.light.error / mean if mean > 0 else 0.0
         if drawn >= last:
@@ -113,9 +123,9 @@ class Photons:
 
     def _tell(self) -> None:
         assert self.light is not None
-        state = "caustics" if self.done else "caustics, so far" if self._on_show else "caustics, not in the picture yet"
         noise = f", standard error {self._noise:.2%}" if self._noise < 1e3 else ""
-        self.told = f"{state}: {self.light.photons:,} photons{noise}"
+        seen = f"{self._in_picture:,} photons in the picture{noise}" if self._in_picture else "not in the picture yet"
+        self.told = f"caustics: {seen}" if self.done else f"caustics: {seen}; {self.light.photons:,} so far"
 
     def stop(self, viewport: Viewport) -> bool:
         """End it; returns whether its picture was on show."""

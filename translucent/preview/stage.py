@@ -255,7 +255,8 @@ class Stage:
     def _light_by_photons(self, scene: Scene, method: Method | None, antialias: bool) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons = self.photons
-        if not photons.ready(scene, self.renderer, self.viewport, method, self._scattering, BUDGET):
+        expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
+        if not photons.ready(scene, self.renderer, self.viewport, method, self._scattering, BUDGET, expected):
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 
 Factor = TypeVar("Factor", int, float)
@@ -50,5 +51,6 @@ class Pace:
         """Smallest factor of reduction at which a picture is expected to be drawn within so many seconds."""
         known = None if plan is None else self._seconds.get(kind(plan))
         if known is None:
-            return factors[0] if plan is None else factors[-2]
+            slow = plan is not None and plan.has(PassName.SHADOW_MAPS)
+            return factors[0] if plan is None else factors[-1] if slow else factors[-2]
         return next((factor for factor in factors if known / factor**2 <= budget), factors[-1])
