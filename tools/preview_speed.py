@@ -40,6 +40,8 @@ class Orbit(Script):
         if not hasattr(self, "started"):
             self.started, self.frames, self.inside, self.sizes = time.perf_counter(), [], [], set()
             desk.work.do(Change("display.inset", False))
+        if desk.work.compiler.lane.task is not None:  # the last picture stays
+            self.started, self.frames, self.inside = time.perf_counter(), [], []
         self.frames.append(time.perf_counter())
         self.inside.append(desk.stage.drawing)
         self.sizes.add(desk.stage.viewport.size)

@@ -87,7 +87,8 @@ class Photons:
             begun = time.perf_counter()
             self.light.step(seconds)
             self._following += time.perf_counter() - begun
-            if self.light.rounds >= self._next and self._following >= SHARE * max(self._drawing, drawing):
+            due = self.light.rounds >= self._next and self._following >= SHARE * max(self._drawing, drawing)
+            if due or self.light.photons >= MOST_PHOTONS:
                 self.light.show()
                 self._in_texture = self.light.photons
                 viewport.restart(1)
@@ -98,8 +99,7 @@ class Photons:
     @property
     def done(self) -> bool:
         """Whether more photons would change nothing to be seen."""
-        light = self.light
-        return light is not None and not self.drawing and (light.photons >= MOST_PHOTONS or self._noise < QUIET)
+        return not self.drawing and (self._in_picture >= MOST_PHOTONS or self._noise < QUIET)
 
     def take_over(self, viewport: Viewport, stride: int, samples: int) -> bool:
         """Put the picture that is drawn aside on show once it is whole; returns whether it was put there.

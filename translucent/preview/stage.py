@@ -188,9 +188,12 @@ class Stage:
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, interfaces, scattering = workspace.document.look, self._quick_interfaces(self.plans[0]), self._scattering
+        look, scattering, interfaces = workspace.document.look, self._scattering, None
         shadows = QUICK_SHADOWS if scene.environment_shadows else None
-        if interfaces is not None or shadows is not None:
+        if shadows is not None:
+            self._moving = self.renderer.plan(scene, method, scattering=scattering, shadows=shadows)
+        if self._traces_slowly(self.plans[0]) or self._traces_slowly(self._moving):
+            interfaces = ScreenInterfaces()
             self._moving = self.renderer.plan(
                 scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
             )
@@ -231,12 +234,11 @@ class Stage:
         """Remark on how diffused light is shown while it is not known; empty if it is known."""
         return self._diffusing.told
 
-    def _quick_interfaces(self, plan: RenderPlan | None) -> ScreenInterfaces | None:
-        """Interfaces for a picture that moves, if tracing them is known to take too long; else None."""
+    def _traces_slowly(self, plan: RenderPlan | None) -> bool:
+        """Whether tracing interfaces is known to take too long for a picture that moves."""
         if plan is None or not plan.has(PassName.TRACED):
-            return None
-        slow = self._pace.known(plan) / COARSEST_TRACED**2 > BUDGET
-        return ScreenInterfaces() if slow else None
+            return False
+        return self._pace.known(plan) / COARSEST_TRACED**2 > BUDGET
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
         """Draw the next sample of a side, if there is one left to draw."""
