@@ -270,3 +270,25 @@ def test_stages_that_are_none_are_refused(
 ) -> None:
     assert main(list(arguments)) == 2
     assert message in capsys.readouterr().err
+
+
+def test_quick_shadows_need_no_more_maps_than_they_read(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all, if these are there; and else of a few, so that an environment can be turned."""
+    scene, quick, made = plain(staged), tl.ShadowMaps(directions=4), []
+    add_up = shadow_maps.ShadowMapsPass._add_up
+    monkeypatch.setattr(shadow_maps.ShadowMapsPass, "_add_up", lambda *given: made.append(1) or add_up(*given))
+    turned = dataclasses.replace(scene, environment=dataclasses.replace(scene.environment, rotation=70.0))
+    with tl.Renderer() as renderer:
+        pictures = []
+        for shown, shadows, count in (
+            (scene, quick, 5),
+            (scene, quick, 0),
+            (scene, None, 17),
+            (scene, quick, 0),
+            (turned, quick, 5),
+            (turned, None, 17),
+        ):
+            made.clear()
+            pictures.append(renderer.render(shown, SMALL, shadows=shadows).radiance)
+            assert len(made) == count
+    np.testing.assert_allclose(pictures[3], pictures[0], rtol=1e-4, atol=1e-6)

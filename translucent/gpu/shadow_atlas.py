@@ -204,10 +204,13 @@ class Seen:
         What decides where light goes.
     media : tuple of bytes or None
         Extinction in each object.
+    step : int
+        There are maps of every so-many-th direction of the environment.
     """
 
     places: tuple[object, ...]
     media: tuple[bytes | None, ...]
+    step: int = 1
 
     def fits(self, other: Seen, *, path_only: bool) -> bool:
         """Whether maps of this are those of another; of one medium they are paths, whatever it absorbs."""

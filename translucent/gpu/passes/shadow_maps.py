@@ -128,6 +128,10 @@ class ShadowMapsPass:
         seen = _seen(job)
         if atlas.held is None or not atlas.held.fits(seen, path_only=not atlas.spectral):
             atlas.held = None
+        if few and (atlas.held is None or atlas.held.step == step):
+            seen, first, step, few = replace(seen, step=step), 0, 1, False  # no more than these
+        elif atlas.held is not None and atlas.held.step > 1:
+            atlas.held = None
         if atlas.held is None or not atlas.drawn.issuperset(self._read(atlas.views, first, step)):
             self._render(job, seen, first, step)
         assert atlas.views is not None
@@ -135,7 +139,8 @@ class ShadowMapsPass:
         extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
         turns = first, -step if few else step
         job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
-        irradiance = shadow_directions(scene.environment, count)[1] if count else np.zeros((0, 3))
+        assert atlas.held is not None
+        irradiance = shadow_directions(scene.environment, count)[1][:: atlas.held.step] if count else np.zeros((0, 3))
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
         job.uniforms.bind()
 
@@ -188,13 +193,13 @@ class ShadowMapsPass:
 
     def _views(self, job: FrameJob, seen: Seen, *, in_place: bool) -> ShadowViews:
         """Places of all maps; where they are stays the same when only media change."""
-        key = seen.places, in_place
+        key = seen.places, seen.step, in_place
         if self._placed is None or self._placed[0] != key:
             scene = job.scene
             corners = [outermost(item) for item in scene.objects]
             lights, sky = (
                 [ShadowThrowers(light, scene, corners) for light in group]
-                for group in (scene.lights, _sky_lights(scene))
+                for group in (scene.lights, _sky_lights(scene)[:: seen.step])
             )
             seen_by, seen_from_sky = (
                 [(found.cameras(), not (found.open_ways and in_place)) for found in group] for group in (lights, sky)
