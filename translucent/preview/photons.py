@@ -18,7 +18,7 @@ from translucent.scene.scene import Scene
 ROUND, FIRST_ROUNDS, MOST_PHOTONS = 1 << 14, 4, 1 << 26
 
 #: Seconds of following photons for each second of drawing, at least.
-SHARE = 0.5
+SHARE = 0.1
 
 #: Noise of the picture, as a share of its mean radiance, at which it is done, too.
 QUIET = 1e-3
