@@ -13,8 +13,8 @@ import pytest
 
 import translucent as tl
 from tests.little import with_few_shadows
-from translucent.bake import unwrap
 from translucent.assets import web_path
+from translucent.bake import unwrap
 from translucent.cli import cli, main
 from translucent.planning.methods import METHODS
 
