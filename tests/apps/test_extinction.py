@@ -85,6 +85,24 @@ def test_a_color_that_the_shell_took_for_a_comment_is_told(run: Run) -> None:
     assert f"color ''; empty; {hint}" in one_error_line(run("", "1cm"))
 
 
+def test_a_filament_is_told_by_its_transmission_distance(run: Run) -> None:
+    code, out, err = run("--td", "4mm")
+    assert (code, err) == (0, "")
+    assert "0.1        0.1        0.1 linear" in out.splitlines()[0]
+    assert "filament TD     4 mm: where 10 % of the luminance of white light is left" in out.splitlines()
+    told = json.loads(run("--td", "0.4", "--unit", "cm", "--td-transmittance", "0.05", "--json").out)
+    assert told["extinction"] == pytest.approx([-math.log(0.05) / 4e-3] * 3, rel=1e-14)
+    assert told["transmission_distance"] == {"distance": pytest.approx(4e-3, rel=1e-12), "transmittance": 0.05}
+    told = json.loads(run("linear(.1,1,.5)", "2cm", "--json").out)
+    assert told["transmission_distance"] == {"distance": None, "transmittance": 0.1}
+
+
+def test_a_transmission_distance_is_all_that_is_said(run: Run) -> None:
+    assert "--td with COLOR" in one_error_line(run("#7b1e3a", "--td", "4mm"))
+    assert "not between 0 and 1" in one_error_line(run("--td", "4mm", "--td-transmittance", "1"))
+    assert "length '-4mm'; not positive" in one_error_line(run("--td", "-4mm"))
+
+
 def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def text_block(target: str, medium: Any, color: np.ndarray, distance: float) -> str:
         assert medium.transmittance(distance) == pytest.approx(color, rel=1e-14)
