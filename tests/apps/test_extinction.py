@@ -104,7 +104,8 @@ def test_a_transmission_distance_is_all_that_is_said(run: Run) -> None:
 
 
 def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def text_block(target: str, medium: Any, color: np.ndarray, distance: float) -> str:
+    def text_block(target: str, medium: Any, color: np.ndarray, distance: float, roughness: float) -> str:
+        assert roughness == 0
         assert medium.transmittance(distance) == pytest.approx(color, rel=1e-14)
         return f"block for {target}"
 
@@ -119,6 +120,25 @@ def test_every_engine_has_a_block(run: Run, target: str) -> None:
     code, out, err = run("#7b1e3a", "1cm", "--as", target)
     assert (code, err) == (0, "")
     assert len(out) > 20
+
+
+@pytest.mark.parametrize(("target", "suffix"), [("blender", ".py"), ("threejs", ".js"), ("godot", ".gdshader")])
+def test_a_material_has_its_surface_and_is_read_again(run: Run, here: Path, target: str, suffix: str) -> None:
+    """Index and roughness as they are asked for; a preset has its own."""
+    block = run("#7b1e3a", "1cm", "--as", target, "--ior", "1.45", "--roughness", "0.25").out
+    assert "1.45" in block
+    assert "0.25" in block
+    (here / f"a{suffix}").write_text(block)
+    again = run("--from", f"a{suffix}", "--as", "json")
+    assert again.code == 0
+    assert json.loads(again.out)["ior"] == 1.45
+    assert json.loads(again.out)["absorption"] == pytest.approx(-np.log(parse_color("#7b1e3a")) / 0.01, rel=1e-12)
+    assert "0.15" in run("--preset", "jade", "--as", target).out
+
+
+@pytest.mark.parametrize("option", [("--ior", "1.5"), ("--roughness", "0.5")])
+def test_a_surface_is_that_of_a_material_for_an_engine(run: Run, option: tuple[str, str]) -> None:
+    assert "add --as, or leave it out" in one_error_line(run("#7b1e3a", "1cm", *option))
 
 
 @pytest.mark.parametrize("name", ["jade.mtlx", "jade.usda", "jade.json"])
@@ -355,7 +375,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["gray", "--from", "dict.json"], "--from with COLOR; each asks for something else"),
         (["--preset", "jade", "--from", "dict.json"], "--from with --preset"),
         (["--from", "none.mtlx"], "material 'none.mtlx'; no such file"),
-        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json file"),
+        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json, .py, .js,"),
         (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
         (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),
         (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; not a known unit"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -18,6 +19,7 @@ from translucent.commands.common import (
     outside_option,
     overwrite_option,
     read_medium,
+    read_roughness,
     refuse_overwriting,
     triple_text,
 )
@@ -30,7 +32,19 @@ if TYPE_CHECKING:
     from translucent.media.fitting import Fit
     from translucent.media.medium import Medium
 
-TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", "usd", "css", "json")
+TARGETS = (
+    "gltf", "openpbr", "standard_surface", "blender", "threejs", "godot", "unreal", "unity", "usd", "css", "json",
+)  # fmt: skip
+
+
+class _Wanted(NamedTuple):
+    """What is to be told of a medium, and how."""
+
+    target: str | None
+    ior: float | None
+    roughness: float
+    td_transmittance: float | None
+    as_json: bool
 
 
 @click.command(epilog="Example: translucent extinction '#7b1e3a' 1cm")
@@ -40,11 +54,18 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.option("--unit-out", default="m", show_default=True, metavar="U", help="Give the extinction per this unit, too.")
 @clamp_option
 @click.option("--as", "target", type=click.Choice(TARGETS), help="Print the material for an engine, to paste.")
+@click.option("--ior", type=float, metavar="N", help="Of --as: its index of refraction. Default: the medium's, or 1.")
+@click.option(
+    "--roughness",
+    type=click.FloatRange(0.0, 1.0),
+    metavar="R",
+    help="Of --as: of its surface, 0 (polished) to 1. Default: the preset's, or 0.",
+)
 @click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
 @click.option("--fit", type=click.Path(path_type=Path), metavar="FILE", help="Fit to rows of distance,color[,weight].")
 @click.option("--preset", "preset_name", metavar="NAME", help="A named medium instead of a color at a distance.")
-@click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx, .usda or .json material instead.")
+@click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx or .usda file, or of what --as printed.")
 @click.option("--td", metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm.")
 @click.option(
     "--td-transmittance",
@@ -66,6 +87,8 @@ def extinction(
     unit_out: str,
     clamp: bool | None,
     target: str | None,
+    ior: float | None,
+    roughness: float | None,
     batch: Path | None,
     output: Path | None,
     fit: Path | None,
@@ -101,6 +124,10 @@ def extinction(
         "--td": td,
     }
     _check_usage(media, {"--batch": batch, "--fit": fit, "--on": model}, {"--json": as_json or None, "--as": target})
+    for option, value in (("--ior", ior), ("--roughness", roughness)):
+        if value is not None and target is None:
+            raise InputError(f"{option} {value:g}", "only a material for an engine has it", "add --as, or leave it out")
+    wanted = _Wanted(target, ior, read_roughness(roughness, preset_name) or 0.0, td_transmittance, as_json)
     if output is not None and batch is None:
         raise InputError(f"-o {output}", "only --batch writes a file", "leave it out")
     if eye is not None and model is None:
@@ -114,7 +141,7 @@ def extinction(
     if fit is not None:
         if clamp:
             raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
-        return _fit(fit, unit, unit_out, target, as_json, td_transmittance)
+        return _fit(fit, unit, unit_out, wanted)
     medium = _given_medium(source, preset_name, unit) if td is None else _filament(td, unit, td_transmittance)
     if medium is None and (color is None or (distance is None and model is None)):
         missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
@@ -127,7 +154,7 @@ def extinction(
         told["warnings"] += doubts_on(told["on"])
         # Without a distance of the user's own, an engine gets the color at the model's thickness.
         stated = stated if distance is not None else told["on"]["mean_thickness"]
-    return _tell(told, medium, stated, target, as_json, td_transmittance)
+    return _tell(told, medium, stated, wanted)
 
 
 def _check_usage(*groups: dict[str, object]) -> None:
@@ -187,22 +214,23 @@ def _convert(
     return told, medium
 
 
-def _tell(
-    told: dict[str, Any], medium: Medium, stated: float, target: str | None, as_json: bool, td_share: float | None
-) -> None:
+def _tell(told: dict[str, Any], medium: Medium, stated: float, wanted: _Wanted) -> None:
     from translucent.media.filament import TD_TRANSMITTANCE, td_of
 
-    share = TD_TRANSMITTANCE if td_share is None else td_share
+    share = TD_TRANSMITTANCE if wanted.td_transmittance is None else wanted.td_transmittance
     td = td_of(medium.extinction, share)
     told["transmission_distance"] = {"distance": td if math.isfinite(td) else None, "transmittance": share}
-    if target is not None:
+    if wanted.target is not None:
         from translucent.materials import text_block
 
         for line in told["warnings"]:
             echo(f"warning: {line}", err=True)
-        echo(text_block(target, medium, medium.transmittance(stated), stated))
+        if wanted.ior is not None:
+            medium = dataclasses.replace(medium, ior=wanted.ior)
+        color = medium.transmittance(stated)
+        echo(text_block(wanted.target, medium, color, stated, roughness=wanted.roughness))
         return
-    echo(json.dumps(told) if as_json else _report(told))
+    echo(json.dumps(told) if wanted.as_json else _report(told))
 
 
 def _report(told: dict[str, Any]) -> str:
@@ -267,7 +295,7 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
         )
 
 
-def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: bool, td_share: float | None) -> None:
+def _fit(table: Path, unit: str, unit_out: str, wanted: _Wanted) -> None:
     import numpy as np
 
     from translucent.media.conversion import summary
@@ -279,8 +307,8 @@ def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: boo
     told["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
     error = None if fit.standard_error is None else fit.standard_error.tolist()
     told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
-    _tell(told, fit.medium, distance, target, as_json, td_share)
-    if not as_json and target is None:
+    _tell(told, fit.medium, distance, wanted)
+    if not wanted.as_json and wanted.target is None:
         echo(_fit_report(fit))
 
 
