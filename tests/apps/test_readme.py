@@ -90,6 +90,8 @@ def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "CASES", run.CASES[:1])
     monkeypatch.setattr(run.ScalingRun, "ladders", lambda _: [])
     monkeypatch.setattr(run, "measure_hard_cases", lambda _: iter(()))
+    monkeypatch.setattr(run, "measure_slabs", lambda *, quick: ())
+    monkeypatch.setattr(run.ShadowsRun, "steps", lambda _: {})
 
 
 def commands(text: str) -> list[str]:

@@ -120,7 +120,7 @@ def measure_all(
         stack.callback(studio.release)
         made = provenance(renderer, command, quick=quick)
         parts = tuple(part for part in get_args(Part) if part in only or not only)
-        report = Report(made) if base is None else _without(base, parts)
+        report = Report(made) if base is None else dataclasses.replace(_without(base, parts), complete=False)
         begin = time.perf_counter()
 
         def stamped(report: Report, *, complete: bool) -> Report:

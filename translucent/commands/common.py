@@ -142,6 +142,15 @@ def outside_option(command: F) -> F:
     )(command)
 
 
+def draft_option(command: F) -> F:
+    """Option for extensions of glTF that are no standard yet."""
+    return click.option(
+        "--draft-extensions",
+        is_flag=True,
+        help="Of a glTF MODEL: read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.",
+    )(command)
+
+
 def interface_options(command: F) -> F:
     """Options for how the interfaces are found at which light refracts and reflects."""
     command = click.option(

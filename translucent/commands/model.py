@@ -69,6 +69,7 @@ def read_scene(
     *,
     allow_outside: bool = False,
     look: FileLook | None = None,
+    draft_extensions: bool = False,
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show.
 
@@ -84,7 +85,8 @@ def read_scene(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
     if is_scene_file(model):
-        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, allow_outside, look)
+        loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
+        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, loaded, look)
     else:
         scene, chosen = _mesh_scene(model, unit, medium, options, size, environment, stage, allow_outside, look)
     named = {id(item) for one in look.media for item in objects_named(scene, one.name)}
@@ -136,7 +138,7 @@ def _file_scene(
     size: tuple[int, int],
     environment: Environment | None,
     stage: str | None,
-    allow_outside: bool,
+    loaded: dict[str, bool],
     look: FileLook,
 ) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
@@ -145,7 +147,7 @@ def _file_scene(
     from translucent.scene.staging import has_ground
 
     camera = None if options.defining else options.camera or 0
-    scene = load_scene(model, unit, camera, size, allow_outside=allow_outside, variant=look.variant, time=look.time)
+    scene = load_scene(model, unit, camera, size, variant=look.variant, time=look.time, **loaded)
     if medium is not None:
         scene = filled(scene, medium)
     scene = _with_media(scene, look)

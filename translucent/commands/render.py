@@ -10,6 +10,7 @@ import click
 
 from translucent.commands.common import (
     common_options,
+    draft_option,
     interface_options,
     look_options,
     medium_options,
@@ -81,6 +82,7 @@ from translucent.errors import InputError
 )
 @unit_option
 @outside_option
+@draft_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
 @click.option(
     "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
@@ -127,6 +129,7 @@ def render(
     time: float | None,
     unit: str,
     allow_outside: bool,
+    draft_extensions: bool,
     size: str,
     camera: int | None,
     eye: str | None,
@@ -195,9 +198,8 @@ def render(
     lit = read_environment(environment, background)
     stage = NO_STAGE if opaque_with is not None else stage
     look = FileLook(read_objects(object_names), variant, time)
-    scene = read_scene(
-        model, unit, medium, options, pixels, lit, roughness, stage, allow_outside=allow_outside, look=look
-    )
+    loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
+    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, look=look, **loaded)
     if tone is None and len(scene.shown) < len(scene.objects):
         pictures = pictures._replace(tone=STAGED_TONE)
     scene = with_environment_shadows(scene, environment_shadows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,8 +20,9 @@ from translucent.gltf.left_out import LeftOut
 from translucent.gltf.lights import LIGHTS, scene_lights
 from translucent.gltf.materials import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
 from translucent.gltf.objects import scene_objects
+from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS
 from translucent.gltf.scene_media import node_transforms
-from translucent.gltf.surfaces import DIFFUSE_TRANSMISSION, LEFT_OUT, UNLIT
+from translucent.gltf.surfaces import LEFT_OUT, UNLIT
 from translucent.gltf.textures import TEXTURE_TRANSFORM
 from translucent.gltf.variants import VARIANTS, variant_names
 from translucent.scene.environment import Environment
@@ -78,6 +79,7 @@ def load_scene(
     allow_outside: bool = False,
     variant: str | None = None,
     time: float | None = None,
+    draft_extensions: bool = False,
 ) -> GltfScene:
     """Read a scene from a .gltf or .glb file: its objects with their media, one camera, and its lights.
 
@@ -100,6 +102,8 @@ def load_scene(
     time : float, optional
         Seconds on the clock of the animations at which nodes stand; see `translucent.gltf.animations`. Default: as the
         nodes are written. Skins and morph targets are left out, whatever the time.
+    draft_extensions : bool
+        Whether to read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.
 
     Returns
     -------
@@ -119,12 +123,12 @@ def load_scene(
     metres = metres_per_unit(unit)
     file = _read(path, allow_outside)
     left_out = LeftOut()
-    check_extensions(file, left_out)
+    check_extensions(file, left_out, DRAFTS.values() if draft_extensions else ())
     if time is not None:
         file = posed(file, time, left_out)
     with np.errstate(under="ignore"):
         transforms = scene_transforms(file, left_out)
-        objects = scene_objects(file, transforms, metres, left_out, variant)
+        objects = scene_objects(file, transforms, metres, left_out, draft_extensions, variant)
         own = scene_camera(file, transforms, camera, metres, left_out)
         lights = scene_lights(file, transforms, metres, left_out)
     for key in ("animations", "skins"):
@@ -150,14 +154,14 @@ def _read(path: str | Path, allow_outside: bool) -> GltfFile:
     return read_gltf(path, allow_outside)
 
 
-def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
-    """Refuse a file with unsupported required extensions, and record those that it merely uses."""
+def check_extensions(file: GltfFile, left_out: LeftOut, known: Collection[str] = ()) -> None:
+    """Refuse a file with unsupported required extensions, and record those that it merely uses; not those `known`."""
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             raise refused(file, f"{key} is {names!r}, not a list of names")
         for name in names:
-            if name in _READ or name in LEFT_OUT:  # the latter is told of the materials that have it
+            if name in _READ or name in LEFT_OUT or name in known:  # the latter is told of the materials that have it
                 continue
             if key == "extensionsRequired" and not name.startswith(_LOOKS):
                 do = "export it without compression" if name in _COMPRESSIONS else "export it without this extension"

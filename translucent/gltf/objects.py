@@ -40,7 +40,12 @@ _METAL = 0.1
 
 
 def scene_objects(
-    file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut, variant: str | None = None
+    file: GltfFile,
+    transforms: dict[int, Array],
+    metres: float,
+    left_out: LeftOut,
+    draft_extensions: bool = False,
+    variant: str | None = None,
 ) -> list[Object]:
     """Objects of a scene, one per node and primitive, with their materials.
 
@@ -55,13 +60,15 @@ def scene_objects(
         Gets what the objects do not hold.
     variant : str, optional
         Name of the variant whose materials they have.
+    draft_extensions : bool
+        Whether extensions that are drafts count.
 
     Raises
     ------
     InputError
         If there is no object or no such variant, or something about one is wrong.
     """
-    finish_of = finish_reader(file, metres, left_out)
+    finish_of = finish_reader(file, metres, left_out, draft_extensions)
     scale = np.diag([metres, metres, metres, 1.0])
     objects: list[Object] = []
     finishes: list[Finish] = []

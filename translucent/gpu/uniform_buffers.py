@@ -42,7 +42,7 @@ class UniformBuffers:
         self._placed = placed
         self._roles = roles
         self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
-        self._bodies = gl.buffer(reserve=_STRIDE * len(roles))
+        self.bodies = gl.buffer(reserve=_STRIDE * len(roles))
         self._constant = {block: gl.buffer(content) for block, content in contents.items()}
 
     def place(self, view: SampleView) -> None:
@@ -50,7 +50,7 @@ class UniformBuffers:
         placed, center = self._placed, media_center(self._placed.scene)
         for i, (placement, role) in enumerate(zip(placed.placements, self._roles, strict=True)):
             record = body_uniforms(placement, view, role, placed.media, placed.scene.diagonal, center)
-            self._bodies.write(record, offset=i * _STRIDE)
+            self.bodies.write(record, offset=i * _STRIDE)
         self._view.write(view_uniforms(view, placed))
         self.bind()
 
@@ -68,9 +68,9 @@ class UniformBuffers:
 
     def bind_body(self, number: int) -> None:
         """Bind the uniforms of one object for the next draw."""
-        self._bodies.bind_to_uniform_block(BODY.binding, offset=number * _STRIDE, size=BODY.dtype.itemsize)
+        self.bodies.bind_to_uniform_block(BODY.binding, offset=number * _STRIDE, size=BODY.dtype.itemsize)
 
     def release(self) -> None:
         """Free the buffers."""
-        for buffer in (self._view, self._bodies, *self._constant.values()):
+        for buffer in (self._view, self.bodies, *self._constant.values()):
             buffer.release()

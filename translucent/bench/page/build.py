@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -69,8 +70,9 @@ def build_page(report: Report) -> str:
     return text
 
 
+@cache
 def _environment() -> Any:
-    """Templates that escape whatever they are given, and fail on a name that they were not given."""
+    """Templates, compiled once, that escape whatever they are given, and fail on a name that they were not given."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(

@@ -12,10 +12,9 @@ import numpy as np
 from translucent import reference
 from translucent.arrays import Array
 from translucent.assets import mesh_path
-from translucent.bench.codec import Packed
 from translucent.bench.measure import one_line
 from translucent.bench.picture import Picture
-from translucent.bench.shadows.pictures import png_of, signed
+from translucent.bench.shadows.pictures import png_of
 from translucent.bench.shadows.record import CausticCase, CausticRow
 from translucent.formulas.color import linear_to_srgb
 from translucent.frames.frame import Frame
@@ -122,13 +121,11 @@ def _measured(renderer: Renderer, scene: Scene, effort: CausticEffort, blank: Ca
         shown = _blurred(found)
         off = float((found * _areas(scene, size)).sum() / power - 1.0)
         rows.append(CausticRow(count, off, *_nrmse(shown, low, high), seconds))
-    seen = np.asarray((truth + shown).any(axis=-1))
-    error = Packed.of(signed((shown - truth) / truth.mean(), seen))
     white = float(np.quantile(truth, 0.995))
     pictures = (
         Picture("the picture", png_of(frame.to_srgb8())),
         Picture("reference", _png(truth / white)),
-        Picture(f"{effort.photons[-1]:,} photons", _png(shown / white), error),
+        Picture(f"{effort.photons[-1]:,} photons", _png(shown / white)),
     )
     noise = 0.5 * abs(one - other) / power
     return dataclasses.replace(blank, reference_seconds=taken, power_noise=noise, rows=tuple(rows), pictures=pictures)

@@ -51,10 +51,13 @@ class Ground:
     bare : (h, w, 3) float64
         Radiance with nothing in the light, for which bodies are made clear.
     frame : Frame
+        The picture.
+    bright : float
+        Of `bare` where it is bright.
     seen : (h, w) bool
         Pixels that show the ground by itself, in light.
-    away : (h, w) bool
-        Of these, those in the shadow and away from all outlines in it.
+    inside, away : (h, w) bool
+        Of these, those away from all outlines of shadows, inner ones included; and of those, the ones in the shadow.
     near : (h, w) bool
         Of these, those in the shadow or next to it.
     """

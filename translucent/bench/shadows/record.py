@@ -153,7 +153,7 @@ class CausticCase:
         Half of the difference between the powers of the halves, as a share of it.
     rows : tuple of CausticRow
     pictures : tuple of Picture
-        The truth, and that of the most photons, with its error in irradiance as a share of the mean.
+        That of the most photons, and of irradiance that of the truth and theirs: its errors would be the truth's noise.
     failure : str, optional
     """
 
