@@ -88,6 +88,13 @@ def test_animations_play_at_once_and_the_first_moves_what_two_do(tmp_path: Path)
     assert found[0, 0] == 2
 
 
+def test_what_is_moved_may_be_anything(tmp_path: Path) -> None:
+    writer = animated("scale", [0], [[1, 1, 1]])
+    writer.tree["animations"][0]["channels"][0]["target"]["path"] = ["scale"]
+    with pytest.warns(tl.TranslucentWarning, match="animated properties"):
+        pose(writer, tmp_path, 0)
+
+
 def test_without_a_time_nodes_stand_as_written_and_animations_are_told(tmp_path: Path) -> None:
     writer = animated("translation", [0], [[1, 0, 0]], translation=[5.0, 0.0, 0.0])
     with pytest.warns(tl.TranslucentWarning, match=r"animations \(1\)"):

@@ -179,6 +179,28 @@ def test_a_value_out_of_range_is_refused() -> None:
         read_blender(re.sub(r'"Density"\].default_value = ', '"Density"].default_value = -', text))
 
 
+@pytest.mark.parametrize(
+    ("target", "old", "new", "message"),
+    [
+        ("threejs", "setRGB(0.18", "setRGB(1.18", "not in 0..1"),
+        ("threejs", "attenuationDistance: 0.02", "attenuationDistance: 0", "not above 0"),
+        ("unity", '"_ATDistance", 0.02', '"_ATDistance", -1', "not above 0"),
+        ("unity", "new Color(0", "new Color(-1", "not in 0..1"),
+        ("unreal", "SSS MFP (cm)                 = (", "SSS MFP (cm)  = (-", "not three lengths above 0"),
+        ("godot", "vec3(", "vec3(-", "negative"),
+    ],
+)
+def test_an_engine_s_value_out_of_range_is_refused(
+    tmp_path: Path, target: str, old: str, new: str, message: str
+) -> None:
+    text = text_block(target, JADE, COLOR, 0.02)
+    assert old in text
+    path = tmp_path / f"a{FILES[target][0]}"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        load_medium(path)
+
+
 def test_a_gltf_material_without_a_volume_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.json").write_text('{"extensions": {}}')
     with pytest.raises(tl.InputError, match="it has no volume"):

@@ -56,7 +56,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
         name = label(animations, number)
         for channel, target in _channels(file, animation, name):
             path, node = target.get("path"), target.get("node")
-            if path not in _KINDS or node is None:
+            if not isinstance(path, str) or path not in _KINDS or node is None:
                 left_out.add(f"animated {path if isinstance(path, str) else 'properties'}", name)
                 continue
             file.item("nodes", node)

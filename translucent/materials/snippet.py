@@ -16,6 +16,22 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBERS = re.compile(_NUMBER)
 
 
+def stated_color(what: str, text: str, start: str) -> Array:
+    """(3,): a color behind `start`, each channel in 0..1; raises `InputError` otherwise."""
+    color = stated(what, text, start, 3)
+    if not ((color >= 0) & (color <= 1)).all():
+        raise InputError(what, f"a color {color.tolist()}, not in 0..1", "correct it")
+    return color
+
+
+def stated_length(what: str, text: str, start: str) -> float:
+    """A length behind `start`, > 0; raises `InputError` otherwise."""
+    length = float(stated(what, text, start)[0])
+    if not length > 0:
+        raise InputError(what, f"{start.strip()!r} is {length:g}, not above 0", "correct it")
+    return length
+
+
 def stated(what: str, text: str, start: str, count: int = 1, default: float | None = None) -> Array:
     """(count,): the numbers that stand behind the first `start` of a text, in its line.
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from translucent.materials.snippet import stated
+from translucent.materials.snippet import stated, stated_color, stated_length
 from translucent.media.color_distance import color_at, extinction_at
 from translucent.media.medium import Medium
 
@@ -50,5 +50,5 @@ def read_threejs(text: str) -> Medium:
     ior = float(stated(_WHAT, text, "  ior:")[0])
     if "attenuationDistance:" not in text:
         return Medium(ior=ior)
-    distance = float(stated(_WHAT, text, "attenuationDistance:")[0])
-    return Medium(absorption=extinction_at(stated(_WHAT, text, "setRGB(", 3), distance), ior=ior)
+    distance = stated_length(_WHAT, text, "attenuationDistance:")
+    return Medium(absorption=extinction_at(stated_color(_WHAT, text, "setRGB("), distance), ior=ior)

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.formulas.color import linear_to_srgb, srgb_to_linear
-from translucent.materials.snippet import stated
+from translucent.materials.snippet import stated, stated_color, stated_length
 from translucent.media.color_distance import color_at, extinction_at
 from translucent.media.medium import Medium
 
@@ -46,5 +46,5 @@ def unity_text(medium: Medium, distance: float | None = None, roughness: float =
 def read_unity(text: str) -> Medium:
     """Read the medium of such a text, as far as nine digits go; raises `InputError` if it is none."""
     what = "Unity material"
-    distance, ior = (float(stated(what, text, f'"{name}"')[0]) for name in ("_ATDistance", "_Ior"))
-    return from_unity(stated(what, text, '"_TransmittanceColor", new Color(', 3), distance, ior)
+    distance, ior = stated_length(what, text, '"_ATDistance"'), float(stated(what, text, '"_Ior"')[0])
+    return from_unity(stated_color(what, text, '"_TransmittanceColor", new Color('), distance, ior)
