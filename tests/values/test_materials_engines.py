@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +124,22 @@ def test_threejs_states_the_color_at_a_distance_and_a_thickness() -> None:
     assert read_threejs(text_block("threejs", dense, dense.transmittance(1), 1)).ior == LARGEST_IOR
 
 
+def test_the_text_for_threejs_is_javascript() -> None:
+    """Run by node with stand-ins of three.js, whose material keeps what it is given."""
+    if (node := shutil.which("node")) is None:
+        pytest.skip("node is absent")
+    stand_in = """
+const THREE = { LinearSRGBColorSpace: "srgb-linear", MeshPhysicalMaterial: class { constructor(p) { Object.assign(this, p); } },
+  Color: class { setRGB(r, g, b, space) { this.rgb = [r, g, b, space]; return this; } } };
+"""
+    program = f"{stand_in}{text_block('threejs', JADE, COLOR, 0.02, 0.3)}\nconsole.log(JSON.stringify(material));"
+    made = json.loads(subprocess.run([node, "-e", program], capture_output=True, text=True, check=True).stdout)
+    assert made == {
+        "roughness": 0.3, "metalness": 0, "transmission": 1, "ior": 1.6, "thickness": 0.02,
+        "attenuationColor": {"rgb": [*COLOR, "srgb-linear"]}, "attenuationDistance": 0.02,
+    }  # fmt: skip
+
+
 def test_godot_has_the_extinction_and_a_constant_thickness() -> None:
     text = text_block("godot", JADE, COLOR, 0.02, 0.3)
     assert text.startswith("shader_type spatial;")
@@ -142,8 +161,6 @@ def test_unity_has_a_smoothness() -> None:
 
 
 def test_gltf_is_no_metal() -> None:
-    import json
-
     entry = json.loads(text_block("gltf", JADE, COLOR, 0.02, 0.3))
     assert entry["pbrMetallicRoughness"] == {"metallicFactor": 0.0, "roughnessFactor": 0.3}
     (found,) = materials_of(GltfFile(Path("a.gltf"), {"asset": {"version": "2.0"}, "materials": [entry]}))

@@ -3,8 +3,8 @@
 StandardMaterial3D has no absorption by length, and its refraction is an offset on the screen, so that a shader is
 written. Formulas: exp(-sigma_t d) with d a constant thickness, or where the uniform `exact` is set, that of a texture
 in metres, as the pass of docs/lifting.md makes it; Schlick's Fresnel with F0 = ((n - 1) / (n + 1))^2, which Godot's
-SPECULAR states as 0.16 SPECULAR^2. Source: Godot documentation, Spatial shaders, Screen-reading shaders. Not run in
-Godot.
+SPECULAR states as 0.16 SPECULAR^2. Source: Godot documentation, Spatial shaders, Screen-reading shaders. Tests
+compile and run it as GLSL; it is not run in Godot.
 
 Not carried over: bending of light (what is behind is seen straight on), scattering (its extinction is written),
 anisotropy, emission; a surface of index above 2.33 reflects as one of 2.33.
