@@ -306,14 +306,19 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
 
 
-def look_options(command: F) -> F:
-    """Options for what lights the model, what is seen behind it, and how bright the picture is."""
-    command = click.option(
+def roughness_option(command: F) -> F:
+    """Option for the surfaces of media."""
+    return click.option(
         "--roughness",
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
         help="Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0.",
     )(command)
+
+
+def look_options(command: F) -> F:
+    """Options for what lights the model, what is seen behind it, and how bright the picture is."""
+    command = roughness_option(command)
     command = click.option(
         "--tone",
         type=click.Choice(TONE_NAMES),
