@@ -74,7 +74,9 @@ def body_records(placed: PlacedScene, roles: BodyRoles, center: Array) -> npt.ND
         placed.anchors,
     )
     records["axis"] = axes
-    records["extinction"][:, :3] = [bounded_extinction(item.medium, diagonal) for item in objects]
+    nothing = np.zeros(3)
+    extinctions = np.array([nothing if item.medium is None else item.medium.extinction for item in objects])
+    records["extinction"][:, :3] = np.minimum(extinctions, _densest(diagonal))
     records["color"][:, :3] = [item.base_color for item in objects]
     records["sheet_thickness"] = roles.sheet_thicknesses
     records["sheet_ior"] = [1.0 if item.medium is None else item.medium.ior for item in objects]
@@ -131,5 +133,9 @@ def _normal_matrices(placed: PlacedScene) -> Array:
 
 def bounded_extinction(medium: Medium | None, diagonal: float) -> Array:
     """(3,): extinction in 1/m that float32 can multiply with lengths of the scene; 0 without a medium."""
-    limit = MAX_SCENE_OPTICAL_DEPTH / max(diagonal, float(np.finfo(np.float64).tiny))
-    return np.zeros(3) if medium is None else np.minimum(medium.extinction, limit)
+    return np.zeros(3) if medium is None else np.minimum(medium.extinction, _densest(diagonal))
+
+
+def _densest(diagonal: float) -> float:
+    """Largest extinction in 1/m in a scene of this size."""
+    return MAX_SCENE_OPTICAL_DEPTH / max(diagonal, float(np.finfo(np.float64).tiny))

@@ -25,9 +25,9 @@ from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.ledger import before_making
-from translucent.media.medium import Medium
+from translucent.media.medium import VACUUM, Medium
 from translucent.scene.scene import Object, Scene
-from translucent.scene.surface import Surface
+from translucent.scene.surface import SMOOTH
 
 Words = npt.NDArray[np.uint32]
 
@@ -220,7 +220,7 @@ class SceneHierarchies:
         linear = body.matrix[:3, :3]
         middle = linear @ packed.center + (body.matrix[:3, 3] - center)
         rows = np.column_stack([packed.scale * np.linalg.inv(linear), middle])
-        medium, surface = body.medium or Medium(), body.surface or Surface()
+        medium, surface = body.medium or VACUUM, body.surface or SMOOTH
         metres = 1.0 if sheet is None else sheet
         opaque = body.medium is None
         extinction = bounded_extinction(medium, scene.diagonal)

@@ -30,14 +30,14 @@ from translucent.gpu.layout import (
 )
 from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.media.given_back import LayeredMedium
-from translucent.media.medium import Medium
+from translucent.media.medium import VACUUM
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
-from translucent.scene.surface import Surface
+from translucent.scene.surface import SMOOTH
 
 
 def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
@@ -268,7 +268,7 @@ _NO_DIFFUSION: dict[str, npt.ArrayLike] = {
 def _surface_row(
     scene: Scene, body: Object, sheet: float | None, diffused: Mapping[str, npt.ArrayLike] | None
 ) -> dict[str, npt.ArrayLike]:
-    medium, surface = body.medium or Medium(), body.surface or Surface()
+    medium, surface = body.medium or VACUUM, body.surface or SMOOTH
     stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
     limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
     return {

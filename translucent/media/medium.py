@@ -222,3 +222,7 @@ def _channels(field: str, value: Channels) -> Array:
         )
     triple.setflags(write=False)
     return triple
+
+
+#: Medium of what has none.
+VACUUM = Medium()
