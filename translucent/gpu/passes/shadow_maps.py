@@ -175,8 +175,8 @@ class ShadowMapsPass:
         self, scene: Scene, method: Method | None, opaque: tuple[int, ...]
     ) -> tuple[Hashable, Scene, RenderPlan]:
         """The scene without interfaces, and no opaque objects but these, and its plan; with a key of them."""
-        bodies = _throwing(scene)
-        objects = [item for i, item in enumerate(scene.objects) if i in opaque or item in bodies]
+        bodies, ends = set(map(id, _throwing(scene))), set(opaque)
+        objects = [item for i, item in enumerate(scene.objects) if i in ends or id(item) in bodies]
         # Lights move more often than objects change.
         key = tuple(map(weakref.ref, objects)), scene.overlap, method
         if key not in self._plans:
