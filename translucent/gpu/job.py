@@ -32,6 +32,7 @@ from translucent.gpu.uniforms import (
     media_uniforms,
     scatter_uniforms,
     shade_uniforms,
+    surface_table,
     surface_uniforms,
 )
 from translucent.planning.render_plan import RenderPlan
@@ -127,6 +128,11 @@ class FrameJob(SceneView):
         """Fields of the objects in which light diffuses, for the table of surfaces."""
         light = self.diffused_light
         return {} if light is None else light.rows(media_center(self.scene))
+
+    @cached_property
+    def surface_rows(self) -> npt.NDArray[np.float32]:
+        """Table of the surfaces of all objects, the same for all samples."""
+        return surface_table(self.scene, self.features.sheets, self.diffused_rows)
 
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""

@@ -17,7 +17,7 @@ from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switc
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
-from translucent.gpu.uniforms import media_center, surface_table
+from translucent.gpu.uniforms import media_center
 from translucent.media.given_back import LayeredMedium
 from translucent.planning.mirrors import Mirror, mirror_of
 from translucent.planning.passes import PassSpec
@@ -84,7 +84,7 @@ class TracedInterfacesPass:
         hierarchies = job.resources.hierarchies.of(job.scene)
         rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
         diffused = job.diffused_light
-        contents = surface_table(job.scene, job.features.sheets, job.diffused_rows), rows
+        contents = job.surface_rows, rows
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
         self._bind(job, hierarchies, *tables)
         if diffused is not None:
