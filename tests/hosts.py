@@ -11,7 +11,7 @@ import translucent as tl
 from tests import references
 from translucent.frames.metrics import interior
 from translucent.gpu.balance import Balance, face_counts
-from translucent.gpu.body_uniforms import BodyRole, body_uniforms
+from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
 from translucent.gpu.layout import BLOCKS
 from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.gpu.uniforms import environment_uniforms, media_center, shade_uniforms, view_uniforms
@@ -52,16 +52,11 @@ class Host:
         scene = tl.Scene([tl.Object(mesh, medium)], tl.Camera.framing(mesh.vertices, size))
         placed, view = PlacedScene.of(scene), SampleView(scene.camera, size)
         counts = face_counts(scene, SUBPIXEL_BITS)
-        body = body_uniforms(
-            placed.placements[0],
-            view,
-            BodyRole(True, 0.0, counts[0], 0, 0),
-            placed.media,
-            scene.diagonal,
-            media_center(scene),
-        )
+        roles = BodyRoles(True, np.zeros(1), counts, np.zeros(1, np.intp))
+        body = body_records(placed, roles, media_center(scene))
+        body["clip_from_offset"] = clip_rows(placed, view)
         blocks = {
-            "Body": body,
+            "Body": body.tobytes(),
             "View": view_uniforms(view, placed),
             "Shade": shade_uniforms(scene, Balance.of(placed, tl.SignedDepth(), counts)),
             "Environment": environment_uniforms(scene.environment),

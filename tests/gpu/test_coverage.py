@@ -125,7 +125,7 @@ def test_every_point_of_a_body_that_is_seen_is_within_its_extent(kind: str) -> N
         at[:3, 3] = rng.normal(size=3)
         body = tl.Object(MESHES[1], MEDIA[0], at)
         shift = rng.uniform(-0.99, 0.99, 2)
-        part = part_of(extents([body], camera, SIZE), (float(shift[0]), float(shift[1])), SIZE)
+        part = part_of(extents(body.bounds[None], camera, SIZE), (float(shift[0]), float(shift[1])), SIZE)
         corners = (body.mesh.vertices @ at[:3, :3].T + at[:3, 3])[body.mesh.faces]
         points = np.einsum("nk,nkj->nj", rng.dirichlet(np.ones(3), len(corners)), corners) - camera.eye
         across = points @ np.stack([camera.right, camera.up], axis=1)
@@ -144,7 +144,7 @@ def test_every_point_of_a_body_that_is_seen_is_within_its_extent(kind: str) -> N
 def test_what_is_beside_or_behind_has_no_part_and_what_is_around_has_all() -> None:
     def part(eye: tuple[float, float, float], target: tuple[float, float, float]) -> Part:
         camera = tl.Camera.look_at(eye, target, fov_y=45.0)
-        return part_of(extents([tl.Object(MESHES[0], MEDIA[0])], camera, SIZE), (0.0, 0.0), SIZE)
+        return part_of(extents(tl.Object(MESHES[0], MEDIA[0]).bounds[None], camera, SIZE), (0.0, 0.0), SIZE)
 
     assert not part((0, 0, 5), (0, 0, 10))
     assert not part((0, 0, 5), (5, 0, 5))

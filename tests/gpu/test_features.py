@@ -123,7 +123,7 @@ def test_sheets_are_as_thick_as_declared_or_as_the_method_says() -> None:
 def test_a_body_that_is_no_sheet_falls_back_to_a_share_of_its_size() -> None:
     found = scene(body(mesh=OPEN))
     assert features(found).sheets == {}
-    assert features(found).sheet_thickness(found.objects[0]) == pytest.approx(FALLBACK_SHEET * np.sqrt(3.0))
+    assert features(found).sheet_thicknesses[0] == pytest.approx(FALLBACK_SHEET * np.sqrt(3.0))
 
 
 def test_bodies_of_one_medium_share_a_slot() -> None:

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 import trimesh
 
 import translucent as tl
 from tests.work import calls
+from translucent.gpu import shadow_cameras
+from translucent.gpu.balance import face_counts
+from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
+from translucent.gpu.light_cameras import outermost
+from translucent.gpu.placement import PlacedScene, SampleView
+from translucent.gpu.shadow_cameras import ShadowThrowers
 
 _BOX = trimesh.creation.box((1, 1, 1))
 BOX = tl.Mesh(_BOX.vertices, _BOX.faces)
@@ -34,3 +43,75 @@ def test_frames_of_many_bodies_are_drawn_in_linear_time(method: tl.Method | None
     work(FEW)
     # What a frame takes besides its bodies is the same for any number of them.
     assert work(3 * FEW) - work(2 * FEW) < 1.1 * (work(2 * FEW) - work(FEW))
+
+
+@pytest.mark.parametrize("method", [None, tl.FragmentLists()])
+def test_samples_cost_each_body_little_more_than_its_draws(method: tl.Method | None, renderer: tl.Renderer) -> None:
+    def work(count: int, samples: int) -> int:
+        given = scene(count, "add")
+        return calls(lambda: renderer.render(given, (8, 8), method, samples=samples))
+
+    work(FEW, 2)
+    more = (work(2 * FEW, 4) - work(2 * FEW, 2)) - (work(FEW, 4) - work(FEW, 2))
+    # Half of the bodies are drawn more than once, in some seven calls each; nothing else is done again for each.
+    assert more / (2 * FEW) < 30
+
+
+def test_bodies_are_placed_as_each_alone() -> None:
+    """All at a time or one at a time: the same bits, of mirrored and inverted ones, and with the eye on a surface."""
+    inverted = tl.Mesh(_BOX.vertices, _BOX.faces[:, ::-1])
+    turned = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3), (4, 5, 6))
+    matrices = [turned @ np.diag([1.5, 2.0, 2.5, 1.0]), turned @ np.diag([-1.0, 1.0, 1.0, 1.0]), np.eye(4)]
+    objects = [tl.Object(mesh, WINE, matrix) for mesh in (BOX, inverted) for matrix in matrices]
+    for eye in ((0.5, 0.1, 0.2), (1, 2, 9)):
+        camera = tl.Camera.look_at(eye, (0, 0, 0))
+
+        def records(*items: tl.Object, camera: tl.Camera = camera) -> Any:
+            placed = PlacedScene.of(tl.Scene(items, camera))
+            roles = BodyRoles(True, np.ones(len(items)), face_counts(placed.scene, 8), np.zeros(len(items), np.intp))
+            found = body_records(placed, roles, np.zeros(3))
+            found["clip_from_offset"] = clip_rows(placed, SampleView(camera, (8, 6), (0.25, 0.125)))
+            return found
+
+        together = records(*objects)
+        for i, item in enumerate(objects):
+            alone = records(item)[0]
+            for name in ("clip_from_offset", "world_from_normal", "eye_from_offset", "axis", "starts_unknown"):
+                assert (together[i][name] == alone[name]).all()
+        assert together["starts_unknown"].any() == (eye[0] == 0.5)
+
+
+def _floor(count: int) -> tuple[tl.Scene, ShadowThrowers]:
+    """A floor of flat tiles that a lamp lights, with a ball on it, and what throws shadows there."""
+    tile = tl.Mesh([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+    tiles = [tl.Object(tile, None, trimesh.transformations.translation_matrix((i, 0, 0))) for i in range(count)]
+    ball = tl.Object(BOX, WINE, trimesh.transformations.translation_matrix((2, 0.5, 1)))
+    given = tl.Scene([*tiles, ball], tl.Camera.look_at((0, 0, 20), (0, 0, 0)))
+    lamp = tl.PointLight((1, 1, 9), 1.0)
+    return given, ShadowThrowers(lamp, given, [outermost(item) for item in given.objects])
+
+
+def test_tiles_that_shadow_none_are_found_in_linear_time() -> None:
+    assert set(_floor(FEW)[1].grounds) == set(range(FEW))
+    work = [calls(lambda count=count: _floor(count)) for count in (FEW, 2 * FEW, 3 * FEW)]  # type: ignore[misc]
+    assert work[2] - work[1] < 1.1 * (work[1] - work[0])
+
+
+def test_tiles_beyond_those_that_are_compared_throw_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shadow_cameras, "MOST_GROUNDS", 4)
+    found = _floor(FEW)[1]
+    assert len(found.grounds) == 4
+    assert set(found.in_the_way) == set(range(FEW)) - set(found.grounds)
+
+
+def test_sixty_media_side_by_side_are_told_apart(renderer: tl.Renderer) -> None:
+    """A sum needs no winding numbers, of which a ray keeps 16 apart: each box has the optical depth of its medium."""
+    at = trimesh.transformations.translation_matrix
+    boxes = [tl.Object(BOX, tl.Medium(absorption=1.0 + i), at((1.5 * i, 0, 0)), priority=i % 7) for i in range(60)]
+    pose = np.eye(4)
+    pose[:3, 3] = 1.5 * 29.5, 0.0, 5.0
+    camera = tl.Camera(pose, fov_y=None, height=1.5)
+    for overlap in ("add", "union", "priority"):
+        frame = renderer.render(tl.Scene(boxes, camera, overlap=overlap), (180, 3))  # type: ignore[arg-type]
+        np.testing.assert_allclose(frame.optical_depth[1, 1::3, 0], np.arange(1.0, 61.0), rtol=1e-5)
+        assert frame.valid.all()

@@ -133,10 +133,12 @@ class Mesh(Frozen):
         bounds.setflags(write=False)
         return bounds
 
-    @property
+    @cached_property
     def center(self) -> Array:
         """(3,): center of the bounding box."""
-        return np.asarray(0.5 * self.bounds[0] + 0.5 * self.bounds[1])
+        center = np.asarray(0.5 * self.bounds[0] + 0.5 * self.bounds[1])
+        center.setflags(write=False)
+        return center
 
     @property
     def diagonal(self) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from translucent.arrays import Array
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.placement import PlacedScene
 from translucent.planning.methods import Method
@@ -27,15 +27,15 @@ OPEN_WEIGHTS = tuple(16.0**k for k in range(1, 6))
 ROUNDING = 1e-5
 
 
-@dataclass(frozen=True)
-class FaceCount:
-    """Contribution of one face of a body to the signed count of a pixel.
+@dataclass(frozen=True, eq=False)
+class FaceCounts:
+    """Contribution of one face of each object to the signed count of a pixel.
 
     Attributes
     ----------
-    weight : float
+    weights : (objects,) float64
         With the sign of its side.
-    offset : float
+    offsets : (objects,) float64
         Whatever its side: not 0 marks all pixels that the body covers.
     subpixel : float
         Step of the grid onto which the rasterizer moves vertices, in pixels; 0 where nothing is put down to it.
@@ -43,8 +43,8 @@ class FaceCount:
         The same over the scene's diagonal, in the fraction of the count.
     """
 
-    weight: float
-    offset: float
+    weights: Array
+    offsets: Array
     subpixel: float
     snapping_share: float
 
@@ -68,7 +68,7 @@ class Balance:
     coverage_floor: float
 
     @classmethod
-    def of(cls, placed: PlacedScene, method: Method, counts: Sequence[FaceCount]) -> Balance:
+    def of(cls, placed: PlacedScene, method: Method, counts: FaceCounts) -> Balance:
         """Bounds for a frame of a scene that a method draws with these counts."""
         floor = COVERAGE_FLOOR * placed.scene.diagonal
         return cls(_expected_count(placed, method, counts), _rounding(placed, method), floor)
@@ -85,17 +85,14 @@ def count_weights(scene: Scene) -> list[float]:
     return weights
 
 
-def face_counts(scene: Scene, subpixel_bits: int) -> list[FaceCount]:
+def face_counts(scene: Scene, subpixel_bits: int) -> FaceCounts:
     """Contribution of each object's faces to a pixel's count, with a rasterizer of this precision."""
-    weights = count_weights(scene)
     # Where a body is broken, paths below 0 are more likely to be real than swapped at a silhouette; and the weights of
     # open bodies leave no room in the fraction of a count.
     sound = all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
     subpixel = 0.5**subpixel_bits if sound else 0.0
-    return [
-        FaceCount(weight, count_offset(body), subpixel, subpixel / scene.diagonal)
-        for weight, body in zip(weights, scene.objects, strict=True)
-    ]
+    offsets = np.array([count_offset(body) for body in scene.objects])
+    return FaceCounts(np.array(count_weights(scene)), offsets, subpixel, subpixel / scene.diagonal)
 
 
 def count_offset(body: Object) -> float:
@@ -103,15 +100,11 @@ def count_offset(body: Object) -> float:
     return UNEXPECTED if body.medium is not None and body.mesh.diagnosis.inside_out else 0.0
 
 
-def _expected_count(placed: PlacedScene, method: Method, counts: Sequence[FaceCount]) -> tuple[float, float]:
+def _expected_count(placed: PlacedScene, method: Method, counts: FaceCounts) -> tuple[float, float]:
     if method.makes_sheets:
         return 0.0, 0.0
-    pairs = [
-        (count.weight * placement.expected_count[0], count.weight * placement.expected_count[1])
-        for count, placement in zip(counts, placed.placements, strict=True)
-    ]
-    low, high = zip(*pairs, strict=True)
-    return sum(low), sum(high)
+    low, high = (counts.weights[:, None] * placed.expected_counts).sum(axis=0)
+    return float(low), float(high)
 
 
 def _rounding(placed: PlacedScene, method: Method) -> float:
@@ -123,5 +116,5 @@ def _rounding(placed: PlacedScene, method: Method) -> float:
     reach = placed.scene.diagonal
     if method.counts_from_camera:
         # Distances from the camera cancel with an error that grows with them.
-        reach += max(float(np.linalg.norm(placement.anchor)) for placement in placed.placements)
+        reach += float(np.linalg.norm(placed.anchors, axis=1).max())
     return ROUNDING * reach

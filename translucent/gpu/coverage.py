@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from translucent.arrays import Array
 from translucent.scene.camera import Camera
-from translucent.scene.scene import Object
 
 #: Rounding of float32 that vertices may suffer, as a share of their distance from the eye, with room to spare.
 _ROUNDING = 1e-5
@@ -58,15 +56,15 @@ class Part:
         return tuple(part for part in parts if part)
 
 
-def extents(objects: Sequence[Object], camera: Camera, size: tuple[int, int]) -> Array:
-    """(n, 4): left, bottom, right and top edge of what each object may cover, in pixels, at most 2 pixels off the
-    picture; right of left nowhere for objects out of view.
+def extents(boxes: Array, camera: Camera, size: tuple[int, int]) -> Array:
+    """(n, 4): left, bottom, right and top edge of what objects with these bounds (n, 2, 3) may cover, in pixels, at
+    most 2 pixels off the picture; right of left nowhere for objects out of view.
 
     They enclose the images of all faces, since they come from the corners of bounds. Bounds that reach behind the eye,
     and may yet be in view, give all of the picture.
     """
-    count = len(objects)
-    bounds = np.stack([body.bounds for body in objects]) - camera.eye
+    count = len(boxes)
+    bounds = boxes - camera.eye
     choice = np.array([[i >> axis & 1 for axis in range(3)] for i in range(8)])
     corners = bounds[:, choice, np.arange(3)]
     frame = np.stack([camera.right, camera.up, camera.forward])

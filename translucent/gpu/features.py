@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from translucent.arrays import Array
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.slots import Slot, medium_slots
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ class FrameFeatures:
         """Whether the method steps through the intervals."""
         return self.plan.method.marches
 
-    @property
+    @cached_property
     def emits(self) -> bool:
         """Whether any medium emits light."""
         return any(body.medium is not None and body.medium.emits for body in self.scene.bodies)
@@ -133,18 +134,19 @@ class FrameFeatures:
         """Thickness in metres of the objects that are drawn as sheets, by object index."""
         thin = self.plan.method.makes_sheets
         return {
-            i: self.sheet_thickness(body)
+            i: float(self.sheet_thicknesses[i])
             for i, body in enumerate(self.scene.objects)
             if body.medium is not None and (thin or body.sheet_thickness is not None)
         }
 
-    def sheet_thickness(self, body: Object) -> float:
-        """Thickness in metres of each face of a body, where a pass draws it as a sheet."""
-        if body.sheet_thickness is not None:
-            return body.sheet_thickness
-        if (usual := self.plan.method.usual_thickness) is not None:
-            return usual
-        return FALLBACK_SHEET * float(np.linalg.norm(body.bounds[1] - body.bounds[0]))
+    @cached_property
+    def sheet_thicknesses(self) -> Array:
+        """(objects,): thickness in metres of each face of an object, where a pass draws it as a sheet."""
+        declared = np.array([item.sheet_thickness for item in self.scene.objects], dtype=np.float64)  # NaN: none
+        usual = self.plan.method.usual_thickness
+        boxes = self.scene.boxes
+        others = FALLBACK_SHEET * np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) if usual is None else usual
+        return np.where(np.isnan(declared), others, declared)
 
     def _fills(self, target: str) -> bool:
         return any(step.target == target for step in self.plan.passes)

@@ -7,7 +7,8 @@ each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+import weakref
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -25,9 +26,9 @@ from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.ledger import before_making
-from translucent.media.medium import Medium
+from translucent.media.medium import VACUUM, Medium
 from translucent.scene.scene import Object, Scene
-from translucent.scene.surface import Surface
+from translucent.scene.surface import SMOOTH
 
 Words = npt.NDArray[np.uint32]
 
@@ -168,6 +169,7 @@ class SceneHierarchies:
             triangle += texels // 3
         self.nodes, self.triangles = _texture(gl, nodes), _texture(gl, triangles)
         self.object_nodes = 0
+        self._placed: tuple[Hashable, npt.NDArray[np.float32], tuple[float, float, float, float]] | None = None
 
     def place(
         self, scene: Scene, center: Array, sheets: Mapping[int, float]
@@ -183,7 +185,15 @@ class SceneHierarchies:
         frame : (4,) floats
             Center and scale of the coordinates of the hierarchy of objects; positions count from `center`.
         """
-        boxes = np.stack([body.bounds - center for body in scene.objects])
+        asked = weakref.ref(scene), center.tobytes(), tuple(sheets.items())
+        if self._placed is None or self._placed[0] != asked:  # else as for the last sample of the frame
+            self._placed = asked, *self._place(scene, center, sheets)
+        return self._placed[1:]
+
+    def _place(
+        self, scene: Scene, center: Array, sheets: Mapping[int, float]
+    ) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
+        boxes = scene.boxes - center
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
         middle, scale = _frame(low, high)
         with np.errstate(under="ignore"):
@@ -220,7 +230,7 @@ class SceneHierarchies:
         linear = body.matrix[:3, :3]
         middle = linear @ packed.center + (body.matrix[:3, 3] - center)
         rows = np.column_stack([packed.scale * np.linalg.inv(linear), middle])
-        medium, surface = body.medium or Medium(), body.surface or Surface()
+        medium, surface = body.medium or VACUUM, body.surface or SMOOTH
         metres = 1.0 if sheet is None else sheet
         opaque = body.medium is None
         extinction = bounded_extinction(medium, scene.diagonal)

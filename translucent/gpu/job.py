@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.balance import Balance, face_counts
-from translucent.gpu.body_uniforms import body_roles
+from translucent.gpu.body_uniforms import BodyRoles
 from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.densities import density_uniforms, scene_grids
 from translucent.gpu.diffusion import DiffusedLight
@@ -32,6 +32,7 @@ from translucent.gpu.uniforms import (
     media_uniforms,
     scatter_uniforms,
     shade_uniforms,
+    surface_table,
     surface_uniforms,
 )
 from translucent.planning.render_plan import RenderPlan
@@ -112,12 +113,11 @@ class FrameJob(SceneView):
         if self.features.varies:
             light = resources.diffusion.of(scene, plan.given_back.diffusion)
             contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
-        super().__init__(gl, placed, body_roles(self.features, counts), contents, targets, resources)
+        super().__init__(gl, placed, BodyRoles.of(self.features, counts), contents, targets, resources)
         self._cleared: set[str] = set()
         self._lit = False
-        self._extents = extents(scene.objects, scene.camera, targets.size)
+        self._extents = extents(scene.boxes, scene.camera, targets.size)
         self._in_view = frozenset(np.flatnonzero(self._extents[:, 2] > self._extents[:, 0]).tolist())
-        self._media = np.array([body.medium is not None for body in scene.objects])
         if self.features.marches and not self.features.scatters:
             self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))
         self.place((0.0, 0.0), with_depth=with_depth)
@@ -133,12 +133,17 @@ class FrameJob(SceneView):
         light = self.diffused_light
         return {} if light is None else light.rows(media_center(self.scene))
 
+    @cached_property
+    def surface_rows(self) -> npt.NDArray[np.float32]:
+        """Table of the surfaces of all objects, the same for all samples."""
+        return surface_table(self.scene, self.features.sheets, self.diffused_rows)
+
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene
-        depths = depth_range(scene.objects, scene.camera, scene.diagonal) if with_depth else None
+        depths = depth_range(scene.boxes, scene.camera, scene.diagonal) if with_depth else None
         self.uniforms.place(SampleView(scene.camera, self.targets.size, shift, depths, self.corner))
-        self.covered = part_of(self._extents[self._media], shift, self.targets.size)
+        self.covered = part_of(self._extents[scene.filled], shift, self.targets.size)
         self._cleared.clear()
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:

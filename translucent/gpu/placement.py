@@ -1,4 +1,4 @@
-"""Placement of bodies in a frame: float64 on the CPU, rounded to float32 only relative to each body's center."""
+"""Placement of objects in a frame: float64 on the CPU, rounded to float32 only relative to each body's center."""
 
 from __future__ import annotations
 
@@ -7,58 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Mask
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
 
 #: Distance to a surface, as a share of the diagonal, within which the eye is on it; anything nearer ahead is clipped.
 NEAR_SURFACE = 1e-6
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Placement of one object before a camera.
-
-    Attributes
-    ----------
-    cut : bool
-        The eye, or an orthographic image plane, is within the body's bounds: distances count from there.
-    anchor : (3,) float64
-        World-space vector from the eye to the center of the mesh.
-    expected_count : (float, float)
-        Least and greatest signed count that a ray may have: exits minus entries ahead of its origin. It is the winding
-        number of the body at the origin.
-    """
-
-    body: Object
-    cut: bool
-    anchor: Array
-    expected_count: tuple[float, float]
-
-    @classmethod
-    def of(cls, body: Object, camera: Camera) -> Placement:
-        """Place `body` before `camera`."""
-        anchor = body.matrix[:3, :3] @ body.mesh.center + (body.matrix[:3, 3] - camera.eye)
-        low, high = body.bounds - camera.eye
-        if camera.fov_y is None:
-            # The corner of the bounds that is farthest behind decides.
-            forward = camera.forward
-            cut = bool(np.where(forward > 0, low, high) @ forward < 0)
-        else:
-            margin = NEAR_SURFACE * float(np.linalg.norm(high - low))
-            cut = bool((low <= margin).all() and (high >= -margin).all())
-        expected = _expected_count(body, camera) if cut and body.medium is not None else (0.0, 0.0)
-        return cls(body, cut, anchor, expected)
-
-    @property
-    def on_surface(self) -> bool:
-        """Whether the eye is on the surface: rays inwards leave once more than rays outwards."""
-        return self.expected_count[0] != self.expected_count[1]
-
-    def camera_from_offset(self, camera: Camera) -> Array:
-        """(3, 4): from offsets to metres right of, above and ahead of the eye."""
-        rows = np.stack([camera.right, camera.up, camera.forward])
-        return np.column_stack([rows @ self.body.matrix[:3, :3], rows @ self.anchor])
 
 
 @dataclass(frozen=True)
@@ -71,7 +25,12 @@ class AxialRange:
     @classmethod
     def of(cls, objects: Sequence[Object], camera: Camera) -> AxialRange:
         """Range of the scene ahead of the eye, or of an orthographic picture."""
-        depths = np.concatenate([_corners(body.bounds - camera.eye) @ camera.forward for body in objects])
+        return cls.of_boxes(np.array([item.bounds for item in objects]), camera)
+
+    @classmethod
+    def of_boxes(cls, boxes: Array, camera: Camera) -> AxialRange:
+        """The same of what has these bounds (n, 2, 3)."""
+        depths = _corners(boxes - camera.eye) @ camera.forward
         near = max(float(depths.min()), 0.0)
         # A flat scene has one depth; any length will do.
         return cls(near, near + (max(float(depths.max()), 0.0) - near or float(np.abs(depths).max()) or 1.0))
@@ -84,13 +43,20 @@ class AxialRange:
 
 @dataclass(frozen=True, eq=False)
 class PlacedScene:
-    """Scene placed before its camera.
+    """Scene placed before its camera; arrays have a row for each of its objects.
 
     Attributes
     ----------
     scene : Scene
-    placements : tuple of Placement
-        Of its objects.
+    matrices : (objects, 4, 4) float64
+        From the object to the world.
+    anchors : (objects, 3) float64
+        World-space vector from the eye to the center of the mesh.
+    cut : (objects,) bool
+        The eye, or an orthographic image plane, is within the object's bounds: distances count from there.
+    expected_counts : (objects, 2) float64
+        Least and greatest signed count that a ray may have: exits minus entries ahead of its origin. It is the winding
+        number of the body at the origin.
     media : AxialRange
         Of all its media.
     opaque : AxialRange, optional
@@ -98,21 +64,42 @@ class PlacedScene:
     """
 
     scene: Scene
-    placements: tuple[Placement, ...]
+    matrices: Array
+    anchors: Array
+    cut: Mask
+    expected_counts: Array
     media: AxialRange
     opaque: AxialRange | None
 
     @classmethod
     def of(cls, scene: Scene) -> PlacedScene:
         """Place the objects of a scene before its camera."""
-        placements = tuple(Placement.of(body, scene.camera) for body in scene.objects)
-        opaque = AxialRange.of(scene.opaque, scene.camera) if scene.opaque else None
-        return cls(scene, placements, AxialRange.of(scene.bodies, scene.camera), opaque)
+        camera, objects = scene.camera, scene.objects
+        matrices = np.array([item.transform for item in objects])
+        centers = np.array([item.mesh.center for item in objects])
+        anchors = (matrices[:, :3, :3] @ centers[..., None])[..., 0] + (matrices[:, :3, 3] - camera.eye)
+        cut = _cut(scene.boxes - camera.eye, camera)
+        expected = np.zeros((len(objects), 2))
+        for i in np.flatnonzero(cut & scene.filled).tolist():
+            expected[i] = _expected_count(objects[i], camera)
+        opaque = AxialRange.of_boxes(scene.boxes[~scene.filled], camera) if scene.opaque else None
+        media = AxialRange.of_boxes(scene.boxes[scene.filled], camera)
+        return cls(scene, matrices, anchors, cut, expected, media, opaque)
+
+    @property
+    def on_surface(self) -> Mask:
+        """(objects,): whether the eye is on the surface: rays inwards leave once more than rays outwards."""
+        return np.asarray(self.expected_counts[:, 0] != self.expected_counts[:, 1])
 
     @property
     def starts_inside(self) -> bool:
         """Whether rays may start inside a body."""
-        return any(placement.expected_count[1] > 0 for placement in self.placements)
+        return bool((self.expected_counts[:, 1] > 0).any())
+
+    def camera_from_offset(self, camera: Camera) -> Array:
+        """(objects, 3, 4): from offsets to metres right of, above and ahead of the eye."""
+        rows = np.stack([camera.right, camera.up, camera.forward])
+        return np.concatenate([rows @ self.matrices[:, :3, :3], rows @ self.anchors[..., None]], axis=2)
 
 
 @dataclass(frozen=True)
@@ -139,9 +126,9 @@ class SampleView:
     corner: tuple[int, int] = (0, 0)
 
 
-def depth_range(objects: Sequence[Object], camera: Camera, diagonal: float) -> tuple[float, float]:
-    """Nearest and farthest distance along the view axis that a depth buffer must hold, in metres."""
-    depths = np.concatenate([_corners(body.bounds - camera.eye) @ camera.forward for body in objects])
+def depth_range(boxes: Array, camera: Camera, diagonal: float) -> tuple[float, float]:
+    """Nearest and farthest distance along the view axis that a depth buffer must hold, in metres, for these bounds."""
+    depths = _corners(boxes - camera.eye) @ camera.forward
     near, far = float(depths.min()), float(depths.max())
     margin = 1e-3 * diagonal
     if camera.fov_y is None:
@@ -149,9 +136,21 @@ def depth_range(objects: Sequence[Object], camera: Camera, diagonal: float) -> t
     return max(near - margin, 1e-4 * diagonal), max(far + margin, diagonal)
 
 
-def _corners(bounds: Array) -> Array:
-    """(8, 3): the corners of a box."""
-    return np.array([[bounds[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+def _corners(boxes: Array) -> Array:
+    """(n, 8, 3): the corners of boxes (n, 2, 3)."""
+    choice = np.array([[i >> axis & 1 for axis in range(3)] for i in range(8)])
+    return np.asarray(boxes[:, choice, np.arange(3)])
+
+
+def _cut(boxes: Array, camera: Camera) -> Mask:
+    """(n,): whether rays start within these bounds (n, 2, 3), which count from the eye."""
+    low, high = boxes[:, 0], boxes[:, 1]
+    if camera.fov_y is None:
+        # The corner of the bounds that is farthest behind decides.
+        forward = camera.forward
+        return np.asarray(np.where(forward > 0, low, high) @ forward < 0)
+    margin = NEAR_SURFACE * np.linalg.norm(high - low, axis=1)[:, None]
+    return np.asarray((low <= margin).all(axis=1) & (high >= -margin).all(axis=1))
 
 
 def _expected_count(body: Object, camera: Camera) -> tuple[float, float]:

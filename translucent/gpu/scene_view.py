@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import moderngl
 
-from translucent.gpu.body_uniforms import BodyRole
+from translucent.gpu.body_uniforms import BodyRoles
 from translucent.gpu.placement import PlacedScene
 from translucent.gpu.resources import Resources
 from translucent.gpu.std140 import UniformBlock
@@ -20,8 +20,8 @@ class SceneView:
     Parameters
     ----------
     placed : PlacedScene
-    roles : sequence of BodyRole
-        One for each object of the scene.
+    roles : BodyRoles
+        Of the objects of the scene.
     contents : mapping of UniformBlock to bytes
         Of blocks that are alike for all samples.
     targets, resources
@@ -31,7 +31,7 @@ class SceneView:
         self,
         gl: moderngl.Context,
         placed: PlacedScene,
-        roles: Sequence[BodyRole],
+        roles: BodyRoles,
         contents: Mapping[UniformBlock, bytes],
         targets: Targets,
         resources: Resources,

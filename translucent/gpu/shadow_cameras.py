@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,56 @@ def holds_eye(item: Object, scene: Scene) -> bool:
     """Whether the eye is in the bounds of an object, so that its inner side may be seen."""
     low, high = item.bounds
     return bool((low <= scene.camera.eye).all() and (scene.camera.eye <= high).all())
+
+
+#: Opaque objects that are found to be grounds at most: each is compared with all others. Further ones throw shadows as
+#: what is no ground does.
+MOST_GROUNDS = 1024
+
+
+class _Stack:
+    """Rows of many objects in one array, which grows."""
+
+    def __init__(self, width: int) -> None:
+        self._array = np.empty((64, width))
+        self._starts: list[int] = []
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, rows: Array) -> None:
+        """Add the rows (n, width) of an object, of which there is one at least."""
+        self._starts.append(self._count)
+        self._count += len(rows)
+        if self._count > len(self._array):
+            self._array = np.concatenate([self.rows[: self._starts[-1]], np.empty((self._count, rows.shape[1]))])
+        self._array[self._starts[-1] : self._count] = rows
+
+    @property
+    def rows(self) -> Array:
+        """(n, width): of all objects."""
+        return self._array[: self._count]
+
+    def every(self, which: Mask) -> Mask:
+        """(objects,): whether all rows of each object are among those of `which` (n,)."""
+        return np.logical_and.reduceat(which, self._starts) if self._starts else np.zeros(0, dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Planes of the faces of an object: normal, and its product with a point of the face.
+
+    Attributes
+    ----------
+    planes : (faces, 4) float64
+        Towards the light.
+    lit : (n, 4) float64
+        Of those that the light reaches from outside.
+    """
+
+    planes: Array
+    lit: Array
 
 
 class ShadowThrowers:
@@ -47,23 +97,19 @@ class ShadowThrowers:
 
     def __init__(self, light: Light, scene: Scene, corners: Sequence[Array]) -> None:
         self._light, self._scene, self._corners = light, scene, corners
-        grounds: list[int] = []
-        # Large ones first: leaving those out makes the texels of maps smaller.
-        for i in sorted(range(len(corners)), key=lambda i: -float(np.ptp(corners[i], axis=0).max())):
-            if (
-                scene.objects[i].medium is None
-                and self._lights(i, (*grounds, i))
-                and all(self._lights(j, (i,)) for j in grounds)
-            ):
-                grounds.append(i)
-        self.grounds = tuple(grounds)
-        everything = range(len(corners))
-        opaque = (i for i, item in enumerate(scene.objects) if item.medium is None)
-        self.in_the_way = tuple(i for i in opaque if i not in grounds or not self._lights(i, everything))
+        self._sides: dict[int, _Sides] = {}
+        self.grounds = self._found_grounds()
+        everything = _Stack(3)
+        for points in corners:
+            everything.add(points)
+        shadowed = {i for i in self.grounds if not self._lights(i, everything, range(len(corners)))}
+        opaque = set(np.flatnonzero(~scene.filled).tolist())
+        self.in_the_way = tuple(sorted(opaque - set(self.grounds) | shadowed))
 
     def cameras(self) -> list[Camera]:
         """Cameras of the light that see all but the grounds; what they do not see is lit."""
-        throwing = [points for i, points in enumerate(self._corners) if i not in self.grounds]
+        grounds = set(self.grounds)
+        throwing = [points for i, points in enumerate(self._corners) if i not in grounds]
         if not throwing:
             return []
         points = np.concatenate(throwing)
@@ -82,30 +128,65 @@ class ShadowThrowers:
         pose[:3, 3] -= max(nearer, 0.0) * camera.forward
         return [replace(camera, pose=pose)]
 
-    def _lights(self, ground: int, others: Sequence[int]) -> bool:
-        """Whether an object shadows none of the others: each is before the lit sides of all its faces, or, of a convex
+    def _found_grounds(self) -> tuple[int, ...]:
+        """Numbers of the grounds."""
+        grounds: list[int] = []
+        points, planes, most_faces = _Stack(3), _Stack(4), 0
+        # Large ones first: leaving those out makes the texels of maps smaller.
+        sizes = {
+            i: -float(np.ptp(self._corners[i], axis=0).max()) for i in np.flatnonzero(~self._scene.filled).tolist()
+        }
+        for i in sorted(sizes, key=sizes.__getitem__):
+            faces, own = len(self._scene.objects[i].mesh.faces), self._corners[i]
+            if max(faces * (len(points) + len(own)), most_faces * len(own)) > _MOST_PAIRS:
+                continue
+            if not self._lights_one(i, i) or not self._lights(i, points, grounds):
+                continue
+            before = planes.every(np.asarray(self._ahead(own, planes.rows).all(axis=0)))
+            if not all(self._lights_one(grounds[k], i) for k in np.flatnonzero(~before).tolist()):
+                continue
+            grounds.append(i)
+            points.add(own)
+            planes.add(self._sides_of(i).planes)
+            most_faces = max(most_faces, faces)
+            if len(grounds) == MOST_GROUNDS:
+                break
+        return tuple(grounds)
+
+    def _lights(self, ground: int, points: _Stack, others: Sequence[int]) -> bool:
+        """Whether an object shadows none of the others, whose corners are stacked."""
+        if len(self._scene.objects[ground].mesh.faces) * len(points) > _MOST_PAIRS:
+            return False
+        before = points.every(np.asarray(self._ahead(points.rows, self._sides_of(ground).planes).all(axis=1)))
+        return all(self._lights_one(ground, others[k]) for k in np.flatnonzero(~before).tolist())
+
+    def _lights_one(self, ground: int, other: int) -> bool:
+        """Whether an object does not shadow another: that is before the lit sides of all its faces, or, of a convex
         one that the eye is not in, of some face.
         """
         item = self._scene.objects[ground]
-        if len(item.mesh.faces) * sum(len(self._corners[i]) for i in others) > _MOST_PAIRS:
-            return False
-        first, normal, cosine = self._faces(item)
-        turned = normal * np.sign(cosine)[:, None]
         convex = item.mesh.diagnosis.convex and not holds_eye(item, self._scene)
-        outwards = (-normal if item.faces_inwards else normal)[(cosine < 0) == item.faces_inwards]
-        lit = first[(cosine < 0) == item.faces_inwards]
-        for i in others:
-            if convex and i == ground:
-                continue  # of a convex body what faces the light is lit
-            before = self._ahead(self._corners[i], first, turned).all()
-            if not before and not (convex and self._ahead(self._corners[i], lit, outwards).all(axis=0).any()):
-                return False
-        return True
+        if convex and other == ground:
+            return True  # of a convex body what faces the light is lit
+        sides, points = self._sides_of(ground), self._corners[other]
+        if self._ahead(points, sides.planes).all():
+            return True
+        return convex and bool(self._ahead(points, sides.lit).all(axis=0).any())
 
-    def _ahead(self, points: Array, first: Array, normals: Array) -> Mask:
-        """(n, faces): whether points (n, 3) are before the planes of faces, but for rounding."""
-        ahead = points @ normals.T - (first * normals).sum(axis=1)
-        return np.asarray(ahead >= -_BEHIND * self._scene.diagonal)
+    def _ahead(self, points: Array, planes: Array) -> Mask:
+        """(n, faces): whether points (n, 3) are before planes (faces, 4), but for rounding."""
+        return np.asarray(points @ planes[:, :3].T - planes[:, 3] >= -_BEHIND * self._scene.diagonal)
+
+    def _sides_of(self, number: int) -> _Sides:
+        """Planes of the faces of an object."""
+        if number not in self._sides:
+            item = self._scene.objects[number]
+            first, normal, cosine = self._faces(item)
+            distance = (first * normal).sum(axis=1, keepdims=True)
+            planes = np.concatenate([normal, distance], axis=1)
+            outwards = (-planes if item.faces_inwards else planes)[(cosine < 0) == item.faces_inwards]
+            self._sides[number] = _Sides(planes * np.sign(cosine)[:, None], outwards)
+        return self._sides[number]
 
     def _faces(self, item: Object) -> tuple[Array, Array, Array]:
         """First corners (m, 3) of the faces of an object, unit normals (m, 3), and what these are times the way to the

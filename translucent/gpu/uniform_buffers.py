@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import moderngl
+import numpy as np
 
-from translucent.gpu.body_uniforms import BodyRole, body_uniforms
+from translucent.gpu.body_uniforms import BodyRoles, body_records, clip_rows
 from translucent.gpu.layout import BODY, VIEW
 from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.gpu.std140 import UniformBlock
@@ -25,8 +26,8 @@ class UniformBuffers:
     ----------
     gl : moderngl.Context
     placed : PlacedScene
-    roles : sequence of BodyRole
-        One for each object of the scene.
+    roles : BodyRoles
+        Of the objects of the scene.
     contents : mapping of UniformBlock to bytes
         Of the blocks that are alike for all samples of a picture.
     """
@@ -35,23 +36,24 @@ class UniformBuffers:
         self,
         gl: moderngl.Context,
         placed: PlacedScene,
-        roles: Sequence[BodyRole],
+        roles: BodyRoles,
         contents: Mapping[UniformBlock, bytes],
     ) -> None:
         self._gl = gl
         self._placed = placed
-        self._roles = roles
         self._view = gl.buffer(reserve=VIEW.dtype.itemsize)
-        self.bodies = gl.buffer(reserve=_STRIDE * len(roles))
+        records = body_records(placed, roles, media_center(placed.scene))
+        self._content = np.zeros((len(records), _STRIDE), np.uint8)
+        self._records = self._content[:, : BODY.dtype.itemsize].view(BODY.dtype)[:, 0]
+        self._records[:] = records
+        self.bodies = gl.buffer(reserve=self._content.nbytes)
         self._constant = {block: gl.buffer(content) for block, content in contents.items()}
 
     def place(self, view: SampleView) -> None:
         """Write and bind the uniforms for some sample points."""
-        placed, center = self._placed, media_center(self._placed.scene)
-        for i, (placement, role) in enumerate(zip(placed.placements, self._roles, strict=True)):
-            record = body_uniforms(placement, view, role, placed.media, placed.scene.diagonal, center)
-            self.bodies.write(record, offset=i * _STRIDE)
-        self._view.write(view_uniforms(view, placed))
+        self._records["clip_from_offset"] = clip_rows(self._placed, view)
+        self.bodies.write(self._content)
+        self._view.write(view_uniforms(view, self._placed))
         self.bind()
 
     def add(self, block: UniformBlock, content: bytes) -> None:

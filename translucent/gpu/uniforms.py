@@ -30,14 +30,14 @@ from translucent.gpu.layout import (
 )
 from translucent.gpu.placement import PlacedScene, SampleView
 from translucent.media.given_back import LayeredMedium
-from translucent.media.medium import Medium
+from translucent.media.medium import VACUUM
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
-from translucent.scene.surface import Surface
+from translucent.scene.surface import SMOOTH
 
 
 def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
@@ -60,7 +60,7 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
 
 def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
     """Contents of the Media block."""
-    scene, placements = placed.scene, placed.placements
+    scene = placed.scene
     extinction, emission, scattering = (np.zeros((MAX_SLOTS, 4)) for _ in range(3))
     for i, slot in enumerate(slots[:MAX_SLOTS]):
         density = scene.objects[slot.objects[0]].density
@@ -69,8 +69,7 @@ def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
         emission[i, :3] = slot.medium.emission
         share = extinction[i, :3] / np.where(slot.medium.extinction > 0, slot.medium.extinction, 1.0)
         scattering[i] = *(share * np.asarray(slot.medium.scattering)), slot.medium.anisotropy
-        extinction[i, 3] = sum(placements[k].expected_count[0] for k in slot.objects)
-        emission[i, 3] = sum(placements[k].expected_count[1] for k in slot.objects)
+        extinction[i, 3], emission[i, 3] = placed.expected_counts[list(slot.objects)].sum(axis=0)
     return MEDIA.pack(
         slot_extinction=extinction,
         slot_emission=emission,
@@ -213,7 +212,7 @@ def environment_uniforms(environment: Environment) -> bytes:
 
 def media_center(scene: Scene) -> Array:
     """(3,): center of the bounds of all bodies, from which positions count."""
-    boxes = np.stack([body.bounds for body in scene.bodies])
+    boxes = scene.boxes[scene.filled]
     return np.asarray(0.5 * boxes[:, 0].min(axis=0) + 0.5 * boxes[:, 1].max(axis=0))
 
 
@@ -221,7 +220,7 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
     """Contents of the Surfaces block, for a picture of this size."""
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
     half_width, half_height = camera.half_extent(size)
-    boxes = np.stack([body.bounds for body in scene.bodies])
+    boxes = scene.boxes[scene.filled]
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     center = 0.5 * low + 0.5 * high - camera.eye
     ahead = float(center @ camera.forward)
@@ -269,7 +268,7 @@ _NO_DIFFUSION: dict[str, npt.ArrayLike] = {
 def _surface_row(
     scene: Scene, body: Object, sheet: float | None, diffused: Mapping[str, npt.ArrayLike] | None
 ) -> dict[str, npt.ArrayLike]:
-    medium, surface = body.medium or Medium(), body.surface or Surface()
+    medium, surface = body.medium or VACUUM, body.surface or SMOOTH
     stream = two_stream_absorption(medium.absorption), two_stream_scattering(medium.scattering, medium.anisotropy)
     limit = MAX_SCENE_OPTICAL_DEPTH / max(scene.diagonal, float(np.finfo(np.float64).tiny))
     return {

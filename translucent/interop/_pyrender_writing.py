@@ -75,7 +75,7 @@ def _light(light: Light) -> Any:
 
 def _camera(scene: Scene, near: float | None) -> Any:
     camera = scene.camera
-    closest, far = depth_range(scene.opaque, camera, scene.diagonal)
+    closest, far = depth_range(scene.boxes[~scene.filled], camera, scene.diagonal)
     if camera.fov_y is None:
         # What is behind an orthographic picture is not seen, and what is ahead has the same precision everywhere.
         far = max(far, scene.diagonal)

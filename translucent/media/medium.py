@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -156,10 +157,12 @@ class Medium(Frozen):
             absorption, scattering = extinction * (1.0 - shares), extinction * shares
             return cls(absorption, scattering, absorption * _channels("glow", glow), anisotropy)
 
-    @property
+    @cached_property
     def extinction(self) -> Array:
         """(3,): sigma_t = sigma_a + sigma_s in 1/m."""
-        return np.asarray(np.add(self.absorption, self.scattering))
+        total = np.asarray(np.add(self.absorption, self.scattering))
+        total.setflags(write=False)
+        return total
 
     def transmittance(self, distance: npt.ArrayLike) -> Array:
         """(..., 3): share of light per channel that passes `distance` (...,) metres of the medium."""
@@ -184,12 +187,12 @@ class Medium(Frozen):
 
         return html_strip(self.extinction)
 
-    @property
+    @cached_property
     def emits(self) -> bool:
         """Whether any channel emits."""
         return bool(np.any(np.asarray(self.emission) > 0))
 
-    @property
+    @cached_property
     def scatters(self) -> bool:
         """Whether any channel scatters."""
         return bool(np.any(np.asarray(self.scattering) > 0))
@@ -219,3 +222,7 @@ def _channels(field: str, value: Channels) -> Array:
         )
     triple.setflags(write=False)
     return triple
+
+
+#: Medium of what has none.
+VACUUM = Medium()

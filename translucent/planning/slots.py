@@ -44,12 +44,13 @@ def medium_slots(scene: Scene) -> tuple[Slot, ...]:
     share one.
     """
     groups: dict[Hashable, list[int]] = {}
+    fillings = _fillings(scene)
     for i, body in enumerate(scene.objects):
         if body.medium is None or body.sheet_thickness is not None:
             continue
         own = i if not _never_negative(body) else None
         priority = body.priority if scene.overlap == "priority" else 0
-        groups.setdefault((own, priority, _filling(scene, i)), []).append(i)
+        groups.setdefault((own, priority, fillings[i]), []).append(i)
     slots = []
     for group in sorted(groups.values(), key=lambda group: -scene.objects[group[0]].priority):
         first = scene.objects[group[0]]
@@ -63,7 +64,8 @@ def require_clear_priorities(scene: Scene) -> None:
     bodies = [i for i, body in enumerate(scene.objects) if body.medium is not None and body.sheet_thickness is None]
     priorities = np.unique([scene.objects[i].priority for i in bodies], return_inverse=True)[1]
     known: dict[Hashable, int] = {}
-    fillings = np.array([known.setdefault(_filling(scene, i), len(known)) for i in bodies])
+    keys = _fillings(scene)
+    fillings = np.array([known.setdefault(keys[i], len(known)) for i in bodies])
     found = overlapping_pair(
         [scene.objects[i] for i in bodies],
         lambda one, other: (priorities[one] == priorities[other]) & (fillings[one] != fillings[other]),
@@ -105,12 +107,22 @@ def _never_negative(body: Object) -> bool:
     return body.mesh.diagnosis.sound
 
 
-def _filling(scene: Scene, i: int) -> Hashable:
-    """Key of an object's medium: equal for two objects where it makes no difference which of them fills a point."""
-    medium, varies = scene.objects[i].medium, scene.objects[i].density is not None
-    if medium is None or varies or isinstance(medium, DiffusedVolume):
-        return i
+def _fillings(scene: Scene) -> list[Hashable]:
+    """Key of each object's medium: equal for two objects where it makes no difference which of them fills a point."""
+    # Many bodies share a medium, and what is told of it.
+    media = {id(item.medium): item.medium for item in scene.objects}
+    told = {number: _told(medium, bool(scene.lights)) for number, medium in media.items()}
+    return [
+        i if (key := told[id(item.medium)]) is None or item.density is not None else key
+        for i, item in enumerate(scene.objects)
+    ]
+
+
+def _told(medium: Medium | None, lit: bool) -> Hashable:
+    """What matters of a medium that fills a point; None for one that is like no other."""
+    if medium is None or isinstance(medium, DiffusedVolume):
+        return None
     told = [*medium.extinction, *np.asarray(medium.emission)]
-    if scene.lights:
+    if lit:
         told += [*np.asarray(medium.scattering), medium.anisotropy]
     return tuple(map(float, told))

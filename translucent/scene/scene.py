@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Mask
 from translucent.errors import InputError
 from translucent.frozen import Frozen
 from translucent.geometry.mesh import MAX_COORDINATE, Mesh
@@ -132,7 +132,7 @@ class Object(Frozen):
         """(3,): diffuse reflectance of an opaque object: the color of its surface, if it has one."""
         return np.asarray(self.color if self.surface is None else self.surface.color)
 
-    @property
+    @cached_property
     def has_interface(self) -> bool:
         """Whether its interface changes light: refracts, reflects, tints or scatters it."""
         if self.medium is None or self.covers:
@@ -308,10 +308,19 @@ class Scene(Frozen):
         return tuple(item for item in self.objects if item.medium is None)
 
     @cached_property
+    def boxes(self) -> Array:
+        """(objects, 2, 3): smallest and largest world coordinates of each object."""
+        return np.array([body.bounds for body in self.objects])
+
+    @cached_property
+    def filled(self) -> Mask:
+        """(objects,): whether a medium fills it."""
+        return np.array([body.medium is not None for body in self.objects])
+
+    @cached_property
     def bounds(self) -> Array:
         """(2, 3): smallest and largest world coordinates of all objects."""
-        boxes = np.stack([body.bounds for body in self.objects])
-        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        return np.stack([self.boxes[:, 0].min(axis=0), self.boxes[:, 1].max(axis=0)])
 
     def source(self, body: Object) -> Array:
         """(3,): radiance per metre that a body's medium adds to all rays: q + sigma_s A, with the ambient radiance A.
@@ -354,10 +363,11 @@ class Scene(Frozen):
     @cached_property
     def shown_bounds(self) -> Array:
         """(2, 3): smallest and largest world coordinates of what is shown."""
-        boxes = np.stack([body.bounds for body in self.shown])
+        seen = ~np.array([item.shadow_catcher for item in self.objects])
+        boxes = self.boxes[seen] if seen.any() else self.boxes
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
-    @property
+    @cached_property
     def diagonal(self) -> float:
         """Length of the diagonal of what is shown in metres: the scale of the scene, however large its ground is."""
         return float(np.linalg.norm(self.shown_bounds[1] - self.shown_bounds[0]))

@@ -166,3 +166,7 @@ def _color(field: str, color: ColorLike, most: float) -> Array:
         raise InputError(f"surface {field} {color!r}", found, "give for example (1, 0.9, 0.8)")
     values.setflags(write=False)
     return values
+
+
+#: Surface of a body that is given none.
+SMOOTH = Surface()

@@ -12,8 +12,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import texture_units
 from translucent.planning.interfaces.places import picture_cuts
 from translucent.planning.passes import PassSpec
-from translucent.scene.scene import Object
-from translucent.scene.surface import Surface
+from translucent.scene.surface import SMOOTH, Surface
 
 _FIRST_TEXTURE = 3
 _UNITS = {"opaque_axial_depth": 0, "entered": 1, "ordered_layers": 2} | texture_units(_FIRST_TEXTURE)
@@ -57,17 +56,21 @@ class InterfacesPass:
         job.gl.depth_func = "<"
 
     def _draw(self, job: FrameJob, switches: dict[str, bool], objects: tuple[int, ...]) -> None:
+        finished: tuple[moderngl.Program, Surface] | None = None
         for i in objects:
             body = job.scene.objects[i]
+            surface = body.surface or SMOOTH
             holes = not switches["BACK"] and body.has_holes
             program = self._variants.program(**switches, **look_switches(body), HOLES=holes)
-            self._set_finish(job, program, body)
-            if holes and body.surface is not None:
-                set_uniform(program, "hole_below", body.surface.alpha_cutoff)
+            # Many bodies share a surface, or have none.
+            if finished is None or finished[0] is not program or finished[1] is not surface:
+                self._set_finish(job, program, surface)
+                finished = program, surface
+            if holes:
+                set_uniform(program, "hole_below", surface.alpha_cutoff)
             job.draw(program, (i,))
 
-    def _set_finish(self, job: FrameJob, program: moderngl.Program, body: Object) -> None:
-        surface = body.surface or Surface()
+    def _set_finish(self, job: FrameJob, program: moderngl.Program, surface: Surface) -> None:
         job.resources.textures.bind(surface, program, _FIRST_TEXTURE)
         set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
         set_uniform(program, "surface_roughness", surface.roughness)

@@ -221,8 +221,8 @@ class ShadowMapsPass:
         self, scene: Scene, method: Method | None, opaque: tuple[int, ...]
     ) -> tuple[Hashable, Scene, RenderPlan]:
         """The scene without interfaces, and no opaque objects but these, and its plan; with a key of them."""
-        bodies = _throwing(scene)
-        objects = [item for i, item in enumerate(scene.objects) if i in opaque or item in bodies]
+        bodies, ends = set(map(id, _throwing(scene))), set(opaque)
+        objects = [item for i, item in enumerate(scene.objects) if i in ends or id(item) in bodies]
         # Lights move more often than objects change.
         key = tuple(map(weakref.ref, objects)), scene.overlap, method
         if key not in self._plans:
@@ -267,7 +267,7 @@ def _resolves(scene: Scene) -> bool:
     """Whether a depth buffer of 24 bits tells what is before what, and nothing is clipped that is before the camera."""
     if scene.camera.fov_y is None:
         return True
-    near, far = depth_range(scene.objects, scene.camera, scene.diagonal)
+    near, far = depth_range(scene.boxes, scene.camera, scene.diagonal)
     return far <= _FARTHEST * near
 
 

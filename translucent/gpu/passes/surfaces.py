@@ -10,7 +10,6 @@ from translucent.gpu.passes.no_interface import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.textures import reflectance_table
-from translucent.gpu.uniforms import surface_table
 from translucent.planning.passes import PassSpec
 
 _SAMPLERS = (
@@ -94,7 +93,7 @@ class SurfacesPass:
         """Bind surfaces and lights; returns the texture of surfaces, which the caller releases."""
         environment = job.scene.environment
         maps = job.resources.environments.light(environment)
-        table = surface_table(job.scene, job.features.sheets, job.diffused_rows)
+        table = job.surface_rows
         if job.diffused_light is not None:
             job.diffused_light.texture.use(_UNITS["diffused_light"])
         finishes = job.gl.texture(table.shape[1::-1], 4, table, dtype="f4")

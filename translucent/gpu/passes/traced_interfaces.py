@@ -17,7 +17,7 @@ from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switc
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
-from translucent.gpu.uniforms import media_center, surface_table
+from translucent.gpu.uniforms import media_center
 from translucent.media.given_back import LayeredMedium
 from translucent.planning.mirrors import Mirror, mirror_of
 from translucent.planning.passes import PassSpec
@@ -84,7 +84,7 @@ class TracedInterfacesPass:
         hierarchies = job.resources.hierarchies.of(job.scene)
         rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
         diffused = job.diffused_light
-        contents = surface_table(job.scene, job.features.sheets, job.diffused_rows), rows
+        contents = job.surface_rows, rows
         tables = [gl.texture(table.shape[1::-1], 4, table, dtype="f4") for table in contents]
         self._bind(job, hierarchies, *tables)
         if diffused is not None:
@@ -122,7 +122,7 @@ class TracedInterfacesPass:
         _set(program, {**values, "mirror_plane": (*mirror.normal, height), "mirror_finish": finish})
         twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
         width, rows = job.targets.size
-        edges = extents(twins, job.scene.camera, (width, rows))
+        edges = extents(np.array([twin.bounds for twin in twins]), job.scene.camera, (width, rows))
         seen = edges[:, 2] > edges[:, 0]
         edges[seen] += MIRROR_ROOM * rows * np.array([-1.0, -1.0, 1.0, 1.0])
         job.gl.enable_only(moderngl.BLEND)
@@ -215,9 +215,9 @@ def record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:
     """The bodies that contain the eye, as the shader keeps them."""
     entries = [
         number + 1
-        for number, placement in enumerate(job.placed.placements)
+        for number in np.flatnonzero(job.placed.expected_counts[:, 1]).tolist()
         if number not in job.features.sheets
-        for _ in range(round(placement.expected_count[1]))
+        for _ in range(round(job.placed.expected_counts[number, 1]))
     ][::-1][:8]
     entries += [0] * (8 - len(entries))
     words = [low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)]

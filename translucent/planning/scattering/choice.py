@@ -153,7 +153,8 @@ def _volumes(scene: Scene, solved: list[int], wanted: Diffusion) -> tuple[int, .
     """Those of the bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
     varying = tuple(i for i in solved if scene.objects[i].density is not None)
     even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], wanted))
-    fogs = tuple(sorted(varying + even))
+    if not (fogs := tuple(sorted(varying + even))):
+        return ()
     return fogs if len(medium_slots(shown(scene, GivenBack(volumes=fogs)))) <= MAX_SLOTS else varying
 
 
