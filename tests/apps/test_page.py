@@ -7,6 +7,7 @@ import dataclasses
 import gzip
 import json
 import re
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from tests.command_line import Run, one_error_line, strict_json
 from translucent.gpu.recording.frames import FrameRecorder
 from translucent.page.container import MAGIC, Container
 from translucent.page.plans import TEXTURE_UNITS, plan_page
-from translucent.page.simplify import triangles
+from translucent.page.simplify import simplified, triangles
 from translucent.planning.notes import NoteKind
 from translucent.scene.showcase import showcase
 
@@ -159,3 +160,19 @@ def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> Non
     assert frame.averaged
     for vertex, fragment in recorder.gl.programs:
         assert len(set(_SAMPLER.findall(vertex + fragment))) <= TEXTURE_UNITS
+
+
+def test_a_coarser_copy_has_the_same_volume() -> None:
+    pytest.importorskip("fast_simplification", reason="fast-simplification is not installed")
+    scene = scene_of(ball())
+    coarse = simplified(scene, 200)
+    assert triangles(coarse) <= 210
+    mesh = coarse.objects[0].mesh
+    assert mesh.diagnosis.solid
+    assert mesh.volume == pytest.approx(scene.objects[0].mesh.volume, rel=0.05)
+
+
+def test_without_the_package_a_coarser_copy_is_told_how(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "fast_simplification", None)
+    with pytest.raises(tl.InputError, match="pip install fast-simplification"):
+        simplified(scene_of(ball()), 200)

@@ -128,7 +128,7 @@ def page(
     probe. It runs the passes of the renderer; what it leaves out is told here and on the page.
     """
     from translucent.page.plans import plan_page
-    from translucent.page.simplify import simplified
+    from translucent.page.simplify import simplified, triangles
     from translucent.page.write import check_output, poster_of, save_page, title_of
     from translucent.scene.stages import STAGED_TONE
 
@@ -152,6 +152,7 @@ def page(
     )
     scene = with_environment_shadows(scene, environment_shadows)
     require_translucent(model, scene)
+    before = triangles(scene)
     if simplify is not None:
         scene = simplified(scene, simplify)
     curve = tone or (STAGED_TONE if len(scene.shown) < len(scene.objects) else "none")
@@ -173,10 +174,18 @@ def page(
     notes = [{"kind": str(note.kind), "text": str(note)} for note in planned.notes]
     media = medium_lines(scene)
     if as_json:
-        told = {"output": str(output), "bytes": written, "plan": planned.plan.summary(), "notes": notes}
+        told = {
+            "output": str(output),
+            "bytes": written,
+            "triangles": triangles(scene),
+            "plan": planned.plan.summary(),
+            "notes": notes,
+        }
         echo(json.dumps({**told, "medium": "; ".join(media)}))
         return
     echo(f"{output}: {written / 1e6:.2f} MB")
+    if simplify is not None:
+        echo(f"simplified: {before:,} triangles to {triangles(scene):,}")
     for line in media:
         echo(f"medium: {line}")
     echo(str(planned.plan))

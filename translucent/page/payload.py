@@ -15,7 +15,7 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.formulas.tone import TONES
 from translucent.frames.aovs import false_colors
 from translucent.gpu.balance import face_counts
-from translucent.gpu.body_uniforms import body_roles, bounded_extinction
+from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import BLOCKS, BODY, TABLES
 from translucent.gpu.lifting import lift
@@ -290,7 +290,7 @@ def _variant_told(
     spectral_maps: bool,
 ) -> dict[str, Any]:
     features = FrameFeatures(scene, frame.plan)
-    roles = body_roles(features, face_counts(scene, int(INFO["GL_SUBPIXEL_BITS"])))
+    roles = BodyRoles.of(features, face_counts(scene, int(INFO["GL_SUBPIXEL_BITS"])))
     names = {block.binding: name for name, block in BLOCKS.items()}
     blocks = {names[binding]: into.add(_bytes(content)) for binding, content in frame.blocks.items()}
     steps = {part: [dict(step) for step in getattr(frame, part)] for part in _PARTS}
@@ -304,12 +304,8 @@ def _variant_told(
         "bodies": [into.add(_bytes(content)) for content in frame.bodies],
         "targets": frame.targets,
         "roles": [
-            {
-                "anchored": role.anchored,
-                "weight": role.count.weight,
-                "subpixel": role.count.subpixel,
-            }
-            for role in roles
+            {"anchored": roles.anchored, "weight": weight, "subpixel": roles.counts.subpixel}
+            for weight in roles.counts.weights.tolist()
         ],
         "slots": [list(slot.objects) for slot in features.slots],
         "spectral": frame.plan.spectral,
