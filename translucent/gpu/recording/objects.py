@@ -113,9 +113,10 @@ class RecordedBuffer:
         self.content = bytearray(reserve if data is None else _bytes_of(data))
         self.size = len(self.content)
 
-    def write(self, data: bytes, offset: int = 0) -> None:
+    def write(self, data: Any, offset: int = 0) -> None:
         """Replace bytes from an offset on."""
-        self.content[offset : offset + len(data)] = data
+        content = _bytes_of(data)
+        self.content[offset : offset + len(content)] = content
 
     def bind_to_uniform_block(self, binding: int, offset: int = 0, size: int = -1) -> None:
         """Bind a range."""
