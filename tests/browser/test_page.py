@@ -63,9 +63,10 @@ def ball(medium: tl.Medium, **more: Any) -> tl.Object:
 
 def scene_of(body: tl.Object, **more: Any) -> tl.Scene:
     camera = tl.Camera.look_at((0.03, 0.03, 0.09), (0, 0, 0), fov_y=30)
-    return tl.Scene([body], camera, environment=tl.Environment.gradient((0.3, 0.4, 0.5), (1.0, 0.9, 0.8)), **more)
+    return tl.Scene([body], camera, environment=SKY, **more)
 
 
+SKY = tl.Environment.gradient((0.3, 0.4, 0.5), (1.0, 0.9, 0.8))
 RED = tl.Medium.from_color((0.7, 0.2, 0.1), 0.02)
 GLASS = tl.Medium.from_color((0.5, 0.8, 0.6), 0.02, ior=1.5)
 
@@ -137,7 +138,7 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     page.keyboard.press("r")
     assert page.evaluate(where) == pytest.approx(start)
     page.keyboard.press("t")
-    page.wait_for_function("viewer.still")
+    page.wait_for_function("() => viewer.still")
     found = page.evaluate("viewer.probe(0.5, 0.5)")
     assert found["valid"]
     assert found["count"] == 0
@@ -151,11 +152,11 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     held = page.evaluate("viewer.state().media[0]")
     assert held["extinction"] == pytest.approx(tl.Medium.from_color("#3070c0", held["distance"]).extinction)
     page.evaluate("(window.loser = viewer.gl.getExtension('WEBGL_lose_context')).loseContext()")
-    page.wait_for_function("viewer.lost")
+    page.wait_for_function("() => viewer.lost")
     assert "graphics card" in page.locator(".told").inner_text()
     page.evaluate("window.before = viewer.player")
     page.evaluate("loser.restoreContext()")
-    page.wait_for_function("!viewer.lost && viewer.still && viewer.player !== before")
+    page.wait_for_function("() => !viewer.lost && viewer.still && viewer.player !== before")
     assert page.evaluate("viewer.probe(0.5, 0.5)")["covered"]
 
 

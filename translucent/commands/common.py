@@ -344,8 +344,8 @@ def stage_option(command: F) -> F:
         "--stage",
         metavar="S",
         help=f"What the model stands on, and is lit by: {', '.join(STAGE_NAMES)}, or none, before the environment "
-        f"alone. Default: {STAGE_NAMES[0]}; none with --environment or --background, and for a glTF file with a "
-        "camera, lights or a ground of its own.",
+        f"alone; {STAGE_NAMES[0]},90 turns it by degrees. Default: {STAGE_NAMES[0]}; none with --environment or "
+        "--background, and for a glTF file with a camera, lights or a ground of its own.",
     )(command)
 
 

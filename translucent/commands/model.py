@@ -79,6 +79,7 @@ def read_scene(
     from translucent.scene.showcase import framing, objects_named, with_roughness
     from translucent.scene.staging import staged, upright
 
+    stage, turn = _turned(stage)
     options, look = options or CameraOptions(), look or FileLook()
     if options.camera is not None and options.defining:
         raise InputError(
@@ -101,7 +102,17 @@ def read_scene(
     if options.eye is None and not getattr(scene, "has_camera", False):
         fov = DEFAULT_FOV if options.fov is None else options.fov
         scene = dataclasses.replace(scene, camera=framing(scene.objects, size, fov_y=fov, stage=chosen))
-    return staged(scene, chosen, environment)
+    return staged(scene, chosen, environment, turn)
+
+
+def _turned(stage: str | None) -> tuple[str | None, float]:
+    """Name of a stage, and the degrees after it."""
+    name, comma, degrees = (stage or "").partition(",")
+    try:
+        turn = float(degrees) if comma else 0.0
+    except ValueError:
+        raise InputError(f"--stage {stage!r}", f"{degrees!r} is no number of degrees", f"write {name},90") from None
+    return (name if comma else stage), turn
 
 
 def _mesh_scene(

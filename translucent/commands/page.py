@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -43,6 +44,7 @@ from translucent.commands.model import (
     require_translucent,
 )
 from translucent.errors import RenderError
+from translucent.units import parse_length
 
 #: Values of --poster that are no files.
 RENDERED, NO_POSTER = "rendered", "none"
@@ -160,6 +162,8 @@ def page(
         scattering=read_scattering(scattering_name, diffusion_resolution),
         shadows=read_shadows(shadow_size),
     )
+    if distance is not None:
+        planned = dataclasses.replace(planned, distance=parse_length(distance))
     if poster == RENDERED:
         try:
             picture = poster_of(planned, pixels, exposure, curve)

@@ -75,7 +75,7 @@ def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, e
         "exposure": exposure,
         "tone": tone,
         "notes": [{"kind": str(note.kind), "text": str(note)} for note in planned.notes],
-        "scene": _scene_told(scene, size, gl),
+        "scene": _scene_told(planned, size, gl),
         "presets": _presets_told(),
         "inner_mirror": [diffuse_interface(ior).reflected for ior in np.linspace(1.0, 3.0, MIRROR_STEPS)],
         "layout": {
@@ -165,7 +165,8 @@ def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
                     step["blocks"] = {name: sections.number(content) for name, content in step["blocks"].items()}
 
 
-def _scene_told(scene: Scene, size: tuple[int, int], gl: RecordingContext) -> dict[str, Any]:
+def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) -> dict[str, Any]:
+    scene = planned.scene
     camera = scene.camera
     media = list(dict.fromkeys(body.medium for body in scene.objects if body.medium is not None and not body.covers))
     numbers = [i for i, body in enumerate(scene.objects) if body.medium is not None]
@@ -189,7 +190,7 @@ def _scene_told(scene: Scene, size: tuple[int, int], gl: RecordingContext) -> di
             {"position": np.asarray(light.position, np.float64).tolist()} if isinstance(light, PositionalLight) else {}
             for light in scene.lights
         ],
-        "media": [_medium_told(scene, medium) for medium in media],
+        "media": [_medium_told(scene, medium, planned.distance) for medium in media],
         "objects": [
             {
                 "mesh": gl.number_of_mesh(body.mesh),
@@ -205,7 +206,7 @@ def _scene_told(scene: Scene, size: tuple[int, int], gl: RecordingContext) -> di
     }
 
 
-def _medium_told(scene: Scene, medium: Medium) -> dict[str, Any]:
+def _medium_told(scene: Scene, medium: Medium, distance: float | None) -> dict[str, Any]:
     bodies = [body for body in scene.objects if body.medium is medium and not body.covers]
     first = bodies[0]
     why = next(filter(None, map(editable, bodies)), "")
@@ -215,7 +216,7 @@ def _medium_told(scene: Scene, medium: Medium) -> dict[str, Any]:
         "extinction": extinction.tolist(),
         "ior": medium.ior,
         "roughness": 0.0 if first.surface is None else first.surface.roughness,
-        "distance": _shown_distance(first),
+        "distance": distance or _shown_distance(first),
         "editable": not why,
         "why": why,
     }

@@ -20,7 +20,7 @@ from translucent.scene.scene import Scene
 #: `UNITS_WITH_SHADOWS` in these.
 TEXTURE_UNITS = 16
 
-#: Triangles up to which a page traces rays: it builds their hierarchy when it is opened, 1 s for 300 000.
+#: Triangles up to which a page traces rays: it builds their hierarchy when it is opened, 2 s for 300 000.
 MOST_TRACED = 600_000
 
 #: Triangles from which on a page is slow to load and to turn.
@@ -51,6 +51,8 @@ class PagePlan:
         As they were asked for.
     texture_units : int
         As the planner is told.
+    distance : float, optional
+        In metres, at which panels show colors of media at first. Default: as far as each body is thick.
     """
 
     scene: Scene
@@ -60,6 +62,7 @@ class PagePlan:
     scattering: Scattering | None
     shadows: ShadowMaps | None
     texture_units: int
+    distance: float | None = None
 
     @property
     def notes(self) -> tuple[Note, ...]:

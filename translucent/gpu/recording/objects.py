@@ -6,21 +6,36 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from translucent.geometry.mesh import Mesh
 
-if TYPE_CHECKING:
-    from translucent.gpu.recording.context import RecordingContext
-
 _UNIFORM = re.compile(r"^uniform\s+(\w+)\s+(\w+)\s*(?:\[(\w+)\])?\s*;", re.MULTILINE)
 _BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
 _INPUT = re.compile(r"^in\s+\w+\s+(\w+)\s*;", re.MULTILINE)
 
 _numbers = count()
+
+
+class Recorder(Protocol):
+    """What objects know of the context that they belong to."""
+
+    bound_blocks: dict[int, tuple[RecordedBuffer, int, int]]
+    bound_textures: dict[int, RecordedTexture]
+    framebuffer_in_use: RecordedFramebuffer | None
+    most_layers: int
+
+    def note_clear(self, framebuffer: RecordedFramebuffer, color: tuple[float, ...], depth: float) -> None:
+        """Take down a clear."""
+
+    def note_mipmaps(self, texture: RecordedTexture) -> None:
+        """Take down that mipmaps are made."""
+
+    def note_draw(self, array: RecordedArray) -> None:
+        """Take down a draw."""
 
 
 class RecordedUniform:
@@ -93,7 +108,7 @@ class RecordedProgram:
 class RecordedBuffer:
     """Buffer of uniforms."""
 
-    def __init__(self, gl: RecordingContext, data: Any = None, reserve: int = 0) -> None:
+    def __init__(self, gl: Recorder, data: Any = None, reserve: int = 0) -> None:
         self._gl = gl
         self.content = bytearray(reserve if data is None else _bytes_of(data))
         self.size = len(self.content)
@@ -123,9 +138,7 @@ class RecordedTexture:
         None of targets.
     """
 
-    def __init__(
-        self, gl: RecordingContext, kind: str, size: Sequence[int], components: int, data: Any, dtype: str
-    ) -> None:
+    def __init__(self, gl: Recorder, kind: str, size: Sequence[int], components: int, data: Any, dtype: str) -> None:
         self._gl = gl
         self.number = next(_numbers)
         self.kind, self.size, self.components, self.dtype = kind, tuple(size), components, dtype
@@ -171,7 +184,7 @@ def _array(data: Any, dtype: str, size: Sequence[int], components: int) -> npt.N
 class RecordedFramebuffer:
     """Framebuffer: its attachments, and the state that comes with it."""
 
-    def __init__(self, gl: RecordingContext, colors: Sequence[RecordedTexture], depth: Any) -> None:
+    def __init__(self, gl: Recorder, colors: Sequence[RecordedTexture], depth: Any) -> None:
         self._gl = gl
         self.number = next(_numbers)
         self.color_attachments = tuple(colors)
@@ -216,7 +229,7 @@ class RecordedArray:
         Whether corners of faces share vertices, and else which normals they have.
     """
 
-    gl: RecordingContext
+    gl: Recorder
     program: RecordedProgram
     mesh: Mesh | None
     looks: str
@@ -243,7 +256,7 @@ class RecordedQuery:
 class RecordedMeshes:
     """Vertex arrays of meshes, in place of those in buffers."""
 
-    def __init__(self, gl: RecordingContext) -> None:
+    def __init__(self, gl: Recorder) -> None:
         self._gl = gl
 
     def __getitem__(self, mesh: Mesh) -> RecordedMeshes:

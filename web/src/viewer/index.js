@@ -153,6 +153,7 @@ export class Viewer {
       const most = Math.min(this.most, Math.max(SCALES.at(-1), Math.sqrt(LONGEST / (this.rate * this.full[0] * this.full[1]))));
       const begun = performance.now();
       this.still_scale = most;
+      this.most_metres = null;
       this.#draw(this.#size(most), null);
       this.#present("radiance", this.stops);
       this.player.finish();

@@ -9,7 +9,7 @@ const STYLE = `
 .viewer { position: relative; display: block; width: 100%; height: 100%; background: #131416; color: #d6d8dc;
   font: 13px/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; container-type: size; overflow: hidden; }
 .viewer * { box-sizing: border-box; font: inherit; color: inherit; }
-.layout { display: grid; width: 100%; height: 100%; grid-template: minmax(0, 1fr) 30px / minmax(0, 1fr) 272px; }
+.layout { display: grid; width: 100%; height: 100%; grid-template: minmax(0, 1fr) 30px / minmax(0, 1fr) 300px; }
 .layout.bare { grid-template-columns: minmax(0, 1fr) 0; }
 .layout.bare .panel { display: none; }
 .stage { position: relative; overflow: hidden; background: #131416; }
@@ -24,14 +24,14 @@ canvas:focus-visible { box-shadow: inset 0 0 0 2px #6f9fd8; }
 .panel { grid-column: 2; grid-row: 1 / 3; overflow-y: auto; background: #191a1d; border-left: 1px solid #26282c;
   padding: 14px 16px 18px; display: flex; flex-direction: column; gap: 14px; scrollbar-color: #3a3d42 transparent; }
 h1 { margin: 0; font-size: 14px; font-weight: 600; color: #f0f1f3; overflow-wrap: anywhere; }
-.group { display: grid; grid-template-columns: 76px minmax(0, 1fr); gap: 9px 10px; align-items: center; }
+.group { display: grid; grid-template-columns: 72px minmax(0, 1fr); gap: 9px 8px; align-items: center; }
 .group > label, .group > .name { color: #9ea2a9; }
 .row { display: flex; gap: 6px; align-items: center; min-width: 0; }
 .row > * { min-width: 0; }
 .row > span { flex: none; }
-#unit { width: 58px; flex: none; padding: 0 2px; }
+#unit { width: 54px; flex: none; padding: 0 2px; }
 input[type="number"], select { width: 100%; height: 28px; padding: 0 7px; background: #242629; border: 1px solid #34373c; border-radius: 5px; }
-input[type="color"] { width: 40px; height: 28px; flex: none; padding: 2px; background: #242629; border: 1px solid #34373c; border-radius: 5px; cursor: pointer; }
+input[type="color"] { width: 34px; height: 28px; flex: none; padding: 2px; background: #242629; border: 1px solid #34373c; border-radius: 5px; cursor: pointer; }
 input[type="range"] { flex: 1; min-width: 0; height: 28px; accent-color: #7fb0ea; cursor: pointer; }
 input[type="range"] + input[type="number"] { width: 62px; flex: none; }
 input[type="number"]:focus-visible, select:focus-visible, button:focus-visible, summary:focus-visible, input:focus-visible { outline: 2px solid #6f9fd8; outline-offset: 1px; }
