@@ -130,7 +130,7 @@ def test_the_text_for_threejs_is_javascript() -> None:
         pytest.skip("node is absent")
     stand_in = """
 const THREE = { LinearSRGBColorSpace: "srgb-linear",
-  MeshPhysicalMaterial: class { constructor(p) { Object.assign(this, p); } },
+  MeshPhysicalMaterial: class { constructor(given) { Object.assign(this, given); } },
   Color: class { setRGB(r, g, b, space) { this.rgb = [r, g, b, space]; return this; } } };
 """
     program = f"{stand_in}{text_block('threejs', JADE, COLOR, 0.02, 0.3)}\nconsole.log(JSON.stringify(material));"
