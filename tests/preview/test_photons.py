@@ -77,7 +77,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(stage: Stage) -> None:
 def test_photons_light_the_still_picture_until_something_changes(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, value in {"ROUND": ROUND, "MOST_PHOTONS": 16 * ROUND, "SHARE": 0.0}.items():
+    for name, value in {"ROUND": ROUND, "MOST_PHOTONS": 8 * ROUND, "SHARE": 0.0}.items():
         monkeypatch.setattr(photons, name, value)
     assert work.loaded is not None
     monkeypatch.setattr(work, "scene", lambda: LIT)
