@@ -56,8 +56,8 @@ class _Stack:
         return self._array[: self._count]
 
     def every(self, which: Mask) -> Mask:
-        """(objects,): whether all rows of each object are among those of `which` (n,)."""
-        return np.logical_and.reduceat(which, self._starts) if self._starts else np.zeros(0, dtype=bool)
+        """(objects, ...): whether `which` (n, ...) is true of all rows of each object."""
+        return np.logical_and.reduceat(which, self._starts) if self._starts else which[:0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,24 +154,35 @@ class ShadowThrowers:
         return tuple(grounds)
 
     def _lights(self, ground: int, points: _Stack, others: Sequence[int]) -> bool:
-        """Whether an object shadows none of the others, whose corners are stacked."""
-        if len(self._scene.objects[ground].mesh.faces) * len(points) > _MOST_PAIRS:
+        """Whether an object shadows none of the others, whose corners are stacked; see `_lights_one`."""
+        item = self._scene.objects[ground]
+        if len(item.mesh.faces) * len(points) > _MOST_PAIRS:
             return False
-        before = points.every(np.asarray(self._ahead(points.rows, self._sides_of(ground).planes).all(axis=1)))
-        return all(self._lights_one(ground, others[k]) for k in np.flatnonzero(~before).tolist())
+        sides = self._sides_of(ground)
+        lit = points.every(np.asarray(self._ahead(points.rows, sides.planes).all(axis=1)))
+        if lit.all():
+            return True
+        if not self._turns_once(item):
+            return False
+        lit |= points.every(self._ahead(points.rows, sides.lit)).any(axis=1)
+        return all(others[k] == ground for k in np.flatnonzero(~lit).tolist())
 
     def _lights_one(self, ground: int, other: int) -> bool:
         """Whether an object does not shadow another: that is before the lit sides of all its faces, or, of a convex
         one that the eye is not in, of some face.
         """
         item = self._scene.objects[ground]
-        convex = item.mesh.diagnosis.convex and not holds_eye(item, self._scene)
-        if convex and other == ground:
-            return True  # of a convex body what faces the light is lit
         sides, points = self._sides_of(ground), self._corners[other]
         if self._ahead(points, sides.planes).all():
             return True
-        return convex and bool(self._ahead(points, sides.lit).all(axis=0).any())
+        if not self._turns_once(item):
+            return False
+        # Of a convex body what faces the light is lit.
+        return other == ground or bool(self._ahead(points, sides.lit).all(axis=0).any())
+
+    def _turns_once(self, item: Object) -> bool:
+        """Whether an object is convex, and seen from outside alone."""
+        return item.mesh.diagnosis.convex and not holds_eye(item, self._scene)
 
     def _ahead(self, points: Array, planes: Array) -> Mask:
         """(n, faces): whether points (n, 3) are before planes (faces, 4), but for rounding."""
