@@ -129,7 +129,7 @@ def page(
     """
     from translucent.page.plans import plan_page
     from translucent.page.simplify import simplified, triangles
-    from translucent.page.write import check_output, poster_of, save_page, title_of
+    from translucent.page.write import check_output, poster_of, save_page
     from translucent.scene.stages import STAGED_TONE
 
     check_output(output)
@@ -170,7 +170,7 @@ def page(
             picture = poster_of(planned, pixels, exposure, curve)
         except RenderError as error:
             echo(f"warning: no poster: {error}", err=True)
-    written = save_page(planned, output, title or title_of(scene), pixels, samples, exposure, curve, picture)
+    written = save_page(planned, output, title or Path(model).stem, pixels, samples, exposure, curve, picture)
     notes = [{"kind": str(note.kind), "text": str(note)} for note in planned.notes]
     media = medium_lines(scene)
     if as_json:

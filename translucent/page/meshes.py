@@ -10,6 +10,15 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import drawn_normals
 from translucent.page.container import Container
 
+#: Endings of names that meshes have of their files.
+_FILES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
+
+
+def name_of(mesh: Mesh) -> str:
+    """Name of a mesh for people: without the ending of its file."""
+    stem, dot, ending = mesh.name.rpartition(".")
+    return stem if stem and (dot + ending).lower() in _FILES else mesh.name
+
 
 def mesh_told(mesh: Mesh, into: Container, *, with_normals: bool, with_looks: bool) -> dict[str, Any]:
     """What a page's header says of a mesh, whose arrays go into the container."""

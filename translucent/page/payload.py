@@ -27,7 +27,7 @@ from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
 from translucent.page.container import LIGHT_BITS, Container
-from translucent.page.meshes import mesh_told
+from translucent.page.meshes import mesh_told, name_of
 from translucent.page.plans import PagePlan
 from translucent.page.variants import current, editable, variant
 from translucent.scene.lights import PositionalLight
@@ -212,7 +212,7 @@ def _medium_told(scene: Scene, medium: Medium, distance: float | None) -> dict[s
     why = next(filter(None, map(editable, bodies)), "")
     extinction: Array = bounded_extinction(medium, scene.diagonal)
     return {
-        "name": ", ".join(dict.fromkeys(body.mesh.name.rpartition(".")[0] or body.mesh.name for body in bodies)),
+        "name": ", ".join(dict.fromkeys(name_of(body.mesh) for body in bodies)),
         "extinction": extinction.tolist(),
         "ior": medium.ior,
         "roughness": 0.0 if first.surface is None else first.surface.roughness,

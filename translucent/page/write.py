@@ -13,6 +13,7 @@ from translucent.errors import InputError
 from translucent.files.paths import require_output, write_text_atomically
 from translucent.formulas.tone import tone_curve
 from translucent.frames.frame import check_exposure
+from translucent.page.meshes import name_of
 from translucent.page.payload import payload
 from translucent.page.plans import PagePlan, plan_page
 from translucent.planning.interfaces import Interfaces
@@ -160,7 +161,7 @@ def page_html(
 def title_of(scene: Scene) -> str:
     """Title of a page: the name of the first body, without that of its file's kind."""
     mesh = scene.bodies[0].mesh if scene.bodies else scene.objects[0].mesh
-    return mesh.name.rpartition(".")[0] or mesh.name or "scene"
+    return name_of(mesh) or "scene"
 
 
 def poster_of(planned: PagePlan, size: tuple[int, int], exposure: float, tone: str) -> bytes:
