@@ -14,7 +14,7 @@ BIN = .venv/bin
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv demo test test-drivers lint bench docs meshes web wheel clean
+.PHONY: help venv demo test test-drivers lint bench gpu-report docs meshes web wheel clean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,6 +48,10 @@ lint: ## check style, types and the layers of the imports
 bench: ## measure speed and error of every method into out/report/, in a quarter of an hour; BENCH_ARGS=--quick: in one or two minutes
 	$(BOOTSTRAP) --group test
 	$(BIN)/translucent report -o out/report $(BENCH_ARGS)
+
+gpu-report: ## on a machine with a GPU: tests, report, frames of large models, previewer, into docs/reports/gpu*
+	$(BOOTSTRAP) --group test
+	$(BIN)/python tools/gpu_report.py --keep
 
 docs: ## build the site of docs/ into out/docs/, with the pictures of examples/
 	$(BOOTSTRAP) --group docs

@@ -14,6 +14,9 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import trimesh
+
+from translucent.assets import mesh_path
 from translucent.errors import InputError
 from translucent.gpu.balance import COVERAGE_FLOOR, OPEN_WEIGHTS, ROUNDING
 from translucent.gpu.constants import CONSTANTS
@@ -107,6 +110,13 @@ def install() -> None:
         STAMP.write_text(lock, encoding="utf-8")
 
 
+def write_example() -> None:
+    """The model of the example page, which has no other."""
+    path = WEB / "dist" / "knot.glb"
+    if not path.is_file():
+        path.write_bytes(trimesh.load_mesh(mesh_path("knot")).export(file_type="glb", include_normals=True))
+
+
 def _run(*command: str) -> None:
     done = subprocess.run(command, cwd=WEB, check=False)
     if done.returncode:
@@ -132,6 +142,7 @@ def main() -> None:
                 return print(f"web/dist is not built, so that tests in a browser may skip: {error}")
             raise
         _run("node", "build.mjs")
+        write_example()
         if arguments.types:
             _run("npx", "tsc", "-p", ".")
     except InputError as error:

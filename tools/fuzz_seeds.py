@@ -245,6 +245,7 @@ def readers(folder: Path) -> dict[str, Reader]:
     text = ("scene.gltf", json.dumps(gltf_tree(None)[0]).encode())
     color = JADE.transmittance(0.02)
     targets = {"a.usda": "usd", "a.mtlx": "openpbr", "b.mtlx": "standard_surface", "a.json": "json"}
+    targets |= {"a.py": "blender", "a.js": "threejs", "a.gdshader": "godot", "a.cs": "unity", "a.txt": "unreal"}
     materials = {name: text_block(target, JADE, color, 0.02).encode() for name, target in targets.items()}
     grid = np.linspace(0, 1, 24)
     map_values = {"scale": np.array(1.0), "offset": np.array(0.0), "values": np.ones((4, 4), np.float32)}

@@ -46,6 +46,14 @@ ACTIONS: tuple[dict[str, object], ...] = (
     {"do": "open", "model": "goblet"},
     {"do": "turn", "right": 20.0},
     {"do": "open", "model": "knot"},
+    {"do": "change", "field": "look.stage", "value": "studio"},
+    {"do": "turn", "right": 20.0},
+    {"do": "change", "field": "material.color", "value": [0.2, 0.5, 0.6]},
+    {"do": "change", "field": "look.rotation", "value": 30.0},
+    {"do": "change", "field": "display.caustics", "value": True},
+    {"do": "turn", "right": 20.0},
+    {"do": "change", "field": "display.caustics", "value": False},
+    {"do": "change", "field": "look.stage", "value": "none"},
 )
 
 

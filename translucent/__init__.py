@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for checkers and editors: the same names as in the table below
     from translucent import bench as bench
     from translucent import reference as reference
+    from translucent.bake.audit.check import check_materials as check_materials
+    from translucent.bake.audit.finding import MaterialCheck as MaterialCheck
+    from translucent.bake.audit.finding import MaterialFinding as MaterialFinding
+    from translucent.bake.audit.fix import fix_materials as fix_materials
     from translucent.bake.bake import bake_thickness as bake_thickness
     from translucent.bake.baked import BakeReport as BakeReport
     from translucent.bake.batch import BatchReport as BatchReport
@@ -63,6 +67,8 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.presets import preset as preset
     from translucent.media.presets import presets as presets
     from translucent.mesh_files import load_mesh as load_mesh
+    from translucent.notebook.view import view as view
+    from translucent.page.write import write_page as write_page
     from translucent.planning.caustics import Caustics as Caustics
     from translucent.planning.interfaces import FrontInterface as FrontInterface
     from translucent.planning.interfaces import ScreenInterfaces as ScreenInterfaces
@@ -98,6 +104,9 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
+    "bake.audit.check": "check_materials",
+    "bake.audit.finding": "MaterialCheck MaterialFinding",
+    "bake.audit.fix": "fix_materials",
     "bake.bake": "bake_thickness",
     "bake.baked": "BakeReport",
     "bake.batch": "BatchReport bake_many",
@@ -125,6 +134,8 @@ _NAMES = {
     "media.preset": "Preset",
     "media.presets": "preset presets",
     "mesh_files": "load_mesh",
+    "notebook.view": "view",
+    "page.write": "write_page",
     "planning.caustics": "Caustics",
     "planning.interfaces": "FrontInterface ScreenInterfaces TracedInterfaces",
     "planning.scattering": "Diffusion ScatteringLayer SingleScattering",

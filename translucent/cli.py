@@ -15,6 +15,7 @@ from translucent.commands.doctor import doctor
 from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
 from translucent.commands.material import material
+from translucent.commands.page import page
 from translucent.commands.presets import presets
 from translucent.commands.preview import preview
 from translucent.commands.render import render
@@ -74,7 +75,7 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, preview, bake, explain, extinction, presets, material, report, shader, doctor):
+for command in (render, preview, page, bake, explain, extinction, presets, material, report, shader, doctor):
     cli.add_command(command)
 
 

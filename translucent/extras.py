@@ -10,6 +10,7 @@ from translucent.errors import RenderError
 #: The extra that installs a package, by the name of the package's module.
 EXTRAS = {
     "OpenEXR": "exr",
+    "anywidget": "notebook",
     "distributed": "cluster",
     "imageio_ffmpeg": "video",
     "imgui_bundle": "ui",
@@ -17,6 +18,7 @@ EXTRAS = {
     "markupsafe": "report",
     "matplotlib": "report",
     "tomli_w": "ui",
+    "traitlets": "notebook",
     "xatlas": "bake",
 }
 

@@ -7,6 +7,7 @@ meaning for a mesh. Archives are no meshes, though trimesh unpacks them.
 from __future__ import annotations
 
 import os
+import re
 import warnings
 import zipfile
 from pathlib import Path
@@ -15,15 +16,29 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from translucent.errors import InputError
+from translucent.files.memory import require_memory
 from translucent.files.paths import require_file
-from translucent.files.reading import open_file, require_room, shown
-from translucent.geometry.mesh import Mesh, mended
+from translucent.files.reading import open_file, require_room, shown, size_text
+from translucent.geometry.mesh import PER_TRIANGLE, Mesh, adopted, mended
 from translucent.geometry.triangles import Triangles, joined
 from translucent.gltf.whole import read_whole
 from translucent.units import metres_per_unit
 
+#: Bytes of memory that loading and diagnosing take at most for each byte of a text file, and for each triangle of a
+#: binary file that brings its own corners (measured by tools/measure_loading.py; see geometry/mesh.py for the others).
+_PER_BYTE, PER_SOUP_TRIANGLE = 8, 350
+
+#: Bytes at the beginning of a file in which its numbers of vertices and faces are looked for.
+_HEADER = 1 << 13
+
 #: Formats of trimesh that are archives.
 _ARCHIVES = {"zae", "zip"}
+
+#: Formats of glTF, which trimesh is not asked for: importing it takes longer than reading a small file.
+_GLTF = {"glb", "gltf"}
+
+#: Formats that trimesh reads into arrays of vertices and faces, without transforms.
+_PLAIN = {"obj", "off", "ply", "stl"}
 
 #: Suffixes of the native files of programs that can all export .glb.
 _SCENES_OF_PROGRAMS = (
@@ -63,12 +78,13 @@ def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False)
     Raises
     ------
     InputError
-        If the file is missing, unreadable, has no faces, or has coordinates that are not finite.
+        If the file is missing, unreadable, has no faces, has coordinates that are not finite, or would take more memory
+        than is free.
     """
     path = Path(path)
     scale = metres_per_unit(unit)
     vertices, faces, uv = _read(path, allow_outside)
-    raw = Mesh(vertices * scale, faces, uv, name=path.name)
+    raw = adopted(vertices if scale == 1 else vertices * scale, faces, uv, path.name)
     raw.require_finite()
     return mended(raw)
 
@@ -76,7 +92,7 @@ def load_mesh(path: str | Path, unit: str = "m", *, allow_outside: bool = False)
 def _read(path: Path, allow_outside: bool) -> Triangles:
     asked = f"mesh {str(path)!r}"
     require_file(path, asked)
-    if path.suffix[1:].lower() not in mesh_formats():
+    if path.suffix[1:].lower() not in _GLTF and path.suffix[1:].lower() not in mesh_formats():
         do = (
             "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
@@ -107,29 +123,54 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
     InputError
         If the file cannot be read, or has no triangles.
     """
-    if path.suffix.lower() in (".glb", ".gltf"):
+    if path.suffix[1:].lower() in _GLTF:
         return read_whole(path, allow_outside)
-    import trimesh
-
     with open_file(path, asked) as stream, warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         _require_archive_room(stream, asked)
+        _require_free(stream, path.suffix[1:].lower(), asked)
         try:
-            kind = path.suffix[1:].lower()
-            known = {"skip_materials": True} if kind in ("obj", "ply") else {}
-            scene = trimesh.load_scene(stream, file_type=kind, resolver=_NoLinks(), process=False, **known)
-            parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
-            return joined([_part(part) for part in parts if len(part.faces)], asked)
+            return joined([part for part in _parts(stream, path.suffix[1:].lower()) if len(part[1])], asked)
         except InputError:
             raise
         except Exception as error:  # each of trimesh's readers raises its own kinds
             raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
 
 
-def _part(part: Any) -> Triangles:
-    vertices, faces = np.array(part.vertices, dtype=np.float64), np.array(part.faces, dtype=np.int32)
-    found = getattr(part.visual, "uv", None)
-    return vertices, faces, None if found is None or len(found) != len(vertices) else np.array(found, dtype=np.float64)
+def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
+    """Triangles of each part of a file, by trimesh."""
+    import trimesh
+    from trimesh.exchange.load import mesh_loaders
+
+    known = {"skip_materials": True} if kind in ("obj", "ply") else {}
+    if kind in _PLAIN:
+        # Copying what they hold into a scene and out of it takes longer than reading.
+        content = mesh_loaders[kind](stream, file_type=kind, resolver=_NoLinks(), **known)
+        listed = list(content["geometry"].values()) if kind == "obj" and "geometry" in content else [content]
+        if all(_is_plain(one) for one in listed):
+            return [_triangles(one["vertices"], one["faces"], one.get("visual")) for one in listed]
+        stream.seek(0)
+    scene = trimesh.load_scene(stream, file_type=kind, resolver=_NoLinks(), process=False, **known)
+    parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
+    return [_triangles(part.vertices, part.faces, part.visual) for part in parts]
+
+
+def _is_plain(content: dict[str, Any]) -> bool:
+    """Whether a part is a mesh of triangles as they are stored."""
+    vertices, faces = content.get("vertices"), content.get("faces")
+    return (
+        isinstance(vertices, np.ndarray)
+        and isinstance(faces, np.ndarray)
+        and faces.dtype.kind in "iu"
+        and (vertices.ndim, faces.ndim) == (2, 2)
+        and (vertices.shape[1], faces.shape[1]) == (3, 3)
+    )
+
+
+def _triangles(vertices: Any, faces: Any, visual: Any) -> Triangles:
+    vertices, faces = np.array(vertices, dtype=np.float64, order="C"), np.array(faces, dtype=np.int32, order="C")
+    uv = getattr(visual, "uv", None)
+    return vertices, faces, None if uv is None or len(uv) != len(vertices) else np.array(uv, dtype=np.float64)
 
 
 def _require_archive_room(stream: BinaryIO, asked: str) -> None:
@@ -141,6 +182,21 @@ def _require_archive_room(stream: BinaryIO, asked: str) -> None:
             raise InputError(asked, f"it cannot be read ({shown(error)})", "export the mesh again") from error
         require_room(asked, "its parts", size, os.fstat(stream.fileno()).st_size)
     stream.seek(0)
+
+
+def _require_free(stream: BinaryIO, kind: str, asked: str) -> None:
+    """Raise `InputError` where a mesh takes more memory than is free, by what the header of its file says."""
+    size = os.fstat(stream.fileno()).st_size
+    found, needed = f"its {size_text(size)} of text", _PER_BYTE * size
+    head = stream.read(_HEADER)
+    if kind == "stl" and len(head) >= 84 and 84 + 50 * (count := int.from_bytes(head[80:84], "little")) == size:
+        found, needed = f"its {count} triangles", PER_SOUP_TRIANGLE * count
+    elif kind == "ply" and (stated := re.search(rb"element face (\d{1,18})\s", head)) and b"format binary" in head:
+        # No face takes less than 13 bytes: of a count that is not true, the reader tells.
+        count = min(int(stated[1]), size // 13)
+        found, needed = f"its {count} faces", PER_TRIANGLE * count
+    stream.seek(0)
+    require_memory(asked, found, needed, "close other programs, or decimate the mesh")
 
 
 class _NoLinks:

@@ -52,3 +52,12 @@ def parse_length(text: str, default_unit: str = "m") -> float:
     if not (math.isfinite(metres) and metres > 0):
         raise InputError(f"length {text!r}", "not positive and finite", "give a distance above zero, for example 2cm")
     return metres
+
+
+def length_text(metres: float) -> str:
+    """Length in words, with three digits, in the largest of m, mm, µm and nm that it exceeds."""
+    scale, name = next((one for one in _WORDS if metres >= one[0]), _WORDS[-1])
+    return f"{metres / scale:.3g} {name}"
+
+
+_WORDS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))

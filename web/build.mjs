@@ -1,9 +1,16 @@
 // Bundles of web/dist. Each entry is one file that a browser takes as it is, but for the module, which leaves three to its user.
 import { existsSync, statSync } from "node:fs";
+import { resolve } from "node:path";
 import { build } from "esbuild";
 
 const MODULE = { format: "esm", external: ["three", "three/*"], sourcemap: true };
 const SCRIPT = { format: "iife", minify: true, legalComments: "none" };
+
+// The viewer turns cameras with three.js and draws without it.
+const WITHOUT_RENDERER = {
+  name: "without-renderer",
+  setup: (build) => build.onResolve({ filter: /^three$/ }, () => ({ path: resolve("src/viewer/three.js") })),
+};
 
 const BUNDLES = [
   { entry: "src/index.ts", out: "dist/translucent-three.js", ...MODULE },
@@ -11,7 +18,9 @@ const BUNDLES = [
   { entry: "src/browser.ts", out: "dist/translucent-three.browser.js", globalName: "translucentThree", ...SCRIPT },
   { entry: "examples/glb/main.ts", out: "dist/example-glb.js", ...SCRIPT },
   // The page of `translucent page`.
-  { entry: "page/main.ts", out: "dist/page.js", ...SCRIPT },
+  { entry: "page/main.js", out: "dist/page.js", ...SCRIPT, plugins: [WITHOUT_RENDERER] },
+  // The widget of `tl.view`.
+  { entry: "notebook/widget.js", out: "dist/widget.js", ...SCRIPT, format: "esm", plugins: [WITHOUT_RENDERER] },
 ];
 
 for (const { entry, out, ...options } of BUNDLES) {

@@ -114,14 +114,16 @@ float light_unblocked(int light, vec3 point, vec3 normal) {
 vec3 environment_reaching(vec3 point, vec3 normal) {
     if (sky_count == 0) { return vec3(1.0); }
     vec3 all = vec3(0.0), reaching = vec3(0.0);
-    for (int i = 0; i < sky_count; ++i) {
+    int step = abs(sky_step);
+    bool alone = sky_step < 0;
+    for (int i = alone ? sky_first : 0; i < sky_count; i += alone ? step : 1) {
         all += sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
     }
-    for (int i = sky_first; i < sky_count; i += sky_step) {
+    for (int i = sky_first; i < sky_count; i += step) {
         vec3 light = sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
         if (light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal, true); }
     }
-    return mix(vec3(1.0), float(sky_step) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+    return mix(vec3(1.0), (alone ? 1.0 : float(step)) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }
 #else
 float light_unblocked(int light, vec3 point, vec3 normal) { return 1.0; }

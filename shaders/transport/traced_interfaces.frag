@@ -367,7 +367,8 @@ void main() {
     vec3 direction = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
     vec3 point = point_at(pixel, depth), normal = mirror_plane.xyz;
     float cosine = -dot(normal, direction);
-    if (cosine <= 0.0 || abs(dot(normal, point) - mirror_plane.w) > MIRROR_MARGIN * surface_reach) { return; }
+    if (cosine <= 0.0 || abs(dot(normal, point) - mirror_plane.w) > MIRROR_TOLERANCE * surface_reach) { return; }
+    point += (dot(normal, point) - mirror_plane.w) / cosine * direction;  // where the rasterizer does not quite see it
     float alpha = mirror_finish.x * mirror_finish.x;
     vec3 facet = normal;
     if (blurred_share < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_share) * alpha, microfacet_shares(0, 1)); }

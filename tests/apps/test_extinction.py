@@ -85,8 +85,27 @@ def test_a_color_that_the_shell_took_for_a_comment_is_told(run: Run) -> None:
     assert f"color ''; empty; {hint}" in one_error_line(run("", "1cm"))
 
 
+def test_a_filament_is_told_by_its_transmission_distance(run: Run) -> None:
+    code, out, err = run("--td", "4mm")
+    assert (code, err) == (0, "")
+    assert "0.1        0.1        0.1 linear" in out.splitlines()[0]
+    assert "filament TD     4 mm: where 10 % of the luminance of white light is left" in out.splitlines()
+    told = json.loads(run("--td", "0.4", "--unit", "cm", "--td-transmittance", "0.05", "--json").out)
+    assert told["extinction"] == pytest.approx([-math.log(0.05) / 4e-3] * 3, rel=1e-14)
+    assert told["transmission_distance"] == {"distance": pytest.approx(4e-3, rel=1e-12), "transmittance": 0.05}
+    told = json.loads(run("linear(.1,1,.5)", "2cm", "--json").out)
+    assert told["transmission_distance"] == {"distance": None, "transmittance": 0.1}
+
+
+def test_a_transmission_distance_is_all_that_is_said(run: Run) -> None:
+    assert "--td with COLOR" in one_error_line(run("#7b1e3a", "--td", "4mm"))
+    assert "not between 0 and 1" in one_error_line(run("--td", "4mm", "--td-transmittance", "1"))
+    assert "length '-4mm'; not positive" in one_error_line(run("--td", "-4mm"))
+
+
 def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def text_block(target: str, medium: Any, color: np.ndarray, distance: float) -> str:
+    def text_block(target: str, medium: Any, color: np.ndarray, distance: float, roughness: float) -> str:
+        assert roughness == 0
         assert medium.transmittance(distance) == pytest.approx(color, rel=1e-14)
         return f"block for {target}"
 
@@ -101,6 +120,25 @@ def test_every_engine_has_a_block(run: Run, target: str) -> None:
     code, out, err = run("#7b1e3a", "1cm", "--as", target)
     assert (code, err) == (0, "")
     assert len(out) > 20
+
+
+@pytest.mark.parametrize(("target", "suffix"), [("blender", ".py"), ("threejs", ".js"), ("godot", ".gdshader")])
+def test_a_material_has_its_surface_and_is_read_again(run: Run, here: Path, target: str, suffix: str) -> None:
+    """Index and roughness as they are asked for; a preset has its own."""
+    block = run("#7b1e3a", "1cm", "--as", target, "--ior", "1.45", "--roughness", "0.25").out
+    assert "1.45" in block
+    assert "0.25" in block
+    (here / f"a{suffix}").write_text(block)
+    again = run("--from", f"a{suffix}", "--as", "json")
+    assert again.code == 0
+    assert json.loads(again.out)["ior"] == 1.45
+    assert json.loads(again.out)["absorption"] == pytest.approx(-np.log(parse_color("#7b1e3a")) / 0.01, rel=1e-12)
+    assert "0.15" in run("--preset", "jade", "--as", target).out
+
+
+@pytest.mark.parametrize("option", [("--ior", "1.5"), ("--roughness", "0.5")])
+def test_a_surface_is_that_of_a_material_for_an_engine(run: Run, option: tuple[str, str]) -> None:
+    assert "add --as, or leave it out" in one_error_line(run("#7b1e3a", "1cm", *option))
 
 
 @pytest.mark.parametrize("name", ["jade.mtlx", "jade.usda", "jade.json"])
@@ -337,7 +375,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         (["gray", "--from", "dict.json"], "--from with COLOR; each asks for something else"),
         (["--preset", "jade", "--from", "dict.json"], "--from with --preset"),
         (["--from", "none.mtlx"], "material 'none.mtlx'; no such file"),
-        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json file"),
+        (["--from", "good.csv"], "material 'good.csv'; suffix '.csv'; give a .mtlx, .usda, .json, .py, .js,"),
         (["--from", "dict.json"], "material 'dict.json'; medium as JSON; unknown name"),
         (["--from", "bytes.usda"], "material 'bytes.usda'; not UTF-8 text"),
         (["gray", "1cm", "--unit-out", "furlong"], "unit 'furlong'; not a known unit"),

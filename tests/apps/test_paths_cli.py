@@ -62,14 +62,14 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
 def test_progress_tells_how_long_the_rest_takes(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
     """Counted from what was done when the first share was known; in a file, a line now and then."""
     tell = Progress("path tracing on a machine")
-    shares = {100.0: 0.1, 100.5: 0.15, 110.0: 0.2, 115.0: 0.4, 141.0: 1.0, 150.0: 0.5, 151.0: 0.6}
+    shares = {100.0: 0.1, 100.5: 0.15, 110.0: 0.2, 115.0: 0.4, 141.0: 1.0, 150.0: 0.5, 160.0: 0.9}
     for now, share in shares.items():
         clock[0] = now
         tell(share)
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
         "path tracing on a machine: 20%, about 80 s left",
-        "path tracing on a machine: 60%, about 4 s left",
+        "path tracing on a machine: 90%, about 2 s left",
     ]
 
 

@@ -63,7 +63,8 @@ def test_the_table_as_json(run: Run) -> None:
     result = run("--json")
     listed = strict_json(result.out)["presets"]
     assert [entry["name"] for entry in listed] == list(tl.presets())
-    assert {tuple(entry) for entry in listed} == {("name", "kind", "regime", "colors", "diffuse_color", "source")}
+    keys = ("name", "kind", "regime", "colors", "diffuse_color", "source")
+    assert {tuple(entry) for entry in listed} == {keys}
     merlot = next(entry for entry in listed if entry["name"] == "merlot")
     assert merlot["regime"] == "absorbing"
     assert merlot["colors"] == tl.preset("merlot").colors()
@@ -143,12 +144,21 @@ def test_json_may_be_asked_for_before_the_verb(run: Run) -> None:
 # Swatches
 
 
+def test_slabs_on_white_and_black_are_told(run: Run) -> None:
+    out, told = run("show", "whole_milk").out, strict_json(run("show", "whole_milk", "--json").out)
+    assert told["slab_colors"] == tl.preset("whole_milk").slab_colors()
+    for card, row in told["slab_colors"].items():
+        words = "  ".join(f"{color} {thickness}" for thickness, color in row.items())
+        assert re.search(rf"^on {card} +{re.escape(words)}", out, re.MULTILINE)
+
+
 def test_a_terminal_shows_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     pretend_a_terminal(monkeypatch)
     assert re.search(r"after 1 cm +\x1b\[48;2;161;120;82m  \x1b\[0m #a17852", run("show", "coke").out)
     head, *lines = run().out.splitlines()
     for line, one in zip(lines, tl.presets().values(), strict=True):
-        assert line.count(f"{ESCAPE}48;2;") == line.count("#") == (4 if one.medium.scatters else 3)
+        assert line.count("#") == (4 if one.medium.scatters else 3)
+        assert line.count(f"{ESCAPE}48;2;") == line.count("#") + 6  # slabs on white and black have no room for words
     plain = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in lines]
     assert all(re.match("Jensen|Narasimhan|by eye", line[head.index("source") :]) for line in plain)
 

@@ -13,6 +13,7 @@ import pytest
 
 import translucent as tl
 from tests.little import with_few_shadows
+from translucent.assets import web_path
 from translucent.bake import unwrap
 from translucent.cli import cli, main
 from translucent.planning.methods import METHODS
@@ -109,14 +110,27 @@ ON_A_FARM = "--dask"
 
 
 #: Of an option that is given twice, the last counts: the pages show pictures of a useful size, tests need none.
-SMALL = {"render": ["--size", "96x72", "--samples", "2"], "bake": ["--size", "64", "--rays", "16"]}
+SMALL = {
+    "render": ["--size", "96x72", "--samples", "2"],
+    "page": ["--poster", "none", "--stage", "none"],
+    "bake": ["--size", "64", "--rays", "16"],
+}
 
 #: Likewise of `bake --mode scatter`.
 SMALL_SCATTER = ["--size", "64", "--resolution", "12"]
 
 
 def runs_here(command: str) -> bool:
-    return command.split()[0] != WINDOWED and ON_A_FARM not in command
+    verb = command.split()[0]
+    return verb != WINDOWED and ON_A_FARM not in command and (verb != "page" or is_built("page.js"))
+
+
+def is_built(script: str) -> bool:
+    """Whether a script for browsers is there: it is built with npm."""
+    try:
+        return web_path(script).is_file()
+    except tl.InputError:
+        return False
 
 
 @pytest.mark.usefixtures("one_scene", "small")
@@ -168,6 +182,6 @@ def test_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     for name, command in cli.commands.items():
         assert command.epilog is not None
         example = command.epilog.removeprefix("Example: translucent ")
-        if name == WINDOWED or example in COMMANDS:  # those run above
+        if not runs_here(example) or example in COMMANDS:  # those run above
             continue
         assert main([*shlex.split(example), *SMALL.get(name, [])]) == 0, example

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.browser.pages import CHROMIUM_OPTIONS, WebPage, find_chromium
+from tests.browser.thickness import prepare
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -39,6 +40,22 @@ def web_page(chromium: Browser) -> Iterator[WebPage]:
     yield page
     page.close()
     assert page.errors == []
+
+
+@pytest.fixture(scope="module")
+def three_page_of_module(chromium: Browser, web_dist: Path) -> Iterator[WebPage]:
+    page = WebPage(chromium, (300, 150))
+    prepare(page, web_dist)
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def three_page(three_page_of_module: WebPage) -> Iterator[WebPage]:
+    """A page with the bundle of three.js and this module, and tools.js; shared by the tests of a file."""
+    yield three_page_of_module
+    errors, three_page_of_module.errors[:] = list(three_page_of_module.errors), []
+    assert errors == []
 
 
 @pytest.fixture(scope="session")

@@ -55,5 +55,23 @@ globalThis.tools = (() => {
     return { width, height, thickness: base64(thickness), count: base64(count), valid: base64(valid), covered: base64(covered) };
   }
 
-  return { bytes, base64, geometry, mesh, camera, renderer, pixels };
+  // A renderer, gone with all that it holds once `use` is done.
+  function withRenderer([width, height], use, options) {
+    const made = renderer(width, height, options);
+    try {
+      return use(made);
+    } finally {
+      made.dispose();
+      made.forceContextLoss();
+      made.domElement.remove();
+    }
+  }
+
+  // What the pass finds of a scene.
+  function measured(pass, scene, seen) {
+    pass.render(scene, camera(seen));
+    return { ...pixels(pass), precision: pass.precision };
+  }
+
+  return { withRenderer, measured, bytes, base64, geometry, mesh, camera, renderer, pixels };
 })();

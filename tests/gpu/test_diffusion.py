@@ -30,9 +30,9 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
     media: list[tl.Medium] = []
     original = DiffusingBody.field
 
-    def counted(body: DiffusingBody, scene: tl.Scene) -> DiffusionField:
+    def counted(body: DiffusingBody, scene: tl.Scene, number: int) -> DiffusionField:
         media.append(body._medium)
-        return original(body, scene)
+        return original(body, scene, number)
 
     monkeypatch.setattr(DiffusingBody, "field", counted)
     return media

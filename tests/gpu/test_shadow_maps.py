@@ -268,7 +268,7 @@ def test_maps_are_rendered_when_something_changes(renderer: tl.Renderer, monkeyp
 
     rendered: list[int] = []
     render = ShadowMapsPass._render
-    monkeypatch.setattr(ShadowMapsPass, "_render", lambda self, job: rendered.append(1) or render(self, job))
+    monkeypatch.setattr(ShadowMapsPass, "_render", lambda *given: rendered.append(1) or render(*given))
     shown = scene("ball", "sun")
     brighter = replace(SUN, irradiance=(9, 9, 9))
     denser = [tl.Object(BALL, LEAF), shown.objects[1]]

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.preview.waiting import wait
-from translucent.preview import scenes
+from translucent.preview import scenes, staging
 from translucent.preview.actions import Change, Turn
 from translucent.preview.document import Document, Model
 from translucent.preview.workspace import Workspace
@@ -44,14 +44,14 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
     workspace: Workspace, sky: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read, asked = threading.Event(), []
-    original = scenes.named_environment
+    original = staging.named_environment
 
     def slow(name: str) -> Any:
         asked.append(name)
         read.wait(20.0)
         return original(name)
 
-    monkeypatch.setattr(scenes, "named_environment", slow)
+    monkeypatch.setattr(staging, "named_environment", slow)
     read.set()
     workspace.do(Change("look.environment", "light-table"))
     before = kind(workspace)

@@ -64,7 +64,7 @@ def seen_field(
     scene = tl.Scene([body], CAMERA, lights, environment)
     assert body.medium is not None
     geometry = lit_body(body, None, Diffusion(resolution).cell_size(body))
-    return DiffusingBody(geometry, body.medium, 0.0).field(scene)
+    return DiffusingBody(geometry, body.medium, 0.0).field(scene, 0)
 
 
 # A ball, by series
@@ -415,3 +415,29 @@ def test_a_lamp_just_outside_is_not_inside() -> None:
     )
     assert above > 1
     assert below == 0
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_other_bodies_dim_lights_on_their_way_in(inside: bool) -> None:
+    """Behind a slab, or in the middle of a block, the light of a sun is less by its transmittance, and so is all."""
+    ball = tl.Object(Sphere(radius=0.5).tessellate(16), tl.scattering_medium((0.8, 0.6, 0.4), 0.05))
+    absorption = np.array([0.2, 1.0, 3.0])
+    box = tl.Object(
+        Box((-2, -2, -2 if inside else 1), (2, 2, 2 if inside else 1.3)).tessellate(), tl.Medium(absorption)
+    )
+    sun = tl.DirectionalLight((0, 0, -1), (2, 2, 2))
+    assert ball.medium is not None
+    lit_ball = DiffusingBody(lit_body(ball, None, Diffusion(12).cell_size(ball)), ball.medium, 0.0)
+
+    def light(objects: list[tl.Object]) -> Array:
+        return lit_ball.field(tl.Scene(objects, CAMERA, [sun], BLACK), 0).fluence
+
+    alone, dimmed = light([ball]), light([ball, box])
+    seen = alone > 1e-3 * alone.max()
+    if inside:
+        # Each point has another way through the block: from 1.5 m, above, to 2 m, at the rim.
+        share = (dimmed / np.maximum(alone, 1e-12))[seen.all(axis=-1)]
+        assert (share <= np.exp(-1.5 * absorption) * 1.001).all()
+        assert (share >= np.exp(-2.0 * absorption) * 0.999).all()
+    else:
+        np.testing.assert_allclose(dimmed[seen], (alone * np.exp(-0.3 * absorption))[seen], rtol=1e-5)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.materials.blender import absorption_node, blender_snippet
 
 JADE = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02)
@@ -24,7 +25,7 @@ GLOW = tl.Medium(absorption=(100, 200, 300), emission=(50, 200, 0))
 SIDE, EYE = 8, 1.0  # pixels; distance of the camera from the slab's middle in metres
 
 #: Arguments: snippet, thickness, samples, result. The world is white, and only the camera sees it, so that what is
-#: scattered into the view adds nothing.
+#: scattered into the view adds nothing; with glass around the volume, all rays do, which it turns into others.
 SLAB = f"""
 import json, sys
 import bpy
@@ -47,7 +48,8 @@ if scene.world.node_tree is None:
     scene.world.use_nodes = True
 (background,) = (node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
 background.inputs["Color"].default_value = (1, 1, 1, 1)
-for ray in ("diffuse", "glossy", "transmission", "scatter"):
+glass = any(node.type == "BSDF_GLASS" for node in slab.active_material.node_tree.nodes)
+for ray in () if glass else ("diffuse", "glossy", "transmission", "scatter"):
     setattr(scene.world.cycles_visibility, ray, False)
 scene.render.engine = "CYCLES"
 cycles = scene.cycles
@@ -135,3 +137,14 @@ def test_a_scattering_volume_in_cycles_lets_through_what_ours_does(slab: Render)
     noise = seen.std(axis=0) / SIDE  # of the mean over the pixels, which have their own random numbers
     assert (noise < 1e-3).all()  # the naive values would be off by 0.1
     assert (np.abs(seen.mean(axis=0) - expected) <= 5 * noise).all()
+
+
+@pytest.mark.parametrize("thickness", [0.005, 0.05])
+def test_glass_around_the_volume_in_cycles_is_ours(slab: Render, thickness: float) -> None:
+    """Seen straight on before a white world: all that a thin wall mirrors and lets through, of any order."""
+    medium = tl.Medium.from_color((0.18, 0.62, 0.35), distance=0.02, ior=1.5)
+    seen, depth = slab(blender_snippet(medium), thickness, 1024), medium.extinction * thickness
+    expected = slab_reflectance(0.04, depth) + slab_transmittance(0.04, depth)
+    noise = seen.std(axis=0) / SIDE
+    assert (noise < 2e-3).all()  # without the surface all would be off by 0.01 to 0.05
+    assert (np.abs(seen.mean(axis=0) - expected) <= 5 * noise + length_error(medium)).all()

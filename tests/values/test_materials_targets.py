@@ -168,9 +168,9 @@ def test_unity_color_is_srgb() -> None:
     comment, *lines = text.splitlines()
     assert comment.startswith("// HDRP/Lit, with Surface Type: Transparent")
     color = [float(v) for v in re.findall(r"([\d.e-]+)f", lines[0])]
-    distance, ior = (float(re.findall(r", ([\d.e-]+)f", line)[0]) for line in lines[1:])
+    distance, ior, smoothness = (float(re.findall(r", ([\d.e-]+)f", line)[0]) for line in lines[1:])
     np.testing.assert_allclose(from_unity(color, distance, ior).extinction, JADE.extinction, rtol=1e-7)
-    assert (distance, ior) == (0.02, 1.6)
+    assert (distance, ior, smoothness) == (0.02, 1.6, 1)
 
 
 def test_unity_names_its_properties_and_its_formula_gives_our_extinction() -> None:
@@ -178,7 +178,7 @@ def test_unity_names_its_properties_and_its_formula_gives_our_extinction() -> No
     for color in (COLOR, (1.5e-5, 0.5, 1.0)):
         medium = tl.Medium.from_color(color, 0.02)
         lines = text_block("unity", medium, color, 0.02).splitlines()[1:]
-        names = ("_TransmittanceColor", "_ATDistance", "_Ior")
+        names = ("_TransmittanceColor", "_ATDistance", "_Ior", "_Smoothness")
         assert [re.findall(r'Set(Color|Float)\("(\w+)"', line)[0][1] for line in lines] == list(names)
         encoded = np.array([float(v) for v in re.findall(r"([\d.e-]+)f", lines[0])])
         linear = srgb_to_linear(encoded)
@@ -205,7 +205,8 @@ def test_every_target_writes_finite_numbers(target: str, medium: tl.Medium, dist
 def test_an_unknown_target_names_the_known_ones() -> None:
     with pytest.raises(tl.InputError) as caught:
         text_block("maya", JADE, COLOR, 0.02)
-    for name in ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", "usd", "css", "json"):
+    engines = ("blender", "threejs", "godot", "unreal", "unity")
+    for name in ("gltf", "openpbr", "standard_surface", *engines, "usd", "css", "json"):
         assert name in str(caught.value)
         assert name in TARGETS
 
@@ -280,7 +281,11 @@ def test_files_of_other_systems_are_loaded(tmp_path: Path, name: str, target: st
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.glb", "", "suffix '.glb'; give a .mtlx, .usda, .json file; of glTF, translucent material show tells"),
+        (
+            "a.glb",
+            "",
+            "suffix '.glb'; give a .mtlx, .usda, .json, .py, .js, .gdshader, .cs, .txt file; of glTF, translucent",
+        ),
         ("a.mtlx", "<materialx><open_pbr_surface>", "a.mtlx'; OpenPBR document; its XML is broken"),
         ("a.mtlx", "<materialx/>", "a.mtlx'; Standard Surface document; it has no <standard_surface>"),
         ("a.usda", "", "not .usda text"),

@@ -370,4 +370,4 @@ def test_colors_after_distances() -> None:
 def test_a_notebook_shows_swatches() -> None:
     shown = tl.preset("merlot")._repr_html_()
     assert "merlot (measured)" in shown
-    assert shown.count("background:#") == 5
+    assert shown.count("background:#") == 5 + 6  # light that passes; slabs on a white and on a black card

@@ -142,6 +142,15 @@ def outside_option(command: F) -> F:
     )(command)
 
 
+def draft_option(command: F) -> F:
+    """Option for extensions of glTF that are no standard yet."""
+    return click.option(
+        "--draft-extensions",
+        is_flag=True,
+        help="Of a glTF MODEL: read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.",
+    )(command)
+
+
 def interface_options(command: F) -> F:
     """Options for how the interfaces are found at which light refracts and reflects."""
     command = click.option(
@@ -297,14 +306,19 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
     return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
 
 
-def look_options(command: F) -> F:
-    """Options for what lights the model, what is seen behind it, and how bright the picture is."""
-    command = click.option(
+def roughness_option(command: F) -> F:
+    """Option for the surfaces of media."""
+    return click.option(
         "--roughness",
         type=click.FloatRange(0.0, 1.0),
         metavar="R",
         help="Of the interfaces of media, 0 (polished) to 1. Default: the preset's, else the file's, or 0.",
     )(command)
+
+
+def look_options(command: F) -> F:
+    """Options for what lights the model, what is seen behind it, and how bright the picture is."""
+    command = roughness_option(command)
     command = click.option(
         "--tone",
         type=click.Choice(TONE_NAMES),
@@ -330,8 +344,8 @@ def stage_option(command: F) -> F:
         "--stage",
         metavar="S",
         help=f"What the model stands on, and is lit by: {', '.join(STAGE_NAMES)}, or none, before the environment "
-        f"alone. Default: {STAGE_NAMES[0]}; none with --environment or --background, and for a glTF file with a "
-        "camera, lights or a ground of its own.",
+        f"alone; {STAGE_NAMES[0]},90 turns it by degrees. Default: {STAGE_NAMES[0]}; none with --environment or "
+        "--background, and for a glTF file with a camera, lights or a ground of its own.",
     )(command)
 
 

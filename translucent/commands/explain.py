@@ -9,6 +9,7 @@ import click
 
 from translucent.commands.common import (
     common_options,
+    draft_option,
     interface_options,
     medium_options,
     outside_option,
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 @scattering_medium_options
 @unit_option
 @outside_option
+@draft_option
 @stage_option
 @click.option("--method", "method_name", metavar="NAME", help="Explain this method instead of the planner's choice.")
 @paths_option
@@ -63,6 +65,7 @@ def explain(
     mean_free_path: str | None,
     unit: str,
     allow_outside: bool,
+    draft_extensions: bool,
     stage: str | None,
     method_name: str | None,
     paths: int | None,
@@ -84,7 +87,15 @@ def explain(
 
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(None, preset_name)
-    scene = read_scene(model, unit, medium, roughness=roughness, stage=stage, allow_outside=allow_outside)
+    scene = read_scene(
+        model,
+        unit,
+        medium,
+        roughness=roughness,
+        stage=stage,
+        allow_outside=allow_outside,
+        draft_extensions=draft_extensions,
+    )
     scene = with_environment_shadows(scene, environment_shadows)
     method = read_method(method_name, None, paths)
     interfaces = read_interfaces(interfaces_name, interface_depth, interface_forks)

@@ -1,12 +1,14 @@
-"""``translucent extinction``: from colors at distances, or on a model, to extinction; one, by the table, fitted."""
+"""``translucent extinction``: from colors at distances, on a model, or a filament's TD, to extinction."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -17,6 +19,7 @@ from translucent.commands.common import (
     outside_option,
     overwrite_option,
     read_medium,
+    read_roughness,
     refuse_overwriting,
     triple_text,
 )
@@ -29,7 +32,19 @@ if TYPE_CHECKING:
     from translucent.media.fitting import Fit
     from translucent.media.medium import Medium
 
-TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", "usd", "css", "json")
+TARGETS = (
+    "gltf", "openpbr", "standard_surface", "blender", "threejs", "godot", "unreal", "unity", "usd", "css", "json",
+)  # fmt: skip
+
+
+class _Wanted(NamedTuple):
+    """What is to be told of a medium, and how."""
+
+    target: str | None
+    ior: float | None
+    roughness: float
+    td_transmittance: float | None
+    as_json: bool
 
 
 @click.command(epilog="Example: translucent extinction '#7b1e3a' 1cm")
@@ -39,11 +54,25 @@ TARGETS = ("gltf", "openpbr", "standard_surface", "blender", "unreal", "unity", 
 @click.option("--unit-out", default="m", show_default=True, metavar="U", help="Give the extinction per this unit, too.")
 @clamp_option
 @click.option("--as", "target", type=click.Choice(TARGETS), help="Print the material for an engine, to paste.")
+@click.option("--ior", type=float, metavar="N", help="Of --as: its index of refraction. Default: the medium's, or 1.")
+@click.option(
+    "--roughness",
+    type=click.FloatRange(0.0, 1.0),
+    metavar="R",
+    help="Of --as: of its surface, 0 (polished) to 1. Default: the preset's, or 0.",
+)
 @click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
 @click.option("--fit", type=click.Path(path_type=Path), metavar="FILE", help="Fit to rows of distance,color[,weight].")
 @click.option("--preset", "preset_name", metavar="NAME", help="A named medium instead of a color at a distance.")
-@click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx, .usda or .json material instead.")
+@click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx or .usda file, or of what --as printed.")
+@click.option("--td", metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm.")
+@click.option(
+    "--td-transmittance",
+    type=float,
+    metavar="T",
+    help="Share of light left after --td, and after the TD that is told. Default: 0.1, T = 10^(-d/TD).",
+)
 @click.option("--on", "model", metavar="MODEL", help="A file, or a mesh of the toolkit: its color, see above.")
 @click.option("--eye", metavar="X,Y,Z", help="Of --on: where it is seen from, in metres. Default: as render shows it.")
 @overwrite_option
@@ -58,11 +87,15 @@ def extinction(
     unit_out: str,
     clamp: bool | None,
     target: str | None,
+    ior: float | None,
+    roughness: float | None,
     batch: Path | None,
     output: Path | None,
     fit: Path | None,
     preset_name: str | None,
     source: str | None,
+    td: str | None,
+    td_transmittance: float | None,
     model: str | None,
     eye: str | None,
     allow_outside: bool,
@@ -74,6 +107,9 @@ def extinction(
 
     With --on MODEL and no DISTANCE, the medium in which that model shows COLOR on average, over the pixels that it
     covers before white light; with a DISTANCE, --preset or --from, the average color that this medium shows on it.
+
+    With --td D, the gray medium of a filament with this transmission distance: translucent extinction --td 4mm. Makers
+    agree that next to no light passes there, not on the share: it is --td-transmittance, and told with every result.
     """
     from translucent.media.colors import QUOTE_HINT
     from translucent.units import metres_per_unit
@@ -85,33 +121,40 @@ def extinction(
         "COLOR": color,
         "--preset": preset_name,
         "--from": source,
+        "--td": td,
     }
     _check_usage(media, {"--batch": batch, "--fit": fit, "--on": model}, {"--json": as_json or None, "--as": target})
+    for option, value in (("--ior", ior), ("--roughness", roughness)):
+        if value is not None and target is None:
+            raise InputError(f"{option} {value:g}", "only a material for an engine has it", "add --as, or leave it out")
+    wanted = _Wanted(target, ior, read_roughness(roughness, preset_name) or 0.0, td_transmittance, as_json)
     if output is not None and batch is None:
         raise InputError(f"-o {output}", "only --batch writes a file", "leave it out")
     if eye is not None and model is None:
         raise InputError(f"--eye {eye}", "only --on looks at a model", "leave it out")
     if batch is not None:
+        if td_transmittance is not None:
+            raise InputError(f"--td-transmittance {td_transmittance:g}", "--batch tells no TD", "leave it out")
         if target is not None:
             raise InputError(f"--as {target}", "it takes one color, not --batch", "leave one of them out")
         return _batch(batch, output, unit, unit_out, clamp is not False)
     if fit is not None:
         if clamp:
             raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
-        return _fit(fit, unit, unit_out, target, as_json)
-    medium = _given_medium(source, preset_name, unit)
+        return _fit(fit, unit, unit_out, wanted)
+    medium = _given_medium(source, preset_name, unit) if td is None else _filament(td, unit, td_transmittance)
     if medium is None and (color is None or (distance is None and model is None)):
         missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
         raise click.MissingParameter(hint[:1].upper() + hint[1:], context, param_hint=missing, param_type="argument")
     frame = None if model is None else thickness_on(model, unit, eye, allow_outside)
-    told, medium = _convert(medium, color, distance, frame, unit, unit_out, clamp is not False)
+    told, medium = _convert(medium, color, distance if td is None else td, frame, unit, unit_out, clamp is not False)
     stated = told["distance"]
     if model is not None and frame is not None:
         told["on"] = told_on(model, frame, medium)
         told["warnings"] += doubts_on(told["on"])
         # Without a distance of the user's own, an engine gets the color at the model's thickness.
         stated = stated if distance is not None else told["on"]["mean_thickness"]
-    return _tell(told, medium, stated, target, as_json)
+    return _tell(told, medium, stated, wanted)
 
 
 def _check_usage(*groups: dict[str, object]) -> None:
@@ -125,6 +168,13 @@ def _given_medium(source: str | None, preset_name: str | None, unit: str) -> Med
     from translucent.materials import load_medium
 
     return read_medium(None, None, preset_name) if source is None else load_medium(source, unit)
+
+
+def _filament(td: str, unit: str, transmittance: float | None) -> Medium:
+    from translucent.media.filament import TD_TRANSMITTANCE, medium_of_td
+    from translucent.units import parse_length
+
+    return medium_of_td(parse_length(td, unit), TD_TRANSMITTANCE if transmittance is None else transmittance)
 
 
 def _convert(
@@ -149,7 +199,10 @@ def _convert(
     wanted, changes = clamped(color) if clamp and color is not None else (color or "", [])
     if distance is not None:
         metres = parse_length(distance, unit)
-        medium, triple = Medium.from_color(wanted, metres), parse_color(wanted)
+        if medium is None:
+            medium, triple = Medium.from_color(wanted, metres), parse_color(wanted)
+        else:
+            triple, metres = color_at(medium, metres)
     else:
         thickness = np.empty(0) if frame is None else thickness_samples(frame)
         medium = medium or medium_for_average_color(thickness, wanted)
@@ -161,15 +214,23 @@ def _convert(
     return told, medium
 
 
-def _tell(told: dict[str, Any], medium: Medium, stated: float, target: str | None, as_json: bool) -> None:
-    if target is not None:
+def _tell(told: dict[str, Any], medium: Medium, stated: float, wanted: _Wanted) -> None:
+    from translucent.media.filament import TD_TRANSMITTANCE, td_of
+
+    share = TD_TRANSMITTANCE if wanted.td_transmittance is None else wanted.td_transmittance
+    td = td_of(medium.extinction, share)
+    told["transmission_distance"] = {"distance": td if math.isfinite(td) else None, "transmittance": share}
+    if wanted.target is not None:
         from translucent.materials import text_block
 
         for line in told["warnings"]:
             echo(f"warning: {line}", err=True)
-        echo(text_block(target, medium, medium.transmittance(stated), stated))
+        if wanted.ior is not None:
+            medium = dataclasses.replace(medium, ior=wanted.ior)
+        color = medium.transmittance(stated)
+        echo(text_block(wanted.target, medium, color, stated, roughness=wanted.roughness))
         return
-    echo(json.dumps(told) if as_json else _report(told))
+    echo(json.dumps(told) if wanted.as_json else _report(told))
 
 
 def _report(told: dict[str, Any]) -> str:
@@ -188,6 +249,7 @@ def _report(told: dict[str, Any]) -> str:
         f"mean free path  {triple_text(_infinite(told['mean_free_path']))} m",
         f"half-value      {triple_text(_infinite(told['half_value_thickness']))} m",
         f"                light has the color at {distance:g} m, 1/e (37 %) at a mean free path, half at a half-value",
+        _td_line(told["transmission_distance"]),
     ]
     if sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb":
         if "on" in told:
@@ -197,6 +259,12 @@ def _report(told: dict[str, Any]) -> str:
     for factor, row in colors.items():
         lines.append(f"after {float(factor) * distance:<9.4g} m {triple_text(row)} linear, {to_hex(row)}")
     return "\n".join([*lines, *(f"warning         {line}" for line in told["warnings"])])
+
+
+def _td_line(td: dict[str, float | None]) -> str:
+    reached = "never" if td["distance"] is None else f"{1e3 * td['distance']:.5g} mm"
+    left = 100.0 * (td["transmittance"] or 0.0)
+    return f"filament TD     {reached}: where {left:g} % of the luminance of white light is left"
 
 
 def _infinite(values: list[float | None]) -> list[float]:
@@ -227,7 +295,7 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
         )
 
 
-def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: bool) -> None:
+def _fit(table: Path, unit: str, unit_out: str, wanted: _Wanted) -> None:
     import numpy as np
 
     from translucent.media.conversion import summary
@@ -239,8 +307,8 @@ def _fit(table: Path, unit: str, unit_out: str, target: str | None, as_json: boo
     told["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
     error = None if fit.standard_error is None else fit.standard_error.tolist()
     told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
-    _tell(told, fit.medium, distance, target, as_json)
-    if not as_json and target is None:
+    _tell(told, fit.medium, distance, wanted)
+    if not wanted.as_json and wanted.target is None:
         echo(_fit_report(fit))
 
 

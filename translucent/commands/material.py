@@ -1,15 +1,16 @@
-"""``translucent material``: the volume materials of a glTF file, shown and replaced."""
+"""``translucent material``: the volume materials of a glTF file, shown, replaced and checked."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from translucent.commands.common import (
     common_options,
+    draft_option,
     medium_options,
     outside_option,
     overwrite_option,
@@ -18,25 +19,28 @@ from translucent.commands.common import (
     triple_text,
 )
 from translucent.commands.console import echo
-from translucent.errors import InputError
+from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:
+    from translucent.bake.audit.finding import MaterialCheck
     from translucent.gltf.materials import GltfMaterial
+    from translucent.gltf.scattering import Draft
 
 
 @click.group(epilog="Example: translucent material show model.glb")
 def material() -> None:
-    """Show or replace the materials of a glTF file that light passes."""
+    """Show, replace or check the materials of a glTF file that light passes."""
 
 
 @material.command(epilog="Example: translucent material show model.glb")
 @click.argument("model")
+@draft_option
 @common_options
-def show(model: str, as_json: bool) -> None:
+def show(model: str, draft_extensions: bool, as_json: bool) -> None:
     """List the materials of MODEL, a .glb or .gltf file, with the volume that each of them states."""
     from translucent.gltf.materials import read_materials
 
-    found = read_materials(model)
+    found = read_materials(model, draft_extensions=draft_extensions)
     if as_json:
         echo(json.dumps({"model": model, "materials": [entry.summary() for entry in found]}))
         return
@@ -54,6 +58,8 @@ def _describe(entry: GltfMaterial) -> None:
         echo(f"  color       {triple_text(entry.attenuation_color)} linear, at {entry.attenuation_distance:g} m")
     if medium is not None:
         echo(f"  extinction  {triple_text(medium.extinction)} 1/m")
+        if medium.scatters:
+            echo(f"  scattering  {triple_text(medium.scattering)} 1/m, anisotropy {medium.anisotropy:g}")
     if entry.dispersion:
         echo(f"  dispersion  {entry.dispersion:10.5g}")
     if any(entry.emissive):
@@ -81,6 +87,13 @@ def _texture_text(entry: GltfMaterial) -> str:
     help="Only the objects of this name. Default: all that light enters, or all.",
 )
 @click.option("--thickness", metavar="T", help="In the mesh's own units, as glTF has it. Default: the smallest side.")
+@click.option(
+    "--draft-extensions",
+    is_flag=False,
+    flag_value="scatter",
+    type=click.Choice(["scatter", "volume-scatter"]),
+    help="Write scattering, too, by a draft: KHR_materials_scatter, or KHR_materials_volume_scatter.",
+)
 @overwrite_option
 @outside_option
 @common_options
@@ -93,6 +106,7 @@ def apply(
     clamp: bool | None,
     object_name: str | None,
     thickness: str | None,
+    draft_extensions: Draft | None,
     allow_outside: bool,
     as_json: bool,
 ) -> None:
@@ -100,7 +114,7 @@ def apply(
     from translucent.gltf.write import write_medium
     from translucent.units import parse_length
 
-    medium = read_medium(color, distance, preset_name, clamp)
+    medium = read_medium(color, distance, preset_name, clamp, shows_scattering=draft_extensions is not None)
     if medium is None:
         raise InputError("material apply", "no medium is given", "add --color and --distance, or --preset")
     refuse_overwriting(output, model)
@@ -112,9 +126,84 @@ def apply(
         object_name=object_name,
         thickness=None if thickness is None else parse_length(thickness),
         keep_ior=preset_name is None,
+        draft_extensions=draft_extensions,
         allow_outside=allow_outside,
     )
     if as_json:
         echo(json.dumps({"output": str(output), "materials": changed}))
         return
     echo(f"{output}: material{'' if len(changed) == 1 else 's'} {', '.join(map(str, changed))} changed")
+
+
+@material.command(epilog="Example: translucent material check model.glb --fix -o fixed.glb")
+@click.argument("model")
+@click.option("--fix", is_flag=True, help="Bake the thickness where it is wrong, into OUTPUT, and check that.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --fix: a .glb file.")
+@click.option("--size", type=int, default=512, show_default=True, metavar="N", help="Of --fix: texels along a side.")
+@click.option("--rays", type=int, default=64, show_default=True, metavar="N", help="Of --fix: rays from each texel.")
+@overwrite_option
+@outside_option
+@common_options
+def check(model: str, fix: bool, output: Path | None, size: int, rays: int, allow_outside: bool, as_json: bool) -> None:
+    """Check whether the thickness and attenuation that MODEL, a .glb or .gltf file, states are those of its meshes.
+
+    Told are errors, warnings and notes, each with what to change, and the color that passes each body in truth and in
+    known viewers. The exit code is 1 if there is an error (with --fix: in OUTPUT), and else 0.
+
+    --fix bakes thickness maps, sets metallicFactor of what transmits to 0 and removes doubleSided of volumes. Meshes,
+    units and attenuations are told, and not changed.
+    """
+    from translucent.bake.audit.check import check_materials
+    from translucent.bake.audit.fix import fix_materials
+
+    if fix != (output is not None):
+        given, missing = ("--fix", "-o OUTPUT is missing") if fix else (f"-o {output}", "--fix is missing")
+        raise InputError(given, missing, "give both, or neither")
+    found = left = check_materials(model, allow_outside=allow_outside)
+    if output is not None:
+        refuse_overwriting(output, model)
+        left = fix_materials(model, output, size=size, rays=rays, allow_outside=allow_outside)
+    if as_json:
+        fixed = {} if output is None else {"fixed": left.summary()}
+        echo(json.dumps({**found.summary(), **fixed}))
+    else:
+        _tell(model, found)
+        if output is not None:
+            _tell(str(output), left)
+    if left.errors:
+        count = len(left.errors)
+        asked = f"material check {model if output is None else output}"
+        told = f"{count} finding{'' if count == 1 else 's'} of severity error"
+        raise RenderError(asked, told, left.errors[0].do)
+
+
+def _tell(model: str, found: MaterialCheck) -> None:
+    counts = found.summary()["counts"]
+    told = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
+    echo(f"{model}: {len(found.bodies)} bod{'y' if len(found.bodies) == 1 else 'ies'} that light passes; {told}")
+    for one in found.findings:
+        echo(f"{one.severity:8}{one.code}: {one.where}")
+        echo(f"        {one.text}")
+        echo(f"        do: {one.do}")
+    for body in found.bodies:
+        if body["colors"] and body["stated"]:
+            _tell_body(body)
+
+
+def _tell_body(body: dict[str, Any]) -> None:
+    """Thickness of a body and what passes it, in a few lines."""
+    from translucent.formulas.color import to_hex
+
+    echo(f"{body['mesh_name']!r}, material {body['material']}, node {body['nodes'][0]!r}:")
+    lengths = [
+        f"{name} {values['median']:.4g} m (p95 {values['p95']:.4g})"
+        for name, values in (
+            ("stated", body["stated"]),
+            ("along normals", body["along_normals"]),
+            ("along views", body["along_views"]),
+        )
+        if values is not None
+    ]
+    echo(f"        thickness {', '.join(lengths)}")
+    colors = [f"{name} {to_hex(color)}" for name, color in body["colors"].items()]
+    echo(f"        passes, mean over views: {', '.join(colors)}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,11 +13,13 @@ import numpy as np
 from translucent.errors import InputError
 
 if TYPE_CHECKING:
+    from translucent.commands.objects import NamedMedium
     from translucent.geometry.mesh import Mesh
     from translucent.media.medium import Medium
     from translucent.scene.camera import Camera
     from translucent.scene.environment import Environment
     from translucent.scene.scene import Object, Scene
+    from translucent.scene.showcase import AnyScene
     from translucent.scene.stages import Stage
 
 #: Default field of view in degrees, and up vector, of a camera that options define.
@@ -39,6 +42,14 @@ class CameraOptions(NamedTuple):
         return [option for option, value in options.items() if value is not None]
 
 
+class FileLook(NamedTuple):
+    """Which of its looks a file has, and media for single objects: the options of `translucent.commands.objects`."""
+
+    media: Sequence[NamedMedium] = ()
+    variant: str | None = None
+    time: float | None = None
+
+
 def is_scene_file(model: str) -> bool:
     """Whether MODEL is a glTF file, which holds a scene; all others hold one mesh."""
     from translucent.gltf.load import SUFFIXES
@@ -57,24 +68,32 @@ def read_scene(
     stage: str | None = "none",
     *,
     allow_outside: bool = False,
+    look: FileLook | None = None,
+    draft_extensions: bool = False,
 ) -> Scene:
     """The scene of a glTF file, with `medium` in its translucent objects if there is one; or one mesh on show.
 
-    A stage of None is the default one, where it suits what the model and the options bring with them.
+    Objects that `look` names have media and roughness of their own. A stage of None is the default one, where it suits
+    what the model and the options bring with them.
     """
-    from translucent.scene.showcase import framing, with_roughness
+    from translucent.scene.showcase import framing, objects_named, with_roughness
     from translucent.scene.staging import staged, upright
 
-    options = options or CameraOptions()
+    stage, turn = _turned(stage)
+    options, look = options or CameraOptions(), look or FileLook()
     if options.camera is not None and options.defining:
         raise InputError(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
     if is_scene_file(model):
-        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, allow_outside)
+        loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
+        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, loaded, look)
     else:
-        scene, chosen = _mesh_scene(model, unit, medium, options, size, environment, stage, allow_outside)
-    scene = with_roughness(scene, roughness)
+        scene, chosen = _mesh_scene(model, unit, medium, options, size, environment, stage, allow_outside, look)
+    named = {id(item) for one in look.media for item in objects_named(scene, one.name)}
+    scene = with_roughness(scene, roughness, [item for item in scene.objects if id(item) not in named])
+    for one in look.media:
+        scene = with_roughness(scene, one.roughness, objects_named(scene, one.name))
     if options.defining:
         scene = dataclasses.replace(scene, camera=_defined_camera(scene, options, size, chosen))
     if chosen is None:
@@ -83,7 +102,17 @@ def read_scene(
     if options.eye is None and not getattr(scene, "has_camera", False):
         fov = DEFAULT_FOV if options.fov is None else options.fov
         scene = dataclasses.replace(scene, camera=framing(scene.objects, size, fov_y=fov, stage=chosen))
-    return staged(scene, chosen, environment)
+    return staged(scene, chosen, environment, turn)
+
+
+def _turned(stage: str | None) -> tuple[str | None, float]:
+    """Name of a stage, and the degrees after it."""
+    name, comma, degrees = (stage or "").partition(",")
+    try:
+        turn = float(degrees) if comma else 0.0
+    except ValueError:
+        raise InputError(f"--stage {stage!r}", f"{degrees!r} is no number of degrees", f"write {name},90") from None
+    return (name if comma else stage), turn
 
 
 def _mesh_scene(
@@ -95,16 +124,21 @@ def _mesh_scene(
     environment: Environment | None,
     stage: str | None,
     allow_outside: bool,
+    look: FileLook,
 ) -> tuple[Scene, Stage | None]:
     from translucent.scene.showcase import default_medium, showcase
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
 
     if options.camera is not None:
         raise InputError(f"--camera {options.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
+    for option, value in (("--variant", look.variant), ("--time", look.time)):
+        if value is not None:
+            raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
     chosen = stage_named(stage or (DEFAULT_STAGE if environment is None else NO_STAGE))
     mesh = read_mesh(model, unit, allow_outside)
     filling = medium or default_medium(mesh, chosen)
-    return showcase(mesh, filling, size, environment=environment, stage=NO_STAGE), chosen
+    scene = showcase(mesh, filling, size, environment=environment, stage=NO_STAGE)
+    return _with_media(scene, look), chosen
 
 
 def _file_scene(
@@ -115,7 +149,8 @@ def _file_scene(
     size: tuple[int, int],
     environment: Environment | None,
     stage: str | None,
-    allow_outside: bool,
+    loaded: dict[str, bool],
+    look: FileLook,
 ) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled
@@ -123,12 +158,22 @@ def _file_scene(
     from translucent.scene.staging import has_ground
 
     camera = None if options.defining else options.camera or 0
-    scene = load_scene(model, unit, camera, size, allow_outside=allow_outside)
+    scene = load_scene(model, unit, camera, size, variant=look.variant, time=look.time, **loaded)
     if medium is not None:
         scene = filled(scene, medium)
+    scene = _with_media(scene, look)
     bare = not (scene.has_camera or scene.lights or has_ground(scene)) and environment is None
     chosen = stage_named(stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
     return scene if environment is None else dataclasses.replace(scene, environment=environment), chosen
+
+
+def _with_media(scene: AnyScene, look: FileLook) -> AnyScene:
+    """Scene with the media of the objects that are named."""
+    from translucent.scene.showcase import filled, objects_named
+
+    for one in look.media:
+        scene = filled(scene, one.medium, objects_named(scene, one.name))
+    return scene
 
 
 def require_translucent(model: str, scene: Scene) -> None:

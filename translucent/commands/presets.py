@@ -25,8 +25,8 @@ _LISTED = ("name", "kind", "regime", "colors", "diffuse_color", "source")
 def presets(context: click.Context, as_json: bool) -> None:
     """List the named media: what they do to light, and their colors.
 
-    Three are what is left of white light after 1 mm, 1 cm and 10 cm; the last is what a thick slab of a medium that
-    scatters looks like in white light.
+    Three are what is left of white light after 1 mm, 1 cm and 10 cm; the next is what a thick slab of a medium that
+    scatters looks like in white light. Terminals with colors show slabs of 1, 5 and 20 mm on a white and a black card.
     """
     from translucent.media.presets import presets as all_presets
 
@@ -61,14 +61,24 @@ def _table(found: list[Preset]) -> str:
     # A swatch and a space go before each hex color.
     pad = 3 if _colorful() else 0
     head = "  ".join(f"{text:<{7 + pad}}" for text in (*found[0].colors(), "thick"))
-    lines = [f"{'name':<{wide}}  {'kind':<9}  {'regime':<20}  {head}  source"]
+    cards = "on white, black  " if _colorful() else ""
+    lines = [f"{'name':<{wide}}  {'kind':<9}  {'regime':<20}  {head}  {cards}source"]
     lines += [
         f"{one.name:<{wide}}  {one.kind:<9}  {one.regime:<20}  "
         f"{'  '.join(_swatch(color) + color for color in one.colors().values())}  "
-        f"{_swatch(slab) + slab if (slab := one.diffuse_color()) else '-'.ljust(7 + pad)}  {one.source}"
+        f"{_swatch(slab) + slab if (slab := one.diffuse_color()) else '-'.ljust(7 + pad)}  "
+        f"{_slab_strip(one)}{one.source}"
         for one in found
     ]
     return "\n".join(lines)
+
+
+def _slab_strip(one: Preset) -> str:
+    """Swatches of slabs on a white and on a black card, or nothing where colors cannot be shown."""
+    if not _colorful():
+        return ""
+    strips = ("".join(map(_cell, row.values())) for row in one.slab_colors().values())
+    return f"{' '.join(strips)}    "  # as wide as its heading: two times three cells
 
 
 def _details(one: Preset) -> str:
@@ -98,6 +108,9 @@ def _details(one: Preset) -> str:
         rows.append((f"after {text}", f"{_swatch(color)}{color}{without}"))
     if slab := one.diffuse_color():
         rows.append(("thick slab", f"{_swatch(slab)}{slab}  (scattered back in white light; no mirror image)"))
+    for card, row in one.slab_colors().items():
+        slabs = "  ".join(f"{_swatch(color)}{color} {thickness}" for thickness, color in row.items())
+        rows.append((f"on {card}", f"{slabs}  (slabs on a card, polished; no mirror image)"))
     lines = [f"{label:<15} {text}" for label, text in rows if text]
     if one.reduced:
         lines.append("* reduced, sigma_s (1 - g), all that is known: scatters isotropically")
@@ -116,7 +129,9 @@ def _colorful() -> bool:
 
 def _swatch(color: str) -> str:
     """Two columns of a hex color and a space, or nothing where colors cannot be shown."""
-    if not _colorful():
-        return ""
+    return f"{_cell(color)} " if _colorful() else ""
+
+
+def _cell(color: str) -> str:
     red, green, blue = (int(color[i : i + 2], 16) for i in (1, 3, 5))
-    return f"\x1b[48;2;{red};{green};{blue}m  \x1b[0m "
+    return f"\x1b[48;2;{red};{green};{blue}m  \x1b[0m"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from translucent.commands.common import common_options, outside_option, read_size, unit_option
+from translucent.commands.common import STAGE_NAMES, common_options, outside_option, read_size, unit_option
 from translucent.commands.console import echo
 from translucent.errors import InputError, RenderError, TranslucentError, message_of
 
@@ -18,6 +18,12 @@ from translucent.errors import InputError, RenderError, TranslucentError, messag
 @unit_option
 @outside_option
 @click.option("--session", type=click.Path(path_type=Path), metavar="FILE", help="Begin with a session, a .toml file.")
+@click.option(
+    "--stage",
+    metavar="S",
+    help=f"What the model stands on: {', '.join(STAGE_NAMES)}, none, or auto, as render. Default: that of the last "
+    "window; at first auto; with a script none.",
+)
 @click.option("--size", default="1600x1000", show_default=True, metavar="WxH", help="Size of the window.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Makes letters and fields larger.")
 @click.option("--script", type=click.Path(path_type=Path), metavar="FILE", help="Do what a .toml file says; close.")
@@ -28,6 +34,7 @@ def preview(
     unit: str,
     allow_outside: bool,
     session: Path | None,
+    stage: str | None,
     size: str,
     scale: float,
     script: Path | None,
@@ -40,11 +47,15 @@ def preview(
     fails does not stop the others; the exit code is then 1, or 2 where it asked for what cannot be.
     """
     from translucent.preview.app import leave, require_display, run
-    from translucent.preview.document import Document, Model
+    from translucent.preview.document import AUTO, Document, Look, Model
+    from translucent.preview.preferences import read_stage
     from translucent.preview.script import Script, read_script
     from translucent.preview.session import load_session
     from translucent.preview.tasks import problem
+    from translucent.scene.stages import stage_named
 
+    if stage is not None and stage != AUTO:
+        stage_named(stage)
     if session is not None and model is not None:
         raise InputError(f"--session {str(session)!r}", f"{model} is given, too", "give one of them")
     if not 0.5 <= scale <= 4.0:
@@ -52,7 +63,12 @@ def preview(
     if screenshot is not None and (screenshot.suffix.lower() != ".png" or not screenshot.parent.is_dir()):
         raise InputError(f"--screenshot {str(screenshot)!r}", "no .png in a folder that is there", "give such a path")
     pixels = read_size(size)
-    document = Document() if session is None else load_session(session)
+    if session is not None:
+        document = load_session(session)
+    else:
+        document = Document() if script or screenshot else Document(look=Look(stage=read_stage()))
+    if stage is not None:
+        document = dataclasses.replace(document, look=dataclasses.replace(document.look, stage=stage))
     if model is not None:
         document = dataclasses.replace(document, model=Model(model, unit))
     todo = read_script(script) if script is not None else Script.of([]) if screenshot is not None else None

@@ -7,8 +7,8 @@ import time
 
 from translucent.commands.console import echo, overwrite
 
-#: Seconds before anything is told, between two tellings in a terminal, and between two in a file.
-PATIENCE, OFTEN, SELDOM = 1.0, 0.5, 30.0
+#: Seconds before anything is told, and between two tellings: in a terminal, and in a file.
+TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
 
 
 class Progress:
@@ -40,8 +40,8 @@ class Progress:
                 overwrite("")
                 self._width = 0
             return
-        between = OFTEN if self._terminal else SELDOM
-        if share <= least or spent < PATIENCE or (self._told and now - self._told < between):
+        before, between = TERMINAL if self._terminal else FILE
+        if share <= least or spent < before or (self._told and now - self._told < between):
             return
         self._told = now
         text = f"{self._what}: {share:.0%}, about {time_text(spent * (1.0 - share) / (share - least))} left"

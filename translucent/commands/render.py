@@ -10,6 +10,7 @@ import click
 
 from translucent.commands.common import (
     common_options,
+    draft_option,
     interface_options,
     look_options,
     medium_options,
@@ -43,25 +44,45 @@ from translucent.commands.model import (
     DEFAULT_FOV,
     DEFAULT_UP,
     CameraOptions,
+    FileLook,
     is_own,
     medium_lines,
     read_scene,
     require_translucent,
 )
+from translucent.commands.objects import ObjectCommand, read_objects
 from translucent.commands.pictures import Pictures, picture_options
 from translucent.commands.progress import Progress
 from translucent.errors import InputError
 
 
-@click.command(epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm")
+@click.command(
+    cls=ObjectCommand, epilog="Example: translucent render goblet -o goblet.png --color '#7b1e3a' --distance 1cm"
+)
 @click.argument("model")
 @click.option(
     "-o", "--output", required=True, type=click.Path(path_type=Path), help="A .png, .exr or .npz file; see --turntable."
 )
 @medium_options
 @scattering_medium_options
+@click.option(
+    "--object",
+    "object_names",
+    multiple=True,
+    metavar="NAME",
+    help="What follows of a medium, as --preset P or --color C --distance D, is this object's alone; may be repeated.",
+)
+@click.option("--variant", metavar="NAME", help="Materials of this variant of a glTF file (KHR_materials_variants).")
+@click.option(
+    "--time",
+    type=float,
+    metavar="S",
+    help="Nodes of a glTF file as its animations have them after S seconds, without skins and morph targets. "
+    "Default: as the file has them.",
+)
 @unit_option
 @outside_option
+@draft_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
 @click.option(
     "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
@@ -103,8 +124,12 @@ def render(
     clamp: bool | None,
     scattering_color: str | None,
     mean_free_path: str | None,
+    object_names: tuple[str, ...],
+    variant: str | None,
+    time: float | None,
     unit: str,
     allow_outside: bool,
+    draft_extensions: bool,
     size: str,
     camera: int | None,
     eye: str | None,
@@ -141,7 +166,9 @@ def render(
 
     The model stands on a ground with its shadow; see --stage. A .glb or .gltf file is rendered as the scene that it is,
     with the media of its materials; --color, --preset or --scattering-color replaces them. All other files are one
-    mesh.
+    mesh. Behind an --object they are for this object alone:
+
+    translucent render bar.glb -o bar.png --object Wine --preset merlot --object Glass --preset crystal
     """
     import translucent as tl
     from translucent.scene.stages import NO_STAGE, STAGED_TONE
@@ -170,7 +197,9 @@ def render(
     options = CameraOptions(camera, eye, target, up, fov)
     lit = read_environment(environment, background)
     stage = NO_STAGE if opaque_with is not None else stage
-    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, allow_outside=allow_outside)
+    look = FileLook(read_objects(object_names), variant, time)
+    loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
+    scene = read_scene(model, unit, medium, options, pixels, lit, roughness, stage, look=look, **loaded)
     if tone is None and len(scene.shown) < len(scene.objects):
         pictures = pictures._replace(tone=STAGED_TONE)
     scene = with_environment_shadows(scene, environment_shadows)

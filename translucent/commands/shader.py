@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from translucent.gpu.std140 import UniformBlock
 
 
-@click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target wgsl")
+@click.command(epilog="Example: translucent shader signed_depth --define OPAQUE=0 --define SPECTRAL=0 --target webgl2")
 @click.argument("name", required=False)
 @click.option("--define", "defines", multiple=True, metavar="X=1", help="Value of a switch, once for each that it has.")
 @click.option(

@@ -71,7 +71,7 @@ class FieldCache:
             for i, body in enumerate(scene.objects):
                 if isinstance(body.medium, DiffusedMedium):
                     medium = body.medium.original
-                    surfaces[i] = self._body(body, medium, places, opaque, diffusion).field(scene)
+                    surfaces[i] = self._body(body, medium, places, opaque, diffusion).field(scene, i)
                 elif isinstance(body.medium, DiffusedVolume):
                     volumes[i] = self._volume(body, body.medium, diffusion).field(scene)
             return Fields(surfaces, volumes)
@@ -137,7 +137,12 @@ def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
         around.exposure,
     )
     lights = tuple((type(light), *map(_bytes, astuple(light))) for light in scene.lights)
-    return (diffusion, bodies, opaque, lighting, lights)
+    dimming = tuple(
+        (i, _place(item), np.asarray(item.medium.extinction).tobytes())
+        for i, item in enumerate(scene.objects if lights else ())
+        if item.medium is not None
+    )
+    return (diffusion, bodies, opaque, lighting, lights, dimming)
 
 
 def _bytes(value: npt.ArrayLike) -> bytes:

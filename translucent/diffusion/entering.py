@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Integers, Mask
+from translucent.diffusion.dimming import light_passed
 from translucent.diffusion.grid import BodyGrid
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
@@ -171,8 +172,15 @@ def from_itself(sky: Sky, shares: Array, solid_angles: Array) -> sparse.csr_arra
     return sparse.csr_array((values, (sample, other)), (len(shares), len(shares)))
 
 
-def from_light(grid: BodyGrid, casters: Casters, light: Light, ior: float, interface: DiffuseInterface) -> Array:
-    """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way."""
+def from_light(
+    grid: BodyGrid,
+    casters: Casters,
+    light: Light,
+    ior: float,
+    interface: DiffuseInterface,
+    dimming: Sequence[Object] = (),
+) -> Array:
+    """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way, and other bodies let it."""
     if isinstance(light, PositionalLight):
         towards = np.asarray(light.position) - grid.points
         distance = np.linalg.norm(towards, axis=1)
@@ -190,4 +198,7 @@ def from_light(grid: BodyGrid, casters: Casters, light: Light, ior: float, inter
     # What a rough interface loses, of any light as of uniform light.
     share = interface.entering / diffuse_interface(ior).entering
     flux = np.asarray(light.irradiance_on(grid.points, grid.normals), np.float64)
-    return np.asarray(np.where(lit, polished * share, 0.0)[:, None] * flux)
+    entering = np.where(lit, polished * share, 0.0)[:, None] * flux
+    if dimming and lit.any():
+        entering[lit] *= light_passed(dimming, start[lit], direction[lit], distance[lit])
+    return np.asarray(entering)

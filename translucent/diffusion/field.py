@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.ndimage import map_coordinates, uniform_filter
 
 from translucent.arrays import Array
+from translucent.diffusion.dimming import dimming_bodies
 from translucent.diffusion.entering import (
     Casters,
     Sky,
@@ -185,8 +186,9 @@ class DiffusingBody:
         self._system = BodySystem(lit.grid, medium, roughness)
 
     @np.errstate(under="ignore")
-    def field(self, scene: Scene) -> DiffusionField:
-        """Light that the body gives back in a scene, for its environment and lights."""
+    def field(self, scene: Scene, body: int) -> DiffusionField:
+        """Light that the body gives back in a scene, of which it has this number, for its environment and lights."""
+        dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
         entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
         inside = np.zeros((grid.count, 3))
@@ -194,7 +196,9 @@ class DiffusingBody:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                entering = entering + from_light(grid, self._lit.casters, light, self._medium.ior, self._interface)
+                entering = entering + from_light(
+                    grid, self._lit.casters, light, self._medium.ior, self._interface, dimming
+                )
         found = self._system.solved(entering, self._entrance.itself, inside)
         return _field(grid, self._medium, self._roughness, found)
 

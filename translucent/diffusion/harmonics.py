@@ -98,7 +98,7 @@ class LitAlone:
 
     def field(self, environment: Environment) -> DiffusionField:
         """Light that the body gives back."""
-        return self._diffusing.field(Scene([self._body], self._camera, (), environment))
+        return self._diffusing.field(Scene([self._body], self._camera, (), environment), 0)
 
     def transfer(self) -> Transfer:
         """Transfer of the body.

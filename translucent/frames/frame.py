@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -13,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.errors import InputError
-from translucent.files.images import write_png
 from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
+from translucent.frames.display import Bundle, frame_bundle, png
 from translucent.frames.writing import write_frame, write_pictures
 from translucent.planning.render_plan import RenderPlan
 
@@ -199,11 +198,17 @@ class Frame:
         pictures = aov_pictures(self.arrays, None if truth is None else truth.arrays)
         return write_pictures(Path(folder), pictures.items())
 
+    def _repr_mimebundle_(self, **_: Any) -> Bundle:
+        """The picture, and thickness with a scale, for notebooks."""
+        return frame_bundle(self.to_srgb8(), self.arrays, str(self.plan).partition("\n")[0], repr(self))
+
+    def _repr_html_(self) -> str:
+        """The same, for those that know no bundles."""
+        return str(self._repr_mimebundle_()[0]["text/html"])
+
     def _repr_png_(self) -> bytes:
-        """The picture, for notebooks."""
-        stream = io.BytesIO()
-        write_png(stream, self.to_srgb8())
-        return stream.getvalue()
+        """The picture alone."""
+        return png(self.to_srgb8())
 
 
 def check_exposure(stops: float) -> float:

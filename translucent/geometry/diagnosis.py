@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from translucent.geometry.grouping import equal_rows, position_ids, shared_edges, side_ends, used_vertices
+from translucent.arrays import Array, Mask
+from translucent.geometry.grouping import CHUNK, SortedSides, connected, equal_rows, extent, sorted_sides, use_mask
 from translucent.geometry.repair import spread_winding
 from translucent.geometry.sample_lines import winds_negatively
-from translucent.geometry.winding import inside_out_parts
+from translucent.geometry.winding import inside_out_parts, part_volumes
 
 #: Deepest dent of a convex body, as a share of its size.
 CONVEX_TOLERANCE = 1e-6
@@ -135,7 +136,7 @@ class Diagnosis:
         return "; ".join([f"{kind}, {self.components} component{'s' if self.components != 1 else ''}", *self.problems])
 
 
-def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) -> Diagnosis:
+def diagnose(vertices: Array, faces: npt.NDArray[np.int32], one_closed_part: bool = False) -> Diagnosis:
     """Examine a mesh, as a cycle of oriented triangles.
 
     Parameters
@@ -144,38 +145,37 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
         Positions in metres; may hold non-finite values, which are counted.
     faces : (m, 3) int32
         Valid indices into `vertices`.
+    one_closed_part : bool
+        Whether it is known that no two vertices are at one position, that every edge has two faces, which agree about
+        the winding, and that edges join all faces: loading has found that out.
     """
-    finite = np.asarray(np.isfinite(vertices).all(axis=1))
-    used = np.zeros(len(vertices), dtype=bool)
-    used[faces] = True
-    corners = np.where(finite[:, None], vertices, 0.0)[faces]
-    with np.errstate(over="ignore", under="ignore"):
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        degenerate = np.asarray(~(np.abs(normals).max(axis=1) > 0))
-    shared = position_ids(vertices)[faces]
-    edges = _Edges(shared[~_collapsed(shared)])
-    open_edges = np.asarray(edges.total % 2 == 1)
-    mixed = np.asarray(~open_edges & (edges.net != 0))
-    closed = not open_edges.any()
-    solid = bool(closed and not mixed.any() and finite[used].all() and len(edges.total) > 0)
-    volume = _signed_volume(corners)
-    components = edges.components()
+    finite = _finite(vertices)
+    used = use_mask(faces, len(vertices))
+    filled = vertices if finite.all() else np.where(finite[:, None], vertices, 0.0)
+    shared = faces if one_closed_part else _at_positions(vertices, faces)
+    edges = None if one_closed_part else _Edges(shared)
+    volume = float(part_volumes(filled, faces, np.zeros(len(faces), dtype=np.int64), 1)[0])
+    none = Finding(0)
+    open_edges = none if edges is None else edges.found(edges.sizes % 2 == 1)
+    mixed_edges = none if edges is None else edges.found((edges.sizes % 2 == 0) & (edges.net != 0))
+    whole = bool(finite[used].all()) and (edges is None or len(edges.sizes) > 0)
+    solid = whole and not open_edges and not mixed_edges
     inverted = solid and volume < 0
-    whole = bool(finite[used].all()) and len(edges.total) > 0
-    inside_out = _inside_out(vertices, edges.faces) if whole and components > 1 and not inverted else 0
-    convex = solid and components == 1 and edges.all_convex(vertices, float(np.sign(volume)))
+    components = 1 if edges is None else edges.components()
+    inside_out = _inside_out(vertices, edges.faces) if edges and whole and components > 1 and not inverted else 0
+    convex = solid and components == 1 and _is_convex(vertices, shared, edges, float(np.sign(volume)))
     outwards = faces[:, ::-1] if inverted else faces
     return Diagnosis(
         nonfinite_vertices=_found(~finite),
         unreferenced_vertices=_found(~used),
-        degenerate_faces=_found(degenerate),
-        duplicate_faces=_duplicates(shared),
-        open_edges=edges.found(open_edges),
-        mixed_edges=edges.found(mixed),
-        nonmanifold_edges=edges.found(edges.total > 2),
+        degenerate_faces=_found(_degenerate(filled, faces)),
+        duplicate_faces=none if edges is None and len(faces) > 2 else _duplicates(shared),
+        open_edges=open_edges,
+        mixed_edges=mixed_edges,
+        nonmanifold_edges=none if edges is None else edges.found(edges.sizes > 2),
         components=components,
         volume=volume,
-        closed=closed,
+        closed=not open_edges,
         solid=solid,
         inside_out_parts=inside_out,
         negative_winding=whole and not convex and winds_negatively(vertices, outwards),
@@ -185,74 +185,110 @@ def diagnose(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]) ->
 
 
 class _Edges:
-    """Undirected edges of a mesh, with how many faces use each and in which direction."""
+    """Undirected edges of the faces that have three corners, with how many faces use each and in which direction."""
 
-    def __init__(self, faces: npt.NDArray[np.int64]) -> None:
-        self.faces = faces
-        start, end = side_ends(faces)
-        shared = shared_edges(faces)
-        self.of_side, self.total = shared.of, shared.sizes
-        self.pairs = np.sort(np.stack([start, end], axis=1)[shared.first], axis=1)
-        direction = np.where(start < end, 1.0, -1.0)
+    def __init__(self, faces: npt.NDArray[np.integer]) -> None:
+        collapsed = _collapsed(faces)
+        self.faces = faces[~collapsed] if collapsed.any() else faces
+        self.sides = sorted_sides(self.faces)
+        empty = np.empty(0, dtype=np.int64)
+        self.sizes = self.sides.sizes if len(self.faces) else empty
         #: Uses in ascending minus uses in descending direction: 0 for a balanced edge.
-        self.net = np.rint(np.bincount(self.of_side, weights=direction, minlength=len(self.pairs))).astype(np.int64)
+        self.net = (
+            np.add.reduceat(np.where(self.sides.ascending, 1, -1), self.sides.begins) if len(self.faces) else empty
+        )
 
-    def found(self, mask: npt.NDArray[np.bool_]) -> Finding:
-        return Finding(int(mask.sum()), tuple((int(a), int(b)) for a, b in self.pairs[mask][:FIRST]))
+    def found(self, mask: Mask) -> Finding:
+        first = self.sides.ends(np.flatnonzero(mask)[:FIRST]).tolist()
+        return Finding(int(mask.sum()), tuple((a, b) for a, b in first))
 
     def components(self) -> int:
         """Connected components by shared edges."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        if len(self.pairs) == 0:
+        if len(self.sizes) == 0:
             return 0
-        ids, index = np.unique(self.pairs, return_inverse=True)
-        rows, columns = index.reshape(self.pairs.shape).T
-        graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(len(ids), len(ids)))
-        return int(connected_components(graph, directed=False, return_labels=False))
+        count = self.sides.vertices
+        label = connected(count, *self.sides.ends(np.arange(len(self.sizes))).T)
+        return int(label.max()) + 1 - int((~use_mask(self.faces, count)).sum())
 
-    def all_convex(self, vertices: npt.NDArray[np.float64], orientation: float) -> bool:
-        """Whether all edges are convex; with one closed component of genus 0 that means a convex body."""
-        if not (self.total == 2).all() or orientation == 0:
+
+def _is_convex(vertices: Array, faces: npt.NDArray[np.integer], edges: _Edges | None, orientation: float) -> bool:
+    """Whether all edges of one closed component are convex; with genus 0 that means a convex body."""
+    if orientation == 0:
+        return False
+    faces = faces if edges is None else edges.faces
+    # A dent among the first faces answers for most meshes.
+    if not _all_convex(vertices, faces, sorted_sides(faces[:CHUNK]), orientation):
+        return False
+    sides = sorted_sides(faces) if edges is None else edges.sides
+    if not (sides.sizes == 2).all():
+        return False
+    corners = int(use_mask(faces, len(vertices)).sum())
+    return corners - len(sides.begins) + len(faces) == 2 and _all_convex(vertices, faces, sides, orientation)
+
+
+def _all_convex(vertices: Array, faces: npt.NDArray[np.integer], sides: SortedSides, orientation: float) -> bool:
+    """Whether the edges that have two of these sides are convex."""
+    low, high = extent(vertices[use_mask(faces, len(vertices))])
+    # Files keep float32, so flat patches and fine tessellations scatter by some 1e-7 of the size.
+    dent = CONVEX_TOLERANCE * float((high - low).max())
+    first = sides.begins[sides.sizes == 2]
+    face, number = sides.face, sides.number
+    for begin in range(0, len(first), CHUNK):
+        one, other = first[begin : begin + CHUNK], first[begin : begin + CHUNK] + 1
+        a, b, c = (vertices.take(faces[face[one], i], axis=0) for i in range(3))
+        normals = np.cross(b - a, c - a) * orientation
+        opposite = vertices.take(faces[face[other], (number[other] + 2) % 3], axis=0)
+        height = np.einsum("ij,ij->i", normals, opposite - a)
+        if (height > dent * np.linalg.norm(normals, axis=1)).any():
             return False
-        used = used_vertices(self.faces)
-        if len(used) - len(self.pairs) + len(self.faces) != 2:
-            return False
-        order = np.argsort(self.of_side, kind="stable").reshape(-1, 2)
-        one, other = order[:, 0], order[:, 1]
-        corners = vertices[self.faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * orientation
-        opposite = vertices[self.faces[other // 3, (other + 2) % 3]]
-        height = np.einsum("ij,ij->i", normals[one // 3], opposite - corners[one // 3, 0])
-        size = np.ptp(vertices[used], axis=0).max()
-        # Files keep float32, so flat patches and fine tessellations scatter by some 1e-7 of the size.
-        return bool((height <= CONVEX_TOLERANCE * size * np.linalg.norm(normals[one // 3], axis=1)).all())
+    return True
 
 
-def _inside_out(vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int64]) -> int:
+def _inside_out(vertices: Array, faces: npt.NDArray[np.integer]) -> int:
     """Number of closed parts that face inwards and lie inside no other."""
     part, _ = spread_winding(faces)
     return len(inside_out_parts(vertices, faces, part))
 
 
-def _collapsed(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+def _finite(vertices: Array) -> Mask:
+    """(n,): which vertices are finite."""
+    if len(vertices) and np.isfinite(extent(vertices)).all():
+        return np.ones(len(vertices), dtype=bool)
+    return np.asarray(np.isfinite(vertices).all(axis=1))
+
+
+def _at_positions(vertices: Array, faces: npt.NDArray[np.int32]) -> npt.NDArray[np.integer]:
+    """Faces of the first vertices at each position."""
+    positions = equal_rows(vertices)
+    return faces if len(positions.first) == len(vertices) else positions.first[positions.of][faces]
+
+
+def _degenerate(vertices: Array, faces: npt.NDArray[np.int32]) -> Mask:
+    """(m,): which faces have no area."""
+    found = np.empty(len(faces), dtype=bool)
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        for begin in range(0, len(faces), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            a, b, c = (vertices.take(faces[part, i], axis=0) for i in range(3))
+            (px, py, pz), (qx, qy, qz) = (b - a).T, (c - a).T
+            largest = np.abs(py * qz - pz * qy)
+            np.maximum(largest, np.abs(pz * qx - px * qz), out=largest)
+            np.maximum(largest, np.abs(px * qy - py * qx), out=largest)
+            found[part] = ~(largest > 0)
+    return found
+
+
+def _collapsed(faces: npt.NDArray[np.integer]) -> Mask:
     """Faces with two corners at one position: they have no side and do not belong to the cycle."""
-    return np.asarray((faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1))
+    a, b, c = faces.T
+    return np.asarray((a == b) | (b == c) | (c == a))
 
 
-def _found(mask: npt.NDArray[np.bool_]) -> Finding:
+def _found(mask: Mask) -> Finding:
     return Finding(int(mask.sum()), tuple(int(i) for i in np.flatnonzero(mask)[:FIRST]))
 
 
-def _duplicates(faces: npt.NDArray[np.int64]) -> Finding:
+def _duplicates(faces: npt.NDArray[np.integer]) -> Finding:
     repeated = np.ones(len(faces), dtype=bool)
     repeated[equal_rows(np.sort(faces, axis=1)).first] = False
     return _found(repeated & ~_collapsed(faces))
-
-
-def _signed_volume(corners: npt.NDArray[np.float64]) -> float:
-    """Volume by the divergence theorem, about the first corner, so that far-away meshes lose no digits."""
-    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-        a, b, c = (corners - corners[0, 0]).transpose(1, 0, 2)
-        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,8 +15,8 @@ from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.frozen import Frozen
 from translucent.geometry.diagnosis import Diagnosis, diagnose
-from translucent.geometry.grouping import equal_rows, used_vertices
-from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, orient, weld
+from translucent.geometry.grouping import CHUNK, equal_rows, extent, use_mask
+from translucent.geometry.repair import WELD_EDGE_SHARE, WELD_TOLERANCE, all_apart, orient, weld
 from translucent.geometry.winding import winding_number
 
 #: Largest index of a vertex.
@@ -25,6 +26,12 @@ MAX_INDEX = 2**31 - 1
 MAX_COORDINATE = 1e18
 #: Smallest diagonal in metres whose square is not lost in float32.
 MIN_DIAGONAL = 1e-18
+
+#: Bytes of memory that welding, winding and diagnosing take at most for each triangle, with the mesh itself.
+PER_TRIANGLE = 150
+
+#: Key under which `mended` notes what `diagnose` then need not find out again; no field, since copies may differ.
+_ONE_CLOSED_PART = "_one_closed_part"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +67,12 @@ class Mesh(Frozen):
     colors: Array | None = None
 
     def __post_init__(self) -> None:
-        vertices = self._array("vertices", self.vertices, np.float64, 3)
-        faces = self._array("faces", self.faces, np.int32, 3)
+        self._settle(copy=True)
+
+    def _settle(self, copy: bool) -> None:
+        """Check all that has been given, and keep it as read-only arrays."""
+        vertices = self._array("vertices", self.vertices, np.float64, 3, copy)
+        faces = self._array("faces", self.faces, np.int32, 3, copy)
         if len(faces) == 0:
             raise InputError(f"mesh {self.name!r}", "it has no faces", "give a triangle mesh")
         if faces.min() < 0 or faces.max() >= len(vertices):
@@ -76,7 +87,7 @@ class Mesh(Frozen):
         for field, columns in (("uv", 2), ("colors", 4)):
             if (given := getattr(self, field)) is None:
                 continue
-            values = self._array(field, given, np.float64, columns)
+            values = self._array(field, given, np.float64, columns, copy)
             if len(values) != len(vertices):
                 found = f"{len(values)} {field} for {len(vertices)} vertices"
                 raise InputError(f"mesh {self.name!r}", found, "give one per vertex")
@@ -86,12 +97,12 @@ class Mesh(Frozen):
                 f"mesh {self.name!r}", "a color of a vertex is not in 0 to 1", "give linear RGB and opacity"
             )
 
-    def _array(self, field: str, value: Any, dtype: Any, columns: int) -> npt.NDArray[Any]:
+    def _array(self, field: str, value: Any, dtype: Any, columns: int, copy: bool) -> npt.NDArray[Any]:
         try:
-            array = np.array(value, order="C")
-            if dtype is np.int32 and array.size and (array.dtype.kind not in "iu" or np.abs(array).max() > MAX_INDEX):
+            array = np.asarray(value, order="C")
+            if dtype is np.int32 and array.size and (array.dtype.kind not in "iu" or _beyond_indices(array)):
                 raise ValueError
-            array = array.astype(dtype)
+            array = array.astype(dtype, order="C", copy=copy)
         except (TypeError, ValueError, OverflowError):
             raise InputError(
                 f"mesh {self.name!r}", f"{field} are not numbers of {np.dtype(dtype)}", "check the arrays"
@@ -112,13 +123,13 @@ class Mesh(Frozen):
     @cached_property
     def diagnosis(self) -> Diagnosis:
         """Diagnosis of the mesh: its defects, and whether it bounds a solid."""
-        return diagnose(self.vertices, self.faces)
+        return diagnose(self.vertices, self.faces, self.__dict__.get(_ONE_CLOSED_PART, False))
 
     @cached_property
     def bounds(self) -> Array:
         """(2, 3): smallest and largest coordinates of the vertices that faces use."""
-        used = self.vertices[used_vertices(self.faces)]
-        bounds = np.stack([used.min(axis=0), used.max(axis=0)])
+        used = use_mask(self.faces, len(self.vertices))
+        bounds = extent(self.vertices if used.all() else self.vertices[used])
         bounds.setflags(write=False)
         return bounds
 
@@ -199,10 +210,11 @@ class Mesh(Frozen):
     @cached_property
     def _refusal(self) -> tuple[str, str] | None:
         """Reason why coordinates cannot be used, and advice; found once for all objects that share the mesh."""
-        bad = np.flatnonzero(~np.isfinite(self.vertices).all(axis=1))
-        if len(bad):
+        largest = float(np.abs(extent(self.vertices)).max())
+        if not math.isfinite(largest):
+            bad = np.flatnonzero(~np.isfinite(self.vertices).all(axis=1))
             return f"{len(bad)} vertices are not finite (first: {bad[0]})", "export the mesh again"
-        if (largest := float(np.abs(self.vertices).max())) > MAX_COORDINATE:
+        if largest > MAX_COORDINATE:
             found = f"a coordinate of {largest:.3g} m, beyond {MAX_COORDINATE:g} m"
             return found, "give the file's unit (--unit), or scale the mesh"
         if self.diagonal < MIN_DIAGONAL:
@@ -210,26 +222,38 @@ class Mesh(Frozen):
         return None
 
 
+def _beyond_indices(array: npt.NDArray[Any]) -> bool:
+    return int(array.max()) > MAX_INDEX or int(array.min()) < -MAX_INDEX
+
+
+def adopted(vertices: Array, faces: npt.NDArray[np.int32], uv: Array | None, name: str, **others: Any) -> Mesh:
+    """Make a mesh of arrays that nobody else holds, which are checked but not copied."""
+    given = {"uv": uv, "name": name, "repairs": (), "colors": None} | others
+    mesh = object.__new__(Mesh)
+    mesh.__dict__.update(vertices=vertices, faces=faces, **given)
+    mesh._settle(copy=False)
+    return mesh
+
+
 def mended(raw: Mesh) -> Mesh:
     """Weld `raw` and wind it consistently, with its repairs on record."""
-    corners = raw.vertices[raw.faces]
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    # A stray vertex far away makes the diagonal huge; what is short beside the usual edge is still one point.
-    same = weld(raw.vertices, min(WELD_TOLERANCE * raw.diagonal, WELD_EDGE_SHARE * float(np.median(edges))))
-    faces, flipped, turned = orient(raw.vertices, same[raw.faces].astype(np.int32))
-    reversed_face = (faces != same[raw.faces]).any(axis=1)
-    split_faces = np.where(reversed_face[:, None], raw.faces[:, ::-1], raw.faces)
-    repairs = []
-    positions = raw.vertices[same]
-    carried = [values for values in (raw.uv, raw.colors) if values is not None]
-    index, vertices, uv, colors = same, positions, raw.uv, raw.colors
-    if carried:
+    same = _welded(raw)
+    welded = raw.faces if same is None else same[raw.faces].astype(np.int32)
+    faces, flipped, turned, one_closed_part = orient(raw.vertices, welded)
+    split_faces = raw.faces
+    if flipped or turned:
+        split_faces = np.where((faces != welded).any(axis=1)[:, None], raw.faces[:, ::-1], raw.faces)
+    index = same
+    if same is not None and (carried := [values for values in (raw.uv, raw.colors) if values is not None]):
         groups = equal_rows(np.column_stack([same, *carried]))
         index = groups.first[groups.of]
-    kept = used_vertices(index[split_faces])
-    renumbered = np.zeros(len(index), dtype=np.int32)
-    renumbered[kept] = np.arange(len(kept))
-    if (merged := len(raw.vertices) - len(kept)) > 0:
+    used = use_mask(split_faces if index is None else index[split_faces], len(raw.vertices))
+    one_closed_part &= index is same
+    if used.all() and not flipped and not turned:
+        raw.__dict__[_ONE_CLOSED_PART] = one_closed_part
+        return raw
+    kept, repairs = np.flatnonzero(used), []
+    if (merged := len(used) - len(kept)) > 0:
         repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
     if flipped:
         repairs.append(f"turned {flipped} of {len(faces)} faces to agree with their neighbors")
@@ -241,11 +265,30 @@ def mended(raw: Mesh) -> Mesh:
             TranslucentWarning,
             stacklevel=3,
         )
-    return Mesh(
-        vertices[kept],
-        renumbered[index[split_faces]],
-        None if uv is None else uv[kept],
-        name=raw.name,
-        repairs=tuple(repairs),
-        colors=None if colors is None else colors[kept],
-    )
+    if merged:
+        renumbered = np.cumsum(used, dtype=np.int32) - np.int32(1)
+        split_faces = renumbered[split_faces if index is None else index[split_faces]]
+    # Of vertices that are welded to one, its position is the first one's.
+    positions = raw.vertices[kept if same is None else same[kept]]
+    uv, colors = (None if values is None else values[kept] for values in (raw.uv, raw.colors))
+    mesh = adopted(positions, split_faces, uv, raw.name, repairs=tuple(repairs), colors=colors)
+    mesh.__dict__[_ONE_CLOSED_PART] = one_closed_part
+    return mesh
+
+
+def _welded(raw: Mesh) -> npt.NDArray[np.int64] | None:
+    """(n,): the vertex that replaces each one; None where all stay."""
+    reach = WELD_TOLERANCE * raw.diagonal
+    if all_apart(raw.vertices, reach):
+        return None
+    # A stray vertex far away makes the diagonal huge; what is short beside the usual edge is still one point.
+    return weld(raw.vertices, reach, lambda: WELD_EDGE_SHARE * _median_edge(raw))
+
+
+def _median_edge(mesh: Mesh) -> float:
+    """Median length of the sides of all faces."""
+    lengths = np.empty((len(mesh.faces), 3))
+    for begin in range(0, len(lengths), CHUNK):
+        corners = mesh.vertices.take(mesh.faces[begin : begin + CHUNK], axis=0)
+        lengths[begin : begin + CHUNK] = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    return float(np.median(lengths, overwrite_input=True))

@@ -5,10 +5,14 @@ Nothing here invents geometry. A hole stays a hole, and what is ambiguous stays 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
-from translucent.geometry.grouping import equal_rows, shared_edges, side_ends
+from translucent.arrays import Mask
+from translucent.geometry.grouping import Numbers, SortedSides, connected, equal_rows, side_blocks, sorted_sides
+from translucent.geometry.nearness import near_points
 from translucent.geometry.winding import inside_out_parts
 
 Vertices = npt.NDArray[np.float64]
@@ -22,7 +26,17 @@ WELD_TOLERANCE = 1e-6
 WELD_EDGE_SHARE = 1e-2
 
 
-def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
+#: Vertices at the beginning of a mesh that tell whether it is a soup of triangles, each with corners of its own.
+_SAMPLE = 3000
+
+
+def all_apart(vertices: Vertices, distance: float) -> bool:
+    """Whether no two vertices are within a distance of each other; all have to be finite."""
+    sample = vertices[:_SAMPLE]
+    return len(equal_rows(sample).first) == len(sample) and len(near_points(vertices, distance)) == 0
+
+
+def weld(vertices: Vertices, tolerance: float, limit: Callable[[], float] | None = None) -> npt.NDArray[np.int64]:
     """Index, for each vertex, of the vertex that replaces all those within `tolerance` of one another.
 
     Parameters
@@ -31,30 +45,30 @@ def weld(vertices: Vertices, tolerance: float) -> npt.NDArray[np.int64]:
         Finite positions in metres.
     tolerance : float
         Distance in metres; neighbors of neighbors are joined too.
+    limit : callable, optional
+        Gives another distance that the tolerance must not exceed; asked for only where it matters.
 
     Returns
     -------
     (n,) int64
         Index of the first vertex of each group.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    positions = equal_rows(vertices)
+    near = near_points(vertices[positions.first], tolerance)
+    if len(near) == 0:
+        return positions.first[positions.of]
     from scipy.spatial import cKDTree
 
-    positions = equal_rows(vertices)
-    points = vertices[positions.first]
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    if len(pairs) == 0:
-        return np.asarray(positions.first[positions.of])
-    count = len(points)
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    groups, label = connected_components(graph, directed=False)
-    representative = np.full(groups, len(vertices), dtype=np.int64)
+    if limit is not None:
+        tolerance = min(tolerance, limit())
+    pairs = near[cKDTree(vertices[positions.first[near]]).query_pairs(tolerance, output_type="ndarray")]
+    label = connected(len(positions.first), *pairs.T)
+    representative = np.full(len(label), len(vertices), dtype=np.int64)
     np.minimum.at(representative, label, positions.first)
-    return np.asarray(representative[label][positions.of])
+    return representative[label][positions.of]
 
 
-def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
+def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int, bool]:
     """Wind the faces of each edge-connected part consistently, and flip parts that are inside out.
 
     A part is turned outwards only if it is closed and lies inside no other part: a shell within another is a cavity,
@@ -73,35 +87,56 @@ def orient(vertices: Vertices, faces: Faces) -> tuple[Faces, int, int]:
         Faces turned because their neighbors disagreed.
     turned : int
         Closed parts turned outwards as a whole.
+    one_closed_part : bool
+        Whether every edge had two faces from the beginning, which agreed, and joined all faces.
     """
-    part, flip = spread_winding(faces)
-    oriented = np.where(flip[:, None], faces[:, ::-1], faces)
+    part, flip, paired = _spread(faces)
+    oriented = np.where(flip[:, None], faces[:, ::-1], faces) if flip.any() else faces
     turned = inside_out_parts(vertices, oriented, part)
-    mine = np.isin(part, turned)
-    oriented[mine] = oriented[mine][:, ::-1]
-    return oriented.astype(np.int32), int(flip.sum()), len(turned)
+    if len(turned):
+        oriented = np.where(np.isin(part, turned)[:, None], oriented[:, ::-1], oriented)
+    one = paired and not part.any()
+    return oriented.astype(np.int32, copy=False), int(flip.sum()), len(turned), one
 
 
-def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
-    """Part of each face, and whether the face must be flipped to agree with the majority of its part.
+def spread_winding(faces: npt.NDArray[np.integer]) -> tuple[Numbers, Mask]:
+    """Part of each face, and whether the face must be flipped to agree with the majority of its part."""
+    part, flip, _ = _spread(faces)
+    return part, flip
+
+
+def _spread(faces: npt.NDArray[np.integer]) -> tuple[Numbers, Mask, bool]:
+    """The same, and whether every edge has two faces, which agree."""
+    part: Numbers = np.arange(len(faces), dtype=np.int32)
+    paired = True
+    for sides in side_blocks(faces):
+        one, other, disagree = _neighbors(sides)
+        if disagree.any():
+            return *_flips(len(faces), *_neighbors(sorted_sides(faces))), False
+        paired &= 2 * len(one) == len(sides.edge)
+        del sides  # before the next block is made
+        part = connected(int(part.max()) + 1, part[one], part[other])[part]
+    return part, np.zeros(len(faces), dtype=bool), paired
+
+
+def _neighbors(sides: SortedSides) -> tuple[Numbers, Numbers, Mask]:
+    """(k,): the faces on either side of the edges with two of them, and whether these disagree about the winding."""
+    face, ascending = (sides.side >> np.uint64(3)).astype(np.int32), sides.ascending
+    if sides.paired:
+        return face[::2], face[1::2], ascending[::2] == ascending[1::2]
+    first = sides.begins[sides.sizes == 2]
+    return face[first], face[first + 1], ascending[first] == ascending[first + 1]
+
+
+def _flips(count: int, one: Numbers, other: Numbers, disagree: Mask) -> tuple[Numbers, Mask]:
+    """Part of each face, and whether it must be flipped, from pairs of neighbors of which some disagree.
 
     Each face is two nodes, as it is and turned. A two-face edge links the nodes that fit together; a consistent choice
     is one connected component of that graph.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(faces)
-    start, _ = side_ends(faces)
-    edges = shared_edges(faces)
-    order = np.argsort(edges.of, kind="stable")
-    pairs = order[(edges.sizes[edges.of] == 2)[order]].reshape(-1, 2)
-    one, other = pairs[:, 0] // 3, pairs[:, 1] // 3
-    disagree = start[pairs[:, 0]] == start[pairs[:, 1]]
     rows = np.concatenate([one, one + count])
     columns = np.concatenate([np.where(disagree, other + count, other), np.where(disagree, other, other + count)])
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(2 * count, 2 * count))
-    _, label = connected_components(graph, directed=False)
+    label = connected(2 * count, rows, columns)
     as_is, turned = label[:count], label[count:]
     _, part = np.unique(np.minimum(as_is, turned), return_inverse=True)
     part = part.ravel()

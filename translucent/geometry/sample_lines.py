@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers
+from translucent.geometry.grouping import extent, use_mask
 from translucent.geometry.line_crossings import line_crossings
 
 #: Lines along each side of the grid of one direction: twice the root of the number of faces, within these bounds.
@@ -14,6 +15,9 @@ LINES = (12, 96)
 
 #: Share of the diagonal on which rounding and welding may wind a surface negatively.
 NEGATIVE = 1e-5
+
+#: Number of faces below which it takes no time to test all of them against all lines.
+_FEW = 1 << 14
 
 #: Axes (columns) off those along which meshes tend to be built; and the same with each of them as the last, along which
 #: the lines run.
@@ -34,7 +38,9 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     faces : (m, 3) int
         Counter-clockwise seen from outside.
     """
-    low, high = vertices[faces].min(axis=(0, 1)), vertices[faces].max(axis=(0, 1))
+    if not (used := use_mask(faces, len(vertices))).all():
+        vertices, faces = vertices[used], (np.cumsum(used) - 1)[faces]
+    low, high = extent(vertices)
     diagonal = float(np.linalg.norm(high - low))
     if not 0 < diagonal < np.inf:
         return False
@@ -42,14 +48,29 @@ def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
     lines = int(np.clip(2 * np.sqrt(len(faces)), *LINES))
     # One copy for each direction, the lines of all along the last axis: arrays of small meshes cost more than numbers.
     points = (unit @ _TURNS).reshape(-1, 3)
-    copies = (faces + len(unit) * np.arange(3)[:, None, None]).reshape(-1, 3)
     scaled = (points[:, :2] + 0.5) * lines - 0.5
-    direction = np.repeat(np.arange(3), len(faces))
+    near = [_near_lines(scaled[i * len(unit) : (i + 1) * len(unit)], faces, lines) for i in range(3)]
+    copies = np.concatenate([faces[one] + len(unit) * i for i, one in enumerate(near)])
+    direction = np.repeat(np.arange(3), [len(one) for one in near])
     found = list(line_crossings(scaled, points[:, 2], copies, (lines, lines), direction))
     if not found:
         return False  # no face is as large as a cell
     line, height, sign = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return _winds_below_zero(line, height, sign)
+
+
+def _near_lines(scaled: Array, faces: npt.NDArray[np.integer], lines: int) -> Integers:
+    """Numbers of the faces that may meet a line at whole numbers of both coordinates; most of a fine mesh do not."""
+    near = np.arange(len(faces))
+    if len(faces) < _FEW:
+        return near
+    for column in scaled.T:
+        held = column.clip(-0.5, lines - 0.5)
+        # Odd between two lines, and even on one; a face that lies on one has no area across the lines.
+        step = (np.ceil(held) + np.floor(held)).astype(np.int16)
+        a, b, c = (step.take(faces[near, i]) for i in range(3))
+        near = near[(a != b) | (b != c)]
+    return near
 
 
 def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:

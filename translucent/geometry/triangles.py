@@ -16,6 +16,8 @@ def joined(parts: list[Triangles], asked: str) -> Triangles:
     """Concatenate the triangles of all parts; raises `InputError` if there are none."""
     if not parts:
         raise InputError(asked, "it has no faces", "give a triangle mesh, not points or lines")
+    if len(parts) == 1:
+        return parts[0]
     starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts[:-1])])
     faces = [part.astype(np.int64) + start for (_, part, _), start in zip(parts, starts.tolist(), strict=True)]
     uv = [coordinates for _, _, coordinates in parts if coordinates is not None]

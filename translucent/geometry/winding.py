@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
-from translucent.geometry.grouping import shared_edges, side_ends
+from translucent.geometry.grouping import CHUNK, sorted_sides
 
 #: Smallest negative volume of an inside-out part, as a share of its cubed size: less is rounding.
 _FLAT = 1e-12
@@ -38,7 +40,7 @@ def winding_number(corners: Array, point: npt.ArrayLike) -> float:
 
 
 def inside_out_parts(
-    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64]
+    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]]
 ) -> npt.NDArray[np.int64]:
     """Closed parts that face inwards without being a cavity: they lie inside no other part.
 
@@ -56,23 +58,49 @@ def inside_out_parts(
         Their numbers.
     """
     count = int(part.max()) + 1
+    volume = part_volumes(vertices, faces, part, count)
+    if not (volume < 0).any():
+        return np.empty(0, dtype=np.int64)
     corners = vertices[faces]
     order = np.argsort(part, kind="stable")
     starts = np.searchsorted(part[order], np.arange(count))
     low = np.minimum.reduceat(corners.min(axis=1)[order], starts)
     high = np.maximum.reduceat(corners.max(axis=1)[order], starts)
-    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
-        relative = corners - corners[order[starts], 0][part][:, None]
-        triple = np.einsum("ij,ij->i", relative[:, 0], np.cross(relative[:, 1], relative[:, 2]))
-        flat = -_FLAT * np.linalg.norm(high - low, axis=1) ** 3
-        negative = np.bincount(part, weights=triple, minlength=count) / 6.0 < flat
+    with np.errstate(under="ignore", over="ignore"):
+        negative = volume < -_FLAT * np.linalg.norm(high - low, axis=1) ** 3
     if not negative.any():
         return np.empty(0, dtype=np.int64)
     suspects = np.flatnonzero(negative & _balanced_parts(faces, part, count))
     return np.array([p for p in suspects if not _is_cavity(corners, part, low, high, int(p))], dtype=np.int64)
 
 
-def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Array, p: int) -> bool:
+def part_volumes(
+    vertices: Array, faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]], count: int
+) -> Array:
+    """(count,): signed volumes of the parts of a mesh; meaningful for closed ones.
+
+    By the divergence theorem, about a corner of each part, so that far-away ones lose no digits.
+    """
+    first = np.zeros(count, dtype=np.int64)
+    if count > 1:
+        first[part[::-1]] = np.arange(len(part) - 1, -1, -1)
+    origins = vertices[faces[first, 0]]
+    volume = np.zeros(count)
+    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
+        x, y, z = (vertices[:, i] - origins[0, i] if count == 1 else vertices[:, i].copy() for i in range(3))
+        for begin in range(0, len(faces), CHUNK):
+            corners, of = faces[begin : begin + CHUNK].T.copy(), part[begin : begin + CHUNK]
+            a, b, c = x.take(corners), y.take(corners), z.take(corners)
+            if count > 1:
+                a, b, c = a - origins[of, 0], b - origins[of, 1], c - origins[of, 2]
+            triple = a[0] * (b[1] * c[2] - c[1] * b[2])
+            triple += b[0] * (c[1] * a[2] - a[1] * c[2])
+            triple += c[0] * (a[1] * b[2] - b[1] * a[2])
+            volume += np.bincount(of, weights=triple, minlength=count) if count > 1 else triple.sum()
+    return volume / 6.0
+
+
+def _is_cavity(corners: Array, part: npt.NDArray[np.signedinteger[Any]], low: Array, high: Array, p: int) -> bool:
     around = (low <= low[p]).all(axis=1) & (high >= high[p]).all(axis=1)
     around[p] = False
     if not around.any():
@@ -81,11 +109,13 @@ def _is_cavity(corners: Array, part: npt.NDArray[np.int64], low: Array, high: Ar
     return round(winding_number(corners[around[part]], inside)) != 0
 
 
-def _balanced_parts(faces: npt.NDArray[np.integer], part: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:
+def _balanced_parts(
+    faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]], count: int
+) -> npt.NDArray[np.bool_]:
     """Whether every directed edge of a part has its opposite."""
-    start, end = side_ends(faces)
-    edge = shared_edges(faces).of
-    net = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
+    sides = sorted_sides(faces)
     unbalanced = np.zeros(count, dtype=bool)
-    unbalanced[np.repeat(part, 3)[net[edge] != 0]] = True
+    if not sides.paired:
+        net = np.add.reduceat(np.where(sides.ascending, 1, -1), sides.begins)
+        unbalanced[part[sides.face[np.repeat(net != 0, sides.sizes)]]] = True
     return ~unbalanced

@@ -51,12 +51,12 @@ class Accessors:
             found = np.maximum(found / np.iinfo(values.dtype).max, -1.0)
         return found
 
-    def indices(self, index: object) -> Indices:
-        """(n,) int64: an accessor of indices; raises `InputError` like `vectors`."""
+    def indices(self, index: object) -> npt.NDArray[np.unsignedinteger]:
+        """(n,): an accessor of indices, of the type that is stored; raises `InputError` like `vectors`."""
         values, _ = self._elements(index, "SCALAR")
         if values.dtype.kind != "u":
             raise refused(self.file, f"accessor {index}: indices are no unsigned integers")
-        return values[:, 0].astype(np.int64)
+        return values[:, 0]
 
     def _elements(self, index: object, kind: str) -> tuple[npt.NDArray[Any], Json]:
         """(n, width): the elements as they are stored, and their accessor."""

@@ -36,7 +36,7 @@ class GltfFile:
     allow_outside: bool = False
     #: Lists that have been checked, with their lengths, so that each is checked once.
     _checked: dict[str, tuple[list[Json], int]] = field(default_factory=dict, init=False, repr=False, compare=False)
-    _buffers: dict[int, bytes] = field(default_factory=dict, init=False, compare=False, repr=False)
+    _buffers: dict[int, bytes | memoryview] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def items(self, key: str) -> list[Json]:
         """The objects of a top-level list such as ``"materials"``; raises `InputError` if it is not one."""
@@ -67,10 +67,10 @@ class GltfFile:
                 raise InputError(
                     f"glTF {str(self.path)!r}", "a buffer view leaves its buffer", "copy or export the file again"
                 )
-            return whole[start : start + length]
-        return self._content(holder)
+            return bytes(whole[start : start + length])
+        return bytes(self._content(holder))
 
-    def buffer(self, index: Any) -> bytes:
+    def buffer(self, index: Any) -> bytes | memoryview:
         """Bytes of a buffer, read when they are first asked for; raises `InputError` like `resource`."""
         entry = self.item("buffers", index)
         if index not in self._buffers:
@@ -82,12 +82,12 @@ class GltfFile:
         """Number of bytes read so far, of the file and of its links, without the JSON."""
         return len(self.chunks) + sum(map(len, self._buffers.values()))
 
-    def _content(self, holder: Json) -> bytes:
+    def _content(self, holder: Json) -> bytes | memoryview:
         if isinstance(uri := holder.get("uri"), str):
             return self._linked(uri)
         if len(self.chunks) < CHUNK.size or CHUNK.unpack_from(self.chunks)[1] != BINARY_CHUNK:
             raise InputError(f"glTF {str(self.path)!r}", "it has no binary chunk", "copy or export the file again")
-        return self.chunks[CHUNK.size : CHUNK.size + CHUNK.unpack_from(self.chunks)[0]]
+        return memoryview(self.chunks)[CHUNK.size : CHUNK.size + CHUNK.unpack_from(self.chunks)[0]]
 
     def _linked(self, uri: str) -> bytes:
         asked = f"glTF {str(self.path)!r}"

@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from translucent.geometry.mesh import Mesh, mended
+from translucent.arrays import Array, Integers
+from translucent.files.memory import require_memory
+from translucent.geometry.grouping import use_mask
+from translucent.geometry.mesh import PER_TRIANGLE, Mesh, adopted, mended
 from translucent.gltf.accessors import Accessors
 from translucent.gltf.fields import refused
 from translucent.gltf.file import Json
 
-Indices = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.integer]
 
 _POINTS_AND_LINES = (0, 1, 2, 3)
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -52,18 +55,35 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str) -> Mesh | None:
     if corners.max(initial=0) >= len(positions):
         found = f"{name!r}: index {corners.max()} points outside the {len(positions)} vertices"
         raise refused(accessors.file, found)
+    count = len(corners) // 3 if mode == _TRIANGLES else len(corners)
+    asked, do = f"glTF {str(accessors.file.path)!r}", "close other programs, or decimate the mesh"
+    require_memory(asked, f"the {count} triangles of {name!r}", PER_TRIANGLE * count, do)
     faces = _faces(accessors, mode, corners, name)
-    used, faces = np.unique(faces, return_inverse=True)  # primitives may share their vertices with others
+    stored = len(positions)
+    positions, faces, kept = _compact(positions, faces)
     uv = None
     if "TEXCOORD_0" in attributes:
         uv = accessors.vectors(attributes["TEXCOORD_0"], "VEC2")
-        if len(uv) != len(positions):
-            raise refused(accessors.file, f"{name!r}: {len(uv)} texture coordinates for {len(positions)} vertices")
-        uv = np.column_stack([uv[used, 0], 1.0 - uv[used, 1]])  # glTF counts v downwards
-    colors = None if "COLOR_0" not in attributes else _colors(accessors, attributes["COLOR_0"], len(positions), name)
-    colors = None if colors is None or (colors[used] == 1).all() else colors[used]
-    accessors.keep(repr(name), (24 if colors is None else 56) * len(used) + 8 * faces.size)
-    return Mesh(positions[used], faces.reshape(-1, 3).astype(np.int32), uv, name=name, colors=colors)
+        if len(uv) != stored:
+            raise refused(accessors.file, f"{name!r}: {len(uv)} texture coordinates for {stored} vertices")
+        uv = np.column_stack([uv[kept, 0], 1.0 - uv[kept, 1]])  # glTF counts v downwards
+    colors = None if "COLOR_0" not in attributes else _colors(accessors, attributes["COLOR_0"], stored, name)
+    colors = None if colors is None or (colors[kept] == 1).all() else colors[kept]
+    accessors.keep(repr(name), (24 if colors is None else 56) * len(positions) + 8 * faces.size)
+    return adopted(positions, faces, uv, name, colors=colors)
+
+
+def _compact(positions: Array, faces: Indices) -> tuple[Array, npt.NDArray[np.int32], Integers | slice]:
+    """The vertices that faces use, the faces among these, and the numbers that they had.
+
+    Primitives may share their vertices with others.
+    """
+    used = use_mask(faces, len(positions))
+    if used.all():
+        return positions, faces.astype(np.int32), slice(None)
+    kept = np.flatnonzero(used)
+    number = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    return positions[kept], number[faces], kept
 
 
 def _colors(accessors: Accessors, index: Any, count: int, name: str) -> npt.NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from translucent.arrays import Array
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.mesh import MAX_COORDINATE
+from translucent.gltf.animations import posed
 from translucent.gltf.cameras import scene_camera
 from translucent.gltf.fields import label, refused
 from translucent.gltf.file import GltfFile, read_gltf
@@ -19,9 +20,11 @@ from translucent.gltf.left_out import LeftOut
 from translucent.gltf.lights import LIGHTS, scene_lights
 from translucent.gltf.materials import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
 from translucent.gltf.objects import scene_objects
+from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS
 from translucent.gltf.scene_media import node_transforms
-from translucent.gltf.surfaces import DIFFUSE_TRANSMISSION, LEFT_OUT, UNLIT
+from translucent.gltf.surfaces import LEFT_OUT, UNLIT
 from translucent.gltf.textures import TEXTURE_TRANSFORM
+from translucent.gltf.variants import VARIANTS, variant_names
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import LIGHT_TABLE, framing
@@ -40,6 +43,7 @@ _READ = (
     UNLIT,
     TEXTURE_TRANSFORM,
     LIGHTS,
+    VARIANTS,
     "KHR_mesh_quantization",
 )
 #: Extensions that a file may require and that can be ignored: they only change the look of surfaces and textures.
@@ -57,10 +61,13 @@ class GltfScene(Scene):
         What the file asks for and the scene does not hold, one line per kind with the names that have it.
     has_camera : bool
         Whether the camera is one of the file's, rather than one that frames all objects.
+    variants : tuple of str
+        Names of the file's variants of materials, for `variant` of `load_scene`.
     """
 
     left_out: tuple[str, ...] = ()
     has_camera: bool = False
+    variants: tuple[str, ...] = ()
 
 
 def load_scene(
@@ -70,6 +77,9 @@ def load_scene(
     size: tuple[int, int] = (1, 1),
     *,
     allow_outside: bool = False,
+    variant: str | None = None,
+    time: float | None = None,
+    draft_extensions: bool = False,
 ) -> GltfScene:
     """Read a scene from a .gltf or .glb file: its objects with their media, one camera, and its lights.
 
@@ -87,6 +97,13 @@ def load_scene(
         Size of the picture in pixels, which the framing depends on; a wider picture shows all objects, too.
     allow_outside : bool
         Whether buffers and images may lie outside the file's folder: only for files that you trust.
+    variant : str, optional
+        Name of a variant of materials (KHR_materials_variants). Default: the materials that primitives have themselves.
+    time : float, optional
+        Seconds on the clock of the animations at which nodes stand; see `translucent.gltf.animations`. Default: as the
+        nodes are written. Skins and morph targets are left out, whatever the time.
+    draft_extensions : bool
+        Whether to read KHR_materials_scatter and KHR_materials_volume_scatter, which are drafts.
 
     Returns
     -------
@@ -101,19 +118,21 @@ def load_scene(
     ------
     InputError
         If the file is missing, broken, no glTF, compressed or without triangles; if a value in it is wrong, or the
-        transform of a light or of the camera is singular; if there is no such camera.
+        transform of a light or of the camera is singular; if there is no such camera, variant or animation.
     """
     metres = metres_per_unit(unit)
     file = _read(path, allow_outside)
     left_out = LeftOut()
-    check_extensions(file, left_out)
+    check_extensions(file, left_out, DRAFTS.values() if draft_extensions else ())
+    if time is not None:
+        file = posed(file, time, left_out)
     with np.errstate(under="ignore"):
         transforms = scene_transforms(file, left_out)
-        objects = scene_objects(file, transforms, metres, left_out)
+        objects = scene_objects(file, transforms, metres, left_out, draft_extensions, variant)
         own = scene_camera(file, transforms, camera, metres, left_out)
         lights = scene_lights(file, transforms, metres, left_out)
     for key in ("animations", "skins"):
-        if file.items(key):
+        if file.items(key) and not (key == "animations" and time is not None):
             left_out.add(key, f"{len(file.items(key))}")
     if lost := left_out.lines():
         warnings.warn(f"scene {file.path.name!r}: left out: {'; '.join(lost)}", TranslucentWarning, stacklevel=2)
@@ -121,7 +140,8 @@ def load_scene(
     polished = any(item.surface is not None for item in objects)
     environment = Environment.studio() if polished else LIGHT_TABLE
     view = own or framing(objects, size)
-    return GltfScene(objects, view, lights, environment, left_out=lost, has_camera=own is not None)
+    variants = variant_names(file)
+    return GltfScene(objects, view, lights, environment, left_out=lost, has_camera=own is not None, variants=variants)
 
 
 def _read(path: str | Path, allow_outside: bool) -> GltfFile:
@@ -134,14 +154,14 @@ def _read(path: str | Path, allow_outside: bool) -> GltfFile:
     return read_gltf(path, allow_outside)
 
 
-def check_extensions(file: GltfFile, left_out: LeftOut) -> None:
-    """Refuse a file with unsupported required extensions, and record those that it merely uses."""
+def check_extensions(file: GltfFile, left_out: LeftOut, known: Collection[str] = ()) -> None:
+    """Refuse a file with unsupported required extensions, and record those that it merely uses; not those `known`."""
     for key in ("extensionsRequired", "extensionsUsed"):
         names = file.tree.get(key, [])
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             raise refused(file, f"{key} is {names!r}, not a list of names")
         for name in names:
-            if name in _READ or name in LEFT_OUT:  # the latter is told of the materials that have it
+            if name in _READ or name in LEFT_OUT or name in known:  # the latter is told of the materials that have it
                 continue
             if key == "extensionsRequired" and not name.startswith(_LOOKS):
                 do = "export it without compression" if name in _COMPRESSIONS else "export it without this extension"

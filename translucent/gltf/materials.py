@@ -22,8 +22,9 @@ A node's scale acts on the thickness and not on the distance; `translucent.gltf.
 Source: Khronos, glTF 2.0, and the ratified texts of the extensions above.
 
 Not carried into a `Medium`: emission of the surface, dispersion, base color, roughness, textures of transmission. Not
-known to glTF: scattering, anisotropy and emission of the volume. A medium that scatters is written as its extinction,
-so that what passes straight on is the same; `translucent.gltf.write` says so in a warning.
+known to ratified glTF: scattering, anisotropy and emission of the volume. A medium that scatters is written as its
+extinction, so that what passes straight on is the same; `translucent.gltf.write` says so in a warning. Drafts of
+extensions that know scattering: `translucent.gltf.scattering`.
 """
 
 from __future__ import annotations
@@ -34,8 +35,12 @@ from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from translucent.errors import InputError
+from translucent.gltf.checked import Fields, Triple
 from translucent.gltf.file import GltfFile, Json, read_gltf
+from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DraftScattering, read_draft
 from translucent.gltf.textures import TEXTURE_TRANSFORM, TextureTransform
 from translucent.media.color_distance import BLACKEST, extinction_at
 from translucent.media.conversion import html_strip
@@ -51,8 +56,6 @@ EXCLUDED = ("KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness")
 
 #: Default index of refraction.
 DEFAULT_IOR = 1.5
-
-Triple = tuple[float, float, float]
 
 _VOLUME_KEYS = {
     "thicknessFactor",
@@ -74,6 +77,8 @@ class GltfMaterial:
         In the file's list of materials.
     name : str
         Empty if it has none.
+    scatter : DraftScattering, optional
+        How the volume scatters, where drafts of extensions are read.
     has_volume : bool
         Whether KHR_materials_volume is there.
     transmits : bool
@@ -97,6 +102,7 @@ class GltfMaterial:
     emissive: Triple = (0.0, 0.0, 0.0)
     thickness_texture: int | None = None
     thickness_transform: TextureTransform = field(default_factory=TextureTransform)
+    scatter: DraftScattering | None = None
     has_volume: bool = False
     transmits: bool = False
     warnings: tuple[str, ...] = ()
@@ -120,7 +126,8 @@ class GltfMaterial:
         if not (self.has_volume and self.transmits and self.thickness > 0):
             return None
         extinction = extinction_at(self.attenuation_color, self.attenuation_distance)
-        return Medium(absorption=extinction, ior=self.ior or DEFAULT_IOR)
+        ior = self.ior or DEFAULT_IOR
+        return Medium(absorption=extinction, ior=ior) if self.scatter is None else self.scatter.medium(extinction, ior)
 
     def _repr_html_(self) -> str:
         """Name and swatches of the medium, for notebooks."""
@@ -146,12 +153,19 @@ class GltfMaterial:
             "dispersion": self.dispersion,
             "emissive": list(self.emissive),
             "extinction": None if medium is None else medium.extinction.tolist(),
+            "scattering": None if medium is None else np.asarray(medium.scattering).tolist(),
             "warnings": list(self.warnings),
         }
 
 
-def read_materials(path: str | Path) -> list[GltfMaterial]:
+def read_materials(path: str | Path, *, draft_extensions: bool = False) -> list[GltfMaterial]:
     """Read all materials of a .gltf or .glb file, in its order, without the files that it links to.
+
+    Parameters
+    ----------
+    path : path
+    draft_extensions : bool
+        Whether to read extensions that are drafts, too; see `translucent.gltf.scattering`.
 
     Raises
     ------
@@ -159,97 +173,31 @@ def read_materials(path: str | Path) -> list[GltfMaterial]:
         If the file cannot be read, or a value has a wrong type or is out of its range; all such values of the first
         bad material are named.
     """
-    return materials_of(read_gltf(path))
+    return materials_of(read_gltf(path), draft_extensions=draft_extensions)
 
 
-def materials_of(file: GltfFile) -> list[GltfMaterial]:
+def materials_of(file: GltfFile, *, draft_extensions: bool = False) -> list[GltfMaterial]:
     """Read all materials of an open file; see `read_materials`."""
-    return [_material(file, index, entry) for index, entry in enumerate(file.items("materials"))]
+    return [_material(file, index, entry, draft_extensions) for index, entry in enumerate(file.items("materials"))]
 
 
-class _Fields:
-    """Reader of the checked values of one JSON object; errors go into `problems`."""
-
-    def __init__(self, owner: object, where: str, problems: list[str]) -> None:
-        self.problems = problems
-        if not isinstance(owner, dict):
-            problems.append(f"{where} is {owner!r}, not an object")
-        self.values: Json = owner if isinstance(owner, dict) else {}
-
-    def number(self, key: str, default: float, low: float, high: float = math.inf, *, above: bool = False) -> float:
-        """A number in `low`..`high`; excluding `low` itself with `above`."""
-        value = self.values.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self.problems.append(f"{key} is {value!r}, not a number")
-            return default
-        if not low <= value <= high or (above and value == low):
-            allowed = f"above {low:g}" if above else f"{low:g} or more" if math.isinf(high) else f"in {low:g}..{high:g}"
-            self.problems.append(f"{key} {value:g} is not {allowed}")
-            return default
-        return float(value)
-
-    def triple(self, key: str, default: Triple) -> Triple:
-        """Three numbers in 0..1."""
-        value = self.values.get(key, list(default))
-        if not isinstance(value, list) or len(value) != 3:
-            self.problems.append(f"{key} is {value!r}, not three numbers")
-            return default
-        channels = _Fields({f"{key}[{i}]": channel for i, channel in enumerate(value)}, key, self.problems)
-        red, green, blue = (channels.number(f"{key}[{i}]", default[i], 0.0, 1.0) for i in range(3))
-        return red, green, blue
-
-    def pair(self, key: str, default: tuple[float, float]) -> tuple[float, float]:
-        """Two numbers."""
-        value = self.values.get(key, list(default))
-        if not isinstance(value, list) or len(value) != 2:
-            self.problems.append(f"{key} is {value!r}, not two numbers")
-            return default
-        parts = _Fields({f"{key}[{i}]": part for i, part in enumerate(value)}, key, self.problems)
-        return parts.number(f"{key}[0]", default[0], -math.inf), parts.number(f"{key}[1]", default[1], -math.inf)
-
-    def whole(self, key: str, default: int) -> int:
-        """A nonnegative integer."""
-        value = self.values.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            self.problems.append(f"{key} is {value!r}, not a whole number of 0 or more")
-            return default
-        return value
-
-    def texture(self, key: str, count: int) -> tuple[int | None, TextureTransform]:
-        """Index and transform of a texture, if there is one."""
-        if key not in self.values:
-            return None, TextureTransform()
-        info = _Fields(self.values[key], key, self.problems)
-        index = info.values.get("index")
-        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
-            self.problems.append(f"{key} index {index!r} is not one of {count} textures")
-            return None, TextureTransform()
-        extensions = _Fields(info.values.get("extensions", {}), f"{key} extensions", self.problems).values
-        stated = _Fields(extensions.get(TEXTURE_TRANSFORM, {}), TEXTURE_TRANSFORM, self.problems)
-        return index, TextureTransform(
-            stated.pair("offset", (0.0, 0.0)),
-            stated.number("rotation", 0.0, -math.inf),
-            stated.pair("scale", (1.0, 1.0)),
-            stated.whole("texCoord", info.whole("texCoord", 0)),
-        )
-
-
-def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
+def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -> GltfMaterial:
     name = str(entry.get("name", ""))
     problems: list[str] = []
-    extensions = _Fields(entry.get("extensions", {}), "extensions", problems).values
+    told: list[str] = []
+    extensions = Fields(entry.get("extensions", {}), "extensions", problems).values
     transmission, volume, ior, strength, dispersion = (
-        _Fields(extensions.get(key, {}), key, problems)
+        Fields(extensions.get(key, {}), key, problems)
         for key in (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, DISPERSION)
     )
-    surface = _Fields(entry.get("pbrMetallicRoughness", {}), "pbrMetallicRoughness", problems).values
+    surface = Fields(entry.get("pbrMetallicRoughness", {}), "pbrMetallicRoughness", problems).values
     problems += [
         f"{key} is below pbrMetallicRoughness, where it has no meaning"
-        for key in _Fields(surface.get("extensions", {}), "extensions", problems).values
+        for key in Fields(surface.get("extensions", {}), "extensions", problems).values
         if key.startswith("KHR_materials_")
     ]
     scale = strength.number("emissiveStrength", 1.0, 0.0)
-    red, green, blue = _Fields(entry, "material", problems).triple("emissiveFactor", (0.0, 0.0, 0.0))
+    red, green, blue = Fields(entry, "material", problems).triple("emissiveFactor", (0.0, 0.0, 0.0))
     index_of_refraction = ior.number("ior", DEFAULT_IOR, 0.0)
     texture, transform = volume.texture("thicknessTexture", len(file.items("textures")))
     if 0 < index_of_refraction < 1:
@@ -266,6 +214,7 @@ def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
         emissive=(scale * red, scale * green, scale * blue),
         thickness_texture=texture,
         thickness_transform=transform,
+        scatter=read_draft(extensions, problems, told) if draft_extensions else None,
         has_volume=VOLUME in extensions,
         transmits=share > 0 or _lets_light_in(extensions),
     )
@@ -273,14 +222,13 @@ def _material(file: GltfFile, index: int, entry: Json) -> GltfMaterial:
         raise InputError(
             f"glTF {str(file.path)!r}", f"material {index} {name!r}: {', '.join(problems)}", "mend the file"
         )
-    return GltfMaterial(**{**vars(found), "warnings": tuple(_warnings(found, entry, extensions, volume.values))})
+    return GltfMaterial(**{**vars(found), "warnings": (*_warnings(found, entry, extensions, volume.values), *told)})
 
 
 def _lets_light_in(extensions: Json) -> bool:
     """Whether light may enter by another way than transmission: diffusely, or by an extension that is not known."""
     return any(
-        key == "KHR_materials_diffuse_transmission" or (not key.startswith("KHR_") and key not in EXCLUDED)
-        for key in extensions
+        key == DIFFUSE_TRANSMISSION or (not key.startswith("KHR_") and key not in EXCLUDED) for key in extensions
     )
 
 

@@ -18,6 +18,7 @@ from translucent.gltf.geometry import primitive_mesh
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.scene_media import primitives
 from translucent.gltf.surfaces import VERTEX_COLORED, Finish, finish_reader
+from translucent.gltf.variants import material_index, variant_index
 from translucent.media.medium import Medium
 from translucent.scene.scene import Object
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
@@ -38,7 +39,14 @@ BLENDED = (
 _METAL = 0.1
 
 
-def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, left_out: LeftOut) -> list[Object]:
+def scene_objects(
+    file: GltfFile,
+    transforms: dict[int, Array],
+    metres: float,
+    left_out: LeftOut,
+    draft_extensions: bool = False,
+    variant: str | None = None,
+) -> list[Object]:
     """Objects of a scene, one per node and primitive, with their materials.
 
     Parameters
@@ -50,17 +58,21 @@ def scene_objects(file: GltfFile, transforms: dict[int, Array], metres: float, l
         Per unit of the file.
     left_out : LeftOut
         Gets what the objects do not hold.
+    variant : str, optional
+        Name of the variant whose materials they have.
+    draft_extensions : bool
+        Whether extensions that are drafts count.
 
     Raises
     ------
     InputError
-        If there is no object, or something about one is wrong.
+        If there is no object or no such variant, or something about one is wrong.
     """
-    finish_of = finish_reader(file, metres, left_out)
+    finish_of = finish_reader(file, metres, left_out, draft_extensions)
     scale = np.diag([metres, metres, metres, 1.0])
     objects: list[Object] = []
     finishes: list[Finish] = []
-    for mesh, material, node in _placed_meshes(file, transforms, left_out):
+    for mesh, material, node in _placed_meshes(file, transforms, left_out, variant_index(file, variant)):
         finish, surface = _fitted(finish_of(material), mesh, left_out)
         if finish.hidden:
             left_out.add("objects hidden by their alpha", repr(mesh.name))
@@ -150,7 +162,7 @@ def _has_metal(surface: Surface, mesh: Mesh) -> bool:
 
 
 def _placed_meshes(
-    file: GltfFile, transforms: dict[int, Array], left_out: LeftOut
+    file: GltfFile, transforms: dict[int, Array], left_out: LeftOut, variant: int | None
 ) -> Iterator[tuple[Mesh, int | None, int]]:
     """Mesh, material and node of every primitive that a node places; each mesh is read once."""
     nodes = file.items("nodes")
@@ -172,7 +184,7 @@ def _placed_meshes(
                 known[index, i] = primitive_mesh(accessors, primitive, name)
                 _note_losses(primitive, name, known[index, i], left_out)
             if (mesh := known[index, i]) is not None:
-                yield mesh, primitive.get("material"), node
+                yield mesh, material_index(file, primitive, variant), node
 
 
 def _mesh_name(node: Json, entry: Json, index: int, *, shared: bool) -> str:

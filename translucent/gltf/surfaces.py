@@ -52,13 +52,13 @@ from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.images import Textures
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.materials import DEFAULT_IOR, TRANSMISSION, GltfMaterial, materials_of
+from translucent.gltf.scattering import DIFFUSE_TRANSMISSION
 from translucent.media.color_distance import extinction_at
 from translucent.media.medium import Medium
 from translucent.scene.scene import OPAQUE_COLOR
 from translucent.scene.surface import MAX_DISPERSION, Surface
 from translucent.scene.texture import Texture
 
-DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 UNLIT = "KHR_materials_unlit"
 
 #: Extensions of materials that are not rendered, and their names in messages.
@@ -117,7 +117,9 @@ class Finish:
 VERTEX_COLORED = Finish((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, ior=1.0))
 
 
-def finish_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[[int | None], Finish]:
+def finish_reader(
+    file: GltfFile, metres: float, left_out: LeftOut, draft_extensions: bool = False
+) -> Callable[[int | None], Finish]:
     """Function from the index of a material to its finish, each read once; None is the index of no material.
 
     Parameters
@@ -127,8 +129,10 @@ def finish_reader(file: GltfFile, metres: float, left_out: LeftOut) -> Callable[
         Per unit of the file, in which attenuation distances are.
     left_out : LeftOut
         Gets what the objects do not hold.
+    draft_extensions : bool
+        Whether extensions that are drafts count.
     """
-    materials, entries = materials_of(file), file.items("materials")
+    materials, entries = materials_of(file, draft_extensions=draft_extensions), file.items("materials")
     textures = Textures(file, left_out)
 
     @cache
@@ -172,7 +176,8 @@ class _Reader:
         if UNLIT in section(self.file, self.where, self.entry, "extensions"):
             return Finish(color, surface=self._unlit(), unlit=True)
         if medium is not None and (transmission > 0 or passes):
-            medium = Medium(absorption=medium.extinction / metres, ior=medium.ior)
+            absorption, scattering = np.asarray(medium.absorption), np.asarray(medium.scattering)
+            medium = dataclasses.replace(medium, absorption=absorption / metres, scattering=scattering / metres)
             return Finish(color, medium, surface=self._translucent(color))
         if transmission > 0:
             whole = transmission == 1 and "transmissionTexture" not in self._extension(TRANSMISSION)

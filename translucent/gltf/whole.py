@@ -52,5 +52,7 @@ def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
 
 def _placed(mesh: Mesh, matrix: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Triangles:
     """Place a part in the world; a mirrored one is rewound so that its outside stays outside."""
+    if (matrix == np.eye(4)).all():
+        return mesh.vertices, mesh.faces, mesh.uv
     faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
     return mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces, mesh.uv

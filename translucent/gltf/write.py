@@ -18,6 +18,7 @@ from typing import Any
 from translucent.errors import InputError, TranslucentWarning
 from translucent.gltf.file import GltfFile, Json, read_gltf
 from translucent.gltf.materials import DEFAULT_IOR, EXCLUDED, IOR, TRANSMISSION, VOLUME, materials_of
+from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS, SCATTER, Draft, check_draft, draft_extension
 from translucent.gltf.scene_media import primitives
 from translucent.gltf.write_file import check_gltf_output, write_gltf
 from translucent.media.color_distance import color_at
@@ -54,6 +55,7 @@ def write_medium(
     object_name: str | None = None,
     thickness: float | None = None,
     keep_ior: bool = False,
+    draft_extensions: Draft | None = None,
     allow_outside: bool = False,
 ) -> list[int]:
     """Give a medium to the objects of a glTF file, and write the file atomically.
@@ -63,7 +65,7 @@ def write_medium(
     path_in, path_out : path
         .gltf or .glb, in any combination; they may be the same.
     medium : Medium
-        Scattering, emission and anisotropy are lost, with a `TranslucentWarning`.
+        Emission is lost, and without `draft_extensions` scattering and anisotropy, with a `TranslucentWarning`.
     distance : float, optional
         Where the color is stated, in metres: what the medium was made with. None: where the densest channel lets 1/e
         pass.
@@ -75,6 +77,8 @@ def write_medium(
         object's box (of the largest of several).
     keep_ior : bool
         Leave each material its index of refraction instead of writing that of the medium.
+    draft_extensions : {"scatter", "volume-scatter"}, optional
+        Write scattering by a draft: KHR_materials_scatter, the newer one, or KHR_materials_volume_scatter.
     allow_outside : bool
         Whether files that it links to may lie outside its folder; a .glb holds a copy of them.
 
@@ -91,6 +95,7 @@ def write_medium(
         If the file cannot be written.
     """
     check_gltf_output(Path(path_out))
+    check_draft(draft_extensions)
     if thickness is not None and not 0 < thickness < math.inf:
         raise InputError(f"thickness {thickness!r}", "not above 0 and finite", "give a length, for example 0.02")
     file = read_gltf(path_in, allow_outside)
@@ -100,12 +105,16 @@ def write_medium(
     targets = _own_materials(edited, object_name, entered)
     for index, sizes in targets.items():
         _give(edited, index, medium, distance, thickness, sizes, keep_ior)
+        if draft_extensions is not None:
+            _give_draft(edited, index, medium, draft_extensions)
     used = tree.setdefault("extensionsUsed", [])
     if not isinstance(used, list):
         raise InputError(f"glTF {str(file.path)!r}", f"extensionsUsed is {used!r}, not a list", "export the file again")
-    used += [name for name in (TRANSMISSION, VOLUME, IOR) if name not in used and _uses(tree, name)]
-    if medium.scatters or medium.emits:
+    used += [name for name in (TRANSMISSION, VOLUME, IOR, *DRAFTS.values()) if name not in used and _uses(tree, name)]
+    if medium.emits or (medium.scatters and draft_extensions is None):
         lost = "glTF holds absorption only: scattering is written as extinction, emission is lost"
+        if draft_extensions is not None:
+            lost = "glTF holds no emission of volumes: it is lost"
         warnings.warn(lost, TranslucentWarning, stacklevel=2)
     write_gltf(edited, path_out)
     return sorted(targets)
@@ -246,3 +255,16 @@ def _give(
     extensions.update(made)
     material.setdefault("pbrMetallicRoughness", {})["metallicFactor"] = 0
     material.pop("doubleSided", None)
+
+
+def _give_draft(file: GltfFile, index: int, medium: Medium, draft: Draft) -> None:
+    """State in one material how the medium scatters, by a draft of an extension alone."""
+    material = file.item("materials", index)
+    extensions, made = material["extensions"], draft_extension(medium, draft)
+    if SCATTER in made and DIFFUSE_TRANSMISSION in extensions:
+        asked = f"material {index} {material.get('name', '')!r}"
+        do = "give the object another material, or write the draft 'volume-scatter'"
+        raise InputError(asked, f"{DIFFUSE_TRANSMISSION} excludes {SCATTER}", do)
+    for name in DRAFTS.values():
+        extensions.pop(name, None)
+    extensions.update(made)

@@ -100,6 +100,7 @@ CONSTANTS: dict[str, str] = {
     "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "RECORD_SIZE": "8",  # bodies that a ray can be in
+    "MIRROR_TOLERANCE": "1e-3",  # from a ground to where a rasterizer may see it, as a share of the scene
     "MIRROR_MARGIN": "1e-4",  # from a ground to where its mirrored rays start, as a share of the scene
     "PHOTON_WIDTH": f"{PHOTON_WIDTH}u",
     "SURFACE_OFFSET": "1e-6",  # from a surface to where the next segment of a ray starts, as a share of the scene

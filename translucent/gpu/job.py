@@ -64,6 +64,9 @@ class FrameJob(SceneView):
         Random paths of each pixel that have ended so far.
     averaged : bool
         The averages have all samples: what is drawn now belongs to the pixel centers, but no picture is read of it.
+    photon_light : tuple, optional
+        Light of photons on opaque objects: a texture of the pixels of a larger picture, the number of them to each
+        pixel of the frame along a side, and which of those these are, right and down.
     report : callable
         Takes the share of the frame's samples, or random paths, that is done, now and then.
     corner : (int, int)
@@ -81,6 +84,7 @@ class FrameJob(SceneView):
 
     corner: tuple[int, int] = (0, 0)
     for_map = path_only = projected_depth = False
+    photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(
         self,

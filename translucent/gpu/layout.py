@@ -146,7 +146,7 @@ SHADOWS = UniformBlock(
         ("shadow_extinction", "f4", (4,)),  # of the one medium, where maps hold paths
         ("sky_count", "i4", ()),  # directions of the environment,
         ("sky_first", "i4", ()),  # and those of them that this sample looks at: the first,
-        ("sky_step", "i4", ()),  # and every so-many-th after it
+        ("sky_step", "i4", ()),  # and every so-many-th after it; negative: these stand for all
         ("sky_size", "i4", ()),  # texels along a side of their maps
         ("sky_columns", "i4", ()),  # maps in a row of the atlas
     ),

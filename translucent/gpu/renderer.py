@@ -22,6 +22,7 @@ from translucent.gpu.context import GpuContext, adopt_context, open_context, req
 from translucent.gpu.diffusion import DiffusionCache
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes import PASSES, Pass
+from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.path_trace import PathTracePass, PathTracer
 from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
@@ -152,9 +153,16 @@ class GpuRenderer:
         size: tuple[int, int],
         plan: RenderPlan,
         backdrop: Backdrop | TextureBackdrop | None = None,
+        targets: Targets | None = None,
     ) -> FrameJob:
-        """Prepare the job that `run` needs for a frame, placed for the pixel centers. The caller releases it."""
+        """Prepare the job that `run` needs for a frame, placed for the pixel centers. The caller releases it.
+
+        Without `targets` of its own it is drawn into those of the last frame.
+        """
         self._require_open()
+        scene = shown(scene, plan.given_back).with_ambient_emitted
+        if targets is not None:
+            return FrameJob(self.context.gl, scene, plan, targets, self._resources, backdrop)
         if self._targets is None or self._targets.size != size:
             old, self._targets = self._targets, None
             targets = Targets(self.context.gl, size)
@@ -162,7 +170,6 @@ class GpuRenderer:
                 targets.nothing().use()  # a released framebuffer must not be the bound one
                 old.release()
             self._targets = targets
-        scene = shown(scene, plan.given_back).with_ambient_emitted
         return FrameJob(self.context.gl, scene, plan, self._targets, self._resources, backdrop)
 
     def run(self, job: FrameJob, *, geometry_only: bool = False, leave_out: tuple[PassName, ...] = ()) -> None:
@@ -176,6 +183,13 @@ class GpuRenderer:
         step = self._pass(PathTracePass)
         assert isinstance(step, PathTracePass)
         return step.tracer
+
+    @property
+    def photons(self) -> CausticsPass:
+        """Follower of photons, which `run` takes, too."""
+        step = self._pass(CausticsPass)
+        assert isinstance(step, CausticsPass)
+        return step
 
     def noise(self, job: FrameJob) -> float:
         """Root mean square of the standard error of a job's random paths so far, divided by their mean radiance."""

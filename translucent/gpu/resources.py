@@ -26,9 +26,16 @@ class Resources:
         self.textures = TextureCache(gl)
         self.hierarchies = HierarchyCache(gl)
         self.diffusion = DiffusionCache(gl)
-        self.shadows = ShadowAtlas(gl)
+        self._shadows = ShadowAtlas(gl), ShadowAtlas(gl)
+        #: Photons carry the light that interfaces turn, so that bodies are opaque to lights: their maps are others.
+        self.photons_carry = False
         #: Views from lights, which are the same for frames of all sizes.
         self.light_lists = Storage(gl, "light that media scatter")
+
+    @property
+    def shadows(self) -> ShadowAtlas:
+        """Maps of shadows of the frame that is being drawn."""
+        return self._shadows[self.photons_carry]
 
     def release(self) -> None:
         """Free all caches."""
@@ -39,7 +46,7 @@ class Resources:
             self.textures,
             self.hierarchies,
             self.diffusion,
-            self.shadows,
+            *self._shadows,
             self.light_lists,
         )
         for cache in caches:

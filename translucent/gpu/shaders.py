@@ -76,7 +76,8 @@ def _with_switches(name: str, gathered: Gathered, defines: Mapping[str, int] | N
         raise RenderError(f"shader {name!r}", f"defines {unknown} that it does not ask for", "check the spelling")
     if missing := sorted(gathered.switches - given.keys()):
         raise RenderError(f"shader {name!r}", f"it asks for {missing}, which are not defined", "define them as 0 or 1")
-    head = [f"#version {version} core", *(f"#define {key} {int(value)}" for key, value in given.items())]
+    head = [f"#version {version} core", f"// shaders/{name}"]
+    head += [f"#define {key} {int(value)}" for key, value in given.items()]
     if re.search(r"^\s*precise ", body, re.MULTILINE):
         head += _PRECISE
     return ShaderSource("\n".join([*head, body, ""]), tuple(gathered.files))

@@ -72,7 +72,7 @@ class ShadowView:
 
 
 #: Cameras of a light, and the opaque objects in its way.
-Seen: TypeAlias = tuple[Sequence[Camera], tuple[int, ...]]
+SeenFrom: TypeAlias = tuple[Sequence[Camera], tuple[int, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class ShadowViews:
     extent: tuple[int, int]
 
     @classmethod
-    def of(cls, lights: Sequence[Seen], sky: Sequence[Seen], size: int, limit: int) -> ShadowViews:
+    def of(cls, lights: Sequence[SeenFrom], sky: Sequence[SeenFrom], size: int, limit: int) -> ShadowViews:
         """Places for the maps of cameras, `size` texels wide, or smaller ones where they take more room than there is.
 
         Parameters
@@ -172,8 +172,14 @@ class ShadowViews:
         return self.extent[0] // self.sky[0].size if self.sky else 0
 
 
+def _is_one_medium(media: tuple[bytes | None, ...]) -> bool:
+    """Whether objects have one extinction, which is not 0."""
+    found = {medium for medium in media if medium is not None}
+    return len(found) == 1 and bool(np.frombuffer(found.pop()).any())
+
+
 def _placed(
-    lights: Sequence[Seen], sky: Sequence[Seen], side: int, small: int, columns: int
+    lights: Sequence[SeenFrom], sky: Sequence[SeenFrom], side: int, small: int, columns: int
 ) -> tuple[tuple[tuple[ShadowView, ...], ...], tuple[ShadowView, ...]]:
     across, number, groups = columns // SKY_SHARE, 0, []
     for cameras, opaque in lights:
@@ -193,13 +199,40 @@ def _placed(
     )
 
 
+@dataclass(frozen=True)
+class Seen:
+    """Key of the maps: equal for frames in which lights see the same.
+
+    Attributes
+    ----------
+    places : tuple
+        What decides where light goes.
+    media : tuple of bytes or None
+        Extinction in each object.
+    step : int
+        There are maps of every so-many-th direction of the environment.
+    """
+
+    places: tuple[object, ...]
+    media: tuple[bytes | None, ...]
+    step: int = 1
+
+    def fits(self, other: Seen, *, path_only: bool) -> bool:
+        """Whether maps of this are those of another; of one medium they are paths, whatever it absorbs."""
+        if self.places != other.places or self.media == other.media:
+            return self.places == other.places
+        return path_only and all(_is_one_medium(seen.media) for seen in (self, other))
+
+
 class ShadowAtlas:
     """Textures with all maps: what rays of lights go through, and where each meets the first opaque surface.
 
     Attributes
     ----------
-    held : object
+    held : Seen, optional
         Key of what the textures hold.
+    drawn : set of ShadowView
+        Maps that are there already.
     views : ShadowViews, optional
         Places of the maps.
     spectral : bool
@@ -211,7 +244,8 @@ class ShadowAtlas:
         self._gl = gl
         self._framebuffers: tuple[moderngl.Framebuffer, ...] = ()
         self._made_of: tuple[tuple[int, int], int] | None = None
-        self.held: object = None
+        self.held: Seen | None = None
+        self.drawn: set[ShadowView] = set()
         self.views: ShadowViews | None = None
         self.spectral = False
 
@@ -224,6 +258,7 @@ class ShadowAtlas:
             If OpenGL has no room.
         """
         self.held = None
+        self.drawn.clear()
         components = 4 if spectral else 2 if any(view.ends for view in views) else 1
         if self._made_of != (views.extent, components):
             self.release()

@@ -46,13 +46,13 @@ class UniformBuffers:
         self._content = np.zeros((len(records), _STRIDE), np.uint8)
         self._records = self._content[:, : BODY.dtype.itemsize].view(BODY.dtype)[:, 0]
         self._records[:] = records
-        self._bodies = gl.buffer(reserve=self._content.nbytes)
+        self.bodies = gl.buffer(reserve=self._content.nbytes)
         self._constant = {block: gl.buffer(content) for block, content in contents.items()}
 
     def place(self, view: SampleView) -> None:
         """Write and bind the uniforms for some sample points."""
         self._records["clip_from_offset"] = clip_rows(self._placed, view)
-        self._bodies.write(self._content)
+        self.bodies.write(self._content)
         self._view.write(view_uniforms(view, self._placed))
         self.bind()
 
@@ -70,9 +70,9 @@ class UniformBuffers:
 
     def bind_body(self, number: int) -> None:
         """Bind the uniforms of one object for the next draw."""
-        self._bodies.bind_to_uniform_block(BODY.binding, offset=number * _STRIDE, size=BODY.dtype.itemsize)
+        self.bodies.bind_to_uniform_block(BODY.binding, offset=number * _STRIDE, size=BODY.dtype.itemsize)
 
     def release(self) -> None:
         """Free the buffers."""
-        for buffer in (self._view, self._bodies, *self._constant.values()):
+        for buffer in (self._view, self.bodies, *self._constant.values()):
             buffer.release()

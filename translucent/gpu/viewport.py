@@ -22,10 +22,9 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.strides import STRIDES, phases, shifts
+from translucent.gpu.viewport_side import Side, Size
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.scene import Scene
-
-Size = tuple[int, int]
 
 #: Samples of a pixel after which its edges are smooth.
 SAMPLES = 16
@@ -77,43 +76,6 @@ class Probe:
     valid: bool
 
 
-class _Side:
-    """Accumulated samples of one side of the comparison: radiance, optical depth and thickness, flags."""
-
-    def __init__(self, gl: moderngl.Context, size: Size) -> None:
-        self.size = size
-        try:
-            self.textures = [gl.texture(size, count, dtype="f4") for count in (4, 4, 1)]
-            for texture in self.textures:
-                texture.filter = moderngl.NEAREST, moderngl.NEAREST
-            self.all = gl.framebuffer(self.textures)
-            self.light = gl.framebuffer(self.textures[:1])
-        except moderngl.Error as error:
-            found = f"OpenGL has no room for it ({error})"
-            raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
-        self.step, self.stride = 0, 1
-
-    def known(self) -> list[int]:
-        """Drawn phase, of the stride x stride ones, that stands in for each phase; 0 for the rest."""
-        order = phases(self.stride)
-        found = [0] * STRIDES[-1] ** 2
-        for (x, y), block in order[: max(self.step, 1)]:
-            for i in range(x, x + block):
-                for j in range(y, y + block):
-                    found[i + self.stride * j] = x + self.stride * y
-        return found
-
-    def kept(self, x: int, y: int) -> Size:
-        """Position at which pixel (x, y) is kept, once all of them are drawn."""
-        part = self.size[0] // self.stride, self.size[1] // self.stride
-        return x % self.stride * part[0] + x // self.stride, y % self.stride * part[1] + y // self.stride
-
-    def release(self) -> None:
-        """Free the textures."""
-        for resource in (self.all, self.light, *self.textures):
-            resource.release()
-
-
 class Viewport:
     """Progressive picture of a window, in a texture, with a second frame beside it to compare.
 
@@ -142,7 +104,7 @@ class Viewport:
         # moderngl goes back to the framebuffer in use whenever it makes another one, and fails if that is gone. So
         # before any is released, ours or the engine's, this one is put to use.
         self._rest = gl.framebuffer([gl.texture((1, 1), 1)])
-        self._sides: list[_Side | None] = [None, None]
+        self._sides: list[Side | None] = [None, None]
         self._screen: moderngl.Framebuffer | None = None
         self._coarse: moderngl.Framebuffer | None = None
         self._at_once = False
@@ -220,14 +182,36 @@ class Viewport:
         self._release_pictures()
         self._screen, self.size = screen, size
 
-    def restart(self) -> None:
-        """Begin anew, with another scene or other settings."""
-        for side in self._sides:
-            if side is not None:
+    def restart(self, *numbers: int) -> None:
+        """Begin anew, with another scene or other settings: both sides, or that of a number."""
+        for number in numbers or (0, 1):
+            if (side := self._sides[number]) is not None:
                 side.step = 0
 
-    def step(self, side: int, scene: Scene, plan: RenderPlan, stride: int, samples: int = SAMPLES) -> None:
-        """Draw the next sample of a side, of `samples` a pixel besides its center; a picture has one stride."""
+    def swap(self) -> None:
+        """Swap the sides: what the second has been drawn for takes the place of the first."""
+        self._sides.reverse()
+
+    def mean_radiance(self) -> float:
+        """Mean radiance of the first side, whose pixels are all there; waits for it."""
+        side = self._side(0, self.size)
+        values = np.frombuffer(side.light.read(components=4, dtype="f4"), np.float32).reshape(-1, 4)
+        with np.errstate(under="ignore"):
+            return float((values[:, :3].mean(axis=1, dtype=np.float64) / np.maximum(values[:, 3], 1.0)).mean())
+
+    def step(
+        self,
+        side: int,
+        scene: Scene,
+        plan: RenderPlan,
+        stride: int,
+        samples: int = SAMPLES,
+        photons: moderngl.Texture | None = None,
+    ) -> None:
+        """Draw the next sample of a side, of `samples` a pixel besides its center; a picture has one stride.
+
+        Light of `photons`, as a picture of the viewport's size has it, takes the place of those of a plan.
+        """
         chosen = self._side(side, self.size)
         chosen.stride = stride
         round_, number = divmod(chosen.step, stride * stride)
@@ -236,6 +220,8 @@ class Viewport:
         self._rest.use()
         engine, size = self.engine, (self.size[0] // stride, self.size[1] // stride)
         job = engine.prepare(scene, size, plan)
+        if photons is not None:
+            job.photon_light = photons, stride, phase
         try:
             job.place(((phase[0] + 0.5 + right) / stride - 0.5, (phase[1] + 0.5 + down) / stride - 0.5))
             engine.run(job)
@@ -366,17 +352,17 @@ class Viewport:
         picture.color_attachments[0].release()
         picture.release()
 
-    def _side(self, number: int, size: Size) -> _Side:
+    def _side(self, number: int, size: Size) -> Side:
         side = self._sides[number]
         if side is None or side.size != size:
             self._rest.use()
             if side is not None:
                 side.release()
                 self._sides[number] = None
-            side = self._sides[number] = _Side(self._gl, size)
+            side = self._sides[number] = Side(self._gl, size)
         return side
 
-    def _add(self, job: FrameJob, side: _Side, origin: Size, *, first: bool) -> None:
+    def _add(self, job: FrameJob, side: Side, origin: Size, *, first: bool) -> None:
         """Store the frame of a job: in place of the last one, or added to its radiance."""
         result = job.targets.result()
         radiance = job.picture.color_attachments[0]

@@ -1,4 +1,4 @@
-"""Blender's volume nodes: Volume Absorption and Principled Volume.
+"""Blender: a material of Glass BSDF and a volume, Volume Absorption or Principled Volume; written and read.
 
 Their colors are **not** colors at a distance. Volume Absorption has sigma_a = (1 - Color) Density, which is not
 -ln(Color) Density: with Color 0.5 and Density 1 it lets exp(-0.5) = 0.61 pass after one unit, not 0.5. So a color that
@@ -10,10 +10,12 @@ Principled Volume: sigma_s = Color Density; sigma_a = (1 - Color) (1 - sqrt(Abso
 Strength times Emission Color; Anisotropy = g.
 Inverted: Density is the largest channel of sigma_a (absorption) or of sigma_t (principled), the smallest for which all
 colors are in 0..1. Colors are linear, as sockets store them.
-Source: Blender manual, Volume Absorption, Principled Volume and "Volume Coefficients". The tests render the snippet in
-Cycles where Blender is installed.
+The surface is a white Glass BSDF with the IOR and the Roughness, the square root of the GGX alpha as here; none where
+the index is 1 and nothing is rough, since light then enters as it comes.
+Source: Blender manual, Glass BSDF, Volume Absorption, Principled Volume and "Volume Coefficients". The tests render the
+snippet in Cycles where Blender is installed.
 
-Not carried over: index of refraction, which belongs to a surface shader; heterogeneous density.
+Not carried over: heterogeneous density.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
+from translucent.materials.snippet import stated
 from translucent.media.medium import Medium
 
 
@@ -75,8 +78,8 @@ def _density(value: float) -> float:
     return float(value)
 
 
-def blender_snippet(medium: Medium, name: str = "translucent") -> str:
-    """Python for Blender's text editor that makes a material with this volume; scene unit: metre."""
+def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translucent") -> str:
+    """Python for Blender's text editor that makes a material with this surface and volume; scene unit: metre."""
     if medium.scatters or medium.emits:
         color, absorption, density = principled_node(medium)
         emission = np.asarray(medium.emission)
@@ -107,7 +110,31 @@ def blender_snippet(medium: Medium, name: str = "translucent") -> str:
         *(f'volume.inputs["{socket}"].default_value = {value}' for socket, value in sockets.items()),
         'links.new(volume.outputs["Volume"], output.inputs["Volume"])',
     ]
+    if medium.ior > 1.0 or roughness > 0.0:
+        lines += [
+            'surface = nodes.new("ShaderNodeBsdfGlass")',
+            'surface.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)',
+            f'surface.inputs["IOR"].default_value = {float(medium.ior)!r}',
+            f'surface.inputs["Roughness"].default_value = {roughness!r}',
+            'links.new(surface.outputs["BSDF"], output.inputs["Surface"])',
+        ]
     return "\n".join(lines) + "\n"
+
+
+def read_blender(text: str) -> Medium:
+    """Read the medium of such a snippet, which is not run; raises `InputError` if it is none."""
+
+    def socket(node: str, name: str, count: int = 1, default: float | None = None) -> Array:
+        return stated("Blender material", text, f'{node}.inputs["{name}"].default_value', count, default)
+
+    ior, density = float(socket("surface", "IOR", default=1.0)[0]), float(socket("volume", "Density")[0])
+    color = socket("volume", "Color", 3)
+    if "ShaderNodeVolumePrincipled" not in text:
+        return Medium(absorption=from_absorption_node(color, density).absorption, ior=ior)
+    anisotropy = float(socket("volume", "Anisotropy", default=0.0)[0])
+    found = from_principled_node(color, socket("volume", "Absorption Color", 3), density, anisotropy)
+    emission = socket("volume", "Emission Strength", default=0.0) * socket("volume", "Emission Color", 3, 1.0)
+    return Medium(found.absorption, found.scattering, emission, anisotropy, ior)
 
 
 def _rgba(color: Array) -> str:

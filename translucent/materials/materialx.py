@@ -62,10 +62,11 @@ class Shader:
     depth: str = "transmission_depth"
     scatter: str = "transmission_scatter"
     anisotropy: str = "transmission_scatter_anisotropy"
+    roughness: str = "specular_roughness"
     last_version: tuple[int, int] | None = None
 
     def defaults(self) -> dict[str, float | Array]:
-        """Default values of inputs, which also give the types of the inputs."""
+        """Default values of the inputs that are read, which also give the types of the inputs."""
         return {
             self.weight: 0.0,
             self.color: np.ones(3),
@@ -77,7 +78,7 @@ class Shader:
 
 
 def transmission_inputs(
-    shader: Shader, medium: Medium, distance: float | None = None, unit: str = "m"
+    shader: Shader, medium: Medium, distance: float | None = None, unit: str = "m", roughness: float = 0.0
 ) -> dict[str, float | Array]:
     """Values of a shader's inputs that hold this medium; depth 0 for one without extinction.
 
@@ -89,6 +90,8 @@ def transmission_inputs(
         Where the color is stated, in metres; see `color_at`. Shortened where the scatter color would exceed 1.
     unit : str
         Unit of the scene's lengths.
+    roughness : float
+        Of the surface, 0 to 1.
     """
     strongest = float(np.max(medium.scattering))
     color, metres = color_at(medium, distance)
@@ -102,14 +105,17 @@ def transmission_inputs(
         shader.scatter: np.asarray(medium.scattering) * depth,
         shader.anisotropy: medium.anisotropy,
         shader.ior: medium.ior,
+        shader.roughness: float(roughness),
     }
 
 
-def write_shader(shader: Shader, medium: Medium, distance: float | None, name: str, unit: str) -> str:
+def write_shader(
+    shader: Shader, medium: Medium, distance: float | None, name: str, unit: str, roughness: float = 0.0
+) -> str:
     """Write a MaterialX 1.39 document with one material."""
     root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
     surface = ElementTree.SubElement(root, shader.node, name=f"{name}_surface", type="surfaceshader")
-    for key, value in transmission_inputs(shader, medium, distance, unit).items():
+    for key, value in transmission_inputs(shader, medium, distance, unit, roughness).items():
         scalar = isinstance(value, float)
         text = f"{value!r}" if scalar else ", ".join(repr(channel) for channel in np.asarray(value).tolist())
         ElementTree.SubElement(surface, "input", name=key, type="float" if scalar else "color3", value=text)

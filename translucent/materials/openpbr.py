@@ -1,7 +1,8 @@
 """OpenPBR Surface 1.1 as a MaterialX document (``open_pbr_surface``), written and read.
 
 Inputs: transmission_weight 1, transmission_color, transmission_depth, transmission_scatter,
-transmission_scatter_anisotropy, specular_ior. Semantics, formulas, source, losses: `translucent.materials.materialx`.
+transmission_scatter_anisotropy, specular_ior, specular_roughness.
+Semantics, formulas, source, losses: `translucent.materials.materialx`.
 A depth of 0 makes the color a tint of the surface: it is read as a medium without extinction.
 """
 
@@ -15,7 +16,9 @@ SHADER = Shader(
 )
 
 
-def write_openpbr(medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m") -> str:
+def write_openpbr(
+    medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m", roughness: float = 0.0
+) -> str:
     """Write a MaterialX document with an OpenPBR surface around this medium.
 
     Parameters
@@ -28,8 +31,10 @@ def write_openpbr(medium: Medium, distance: float | None = None, name: str = "tr
         Name of the material, letters, digits and underscores.
     unit : str
         Unit of the scene's lengths, for the depth.
+    roughness : float
+        Of the surface, 0 to 1; it is not read.
     """
-    return write_shader(SHADER, medium, distance, name, unit)
+    return write_shader(SHADER, medium, distance, name, unit, roughness)
 
 
 def read_openpbr(text: str, unit: str = "m") -> Medium:

@@ -1,7 +1,7 @@
 """Autodesk Standard Surface 1.0.1 as a MaterialX document (``standard_surface``), written and read.
 
 Inputs: transmission 1, transmission_color, transmission_depth, transmission_scatter, transmission_scatter_anisotropy,
-specular_IOR. Semantics, formulas, source and losses: `translucent.materials.materialx`.
+specular_IOR, specular_roughness. Semantics, formulas, source and losses: `translucent.materials.materialx`.
 A depth of 0 makes the color a tint of the surface: it is read as a medium without extinction.
 """
 
@@ -14,10 +14,10 @@ SHADER = Shader("standard_surface", weight="transmission", ior="specular_IOR", t
 
 
 def write_standard_surface(
-    medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m"
+    medium: Medium, distance: float | None = None, name: str = "translucent", unit: str = "m", roughness: float = 0.0
 ) -> str:
     """Write a MaterialX document with a Standard Surface around this medium; parameters as in `write_openpbr`."""
-    return write_shader(SHADER, medium, distance, name, unit)
+    return write_shader(SHADER, medium, distance, name, unit, roughness)
 
 
 def read_standard_surface(text: str, unit: str = "m") -> Medium:

@@ -46,10 +46,10 @@ _TOKENS = re.compile(
 _MAX_DEPTH = 100
 
 
-def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent") -> str:
+def usda_text(medium: Medium, distance: float | None = None, name: str = "translucent", roughness: float = 0.0) -> str:
     """Write a .usda layer with one material; the color is stated at `distance` in metres, see `color_at`."""
     lines = []
-    for key, value in transmission_inputs(SHADER, medium, distance).items():
+    for key, value in transmission_inputs(SHADER, medium, distance, roughness=roughness).items():
         if isinstance(value, float):
             lines.append(f"        float inputs:{key} = {value!r}")
         else:

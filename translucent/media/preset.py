@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from translucent.arrays import Array
+from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
 from translucent.media.medium import Medium
+from translucent.media.swatches import html_swatches
 
 Kind = Literal["measured", "estimated"]
 Regime = Literal["absorbing", "single scattering", "scattering dominated"]
@@ -26,6 +29,10 @@ PAPERS = {
 
 #: Distances in m at which colors are listed.
 COLOR_DISTANCES = {"1 mm": 1e-3, "1 cm": 1e-2, "10 cm": 1e-1}
+
+#: Thicknesses in m of slabs on a card, and the cards with their reflectance.
+SLABS = {"1 mm": 1e-3, "5 mm": 5e-3, "20 mm": 2e-2}
+CARDS = {"white": 1.0, "black": 0.0}
 
 #: Size in m of the body of `Preset.regime`.
 BODY_SIZE = 1e-2
@@ -74,8 +81,13 @@ class Preset:
     roughness: float = 0.0
 
     def _repr_html_(self) -> str:
-        """Name and swatches, for notebooks."""
-        return f"<div>{self.name} ({self.kind})</div>{self.medium._repr_html_()}"
+        """Name and swatches, for notebooks: of light that passes, and of slabs on a white and a black card."""
+        slabs = [
+            (color, f"{thickness} on {card}")
+            for card, row in zip(CARDS, self.slab_reflectance, strict=True)
+            for thickness, color in zip(SLABS, row, strict=True)
+        ]
+        return f"<div>{self.name} ({self.kind})</div>{self.medium._repr_html_()}{html_swatches(slabs)}"
 
     @property
     def absorption(self) -> Array:
@@ -127,6 +139,16 @@ class Preset:
         return diffuse_interface(ior).entering * np.array(given_back)
 
     @property
+    def slab_reflectance(self) -> Array:
+        """(2, 3, 3): what slabs of 1, 5 and 20 mm on a white and a black card (`CARDS`) send back of white light.
+
+        From all sides to all sides, polished, without the mirror image, the card below in optical contact: as paint on
+        a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients.
+        """
+        reduced = self.absorption + self.reduced_scattering
+        return _on_cards(*(tuple(v.tolist()) for v in (self.reduced_albedo, reduced)), self.medium.ior)
+
+    @property
     def regime(self) -> Regime:
         """Regime of light transport in a body of 1 cm (`BODY_SIZE`); the channel that scatters most decides.
 
@@ -165,6 +187,13 @@ class Preset:
         """Hex color of a thick slab in white light, `diffuse_reflectance`; empty for media that do not scatter."""
         return _hex(self.diffuse_reflectance) if self.medium.scatters else ""
 
+    def slab_colors(self) -> dict[str, dict[str, str]]:
+        """Hex colors of slabs of 1, 5 and 20 mm on a white and a black card, `slab_reflectance`."""
+        return {
+            card: dict(zip(SLABS, map(_hex, row), strict=True))
+            for card, row in zip(CARDS, self.slab_reflectance, strict=True)
+        }
+
     def absorption_colors(self) -> dict[str, str]:
         """Hex colors as in `colors`, of absorption alone."""
         absorbing = Medium(absorption=self.absorption)
@@ -197,7 +226,17 @@ class Preset:
             "absorption_colors": self.absorption_colors(),
             "diffuse_reflectance": self.diffuse_reflectance.tolist(),
             "diffuse_color": self.diffuse_color() or None,
+            "slab_colors": self.slab_colors(),
         }
+
+
+@lru_cache(maxsize=256)
+def _on_cards(albedo: Triple, extinction: Triple, ior: float) -> Array:
+    depth = np.array(list(SLABS.values()))[:, None] * extinction
+    card = np.array(list(CARDS.values()))[:, None, None]
+    found = reflectance_on_card(np.minimum(albedo, 1.0), depth, ior, card)
+    found.setflags(write=False)
+    return found
 
 
 def _reciprocal(values: Array) -> Array:

@@ -48,6 +48,9 @@ class NoteKind(StrEnum):
     INVISIBLE = "invisible"
     UNUSED_PRIORITIES = "unused priorities"
 
+    # What a page in a browser does with a scene.
+    MANY_TRIANGLES = "many triangles"
+
 
 class Note(str):
     """Note of a plan: a string with a kind, by which programs know it.

@@ -31,14 +31,18 @@ class ShadowMaps:
     size : int
         Texels along a side of each light's map, 64 to 8192. Those of directions of the environment
         (`Scene.environment_shadows`) have a quarter of it.
+    directions : int, optional
+        Of the environment, that a pixel looks into at most: for pictures that move. Shadows are the rougher for it,
+        and as bright. None: all.
 
     Raises
     ------
     InputError
-        If the size is not a whole number in this range.
+        If the size is not a whole number in this range, or the directions are not at least 1.
     """
 
     size: int = 1024
+    directions: int | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.size, bool) or not isinstance(self.size, int) or not LEAST_SIZE <= self.size <= MOST_SIZE:
@@ -47,6 +51,8 @@ class ShadowMaps:
                 f"not a whole number in {LEAST_SIZE} to {MOST_SIZE}",
                 "give for example 1024",
             )
+        if self.directions is not None and not (isinstance(self.directions, int) and self.directions >= 1):
+            raise InputError(f"ShadowMaps directions {self.directions!r}", "not a number of them", "give for example 8")
 
 
 def check_shadows(shadows: object) -> None:

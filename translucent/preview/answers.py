@@ -7,12 +7,16 @@ from pathlib import Path
 from translucent.errors import InputError
 from translucent.gltf.load import SUFFIXES
 from translucent.gltf.write import write_medium
+from translucent.planning.caustics import Caustics
 from translucent.preview.actions import Change
 from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
 from translucent.preview.exports import write_picture, write_turntable
+from translucent.preview.recipes import Shot, command_line, python_code
 from translucent.preview.scenes import medium_of, method_of, scattering_of
+from translucent.preview.staging import tone_of
+from translucent.scene.scene import Scene
 
 
 def take_answers(desk: Desk) -> None:
@@ -51,15 +55,51 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
 
 
 def _export(desk: Desk, kind: str, path: str) -> None:
-    scene, document = desk.work.scene(), desk.work.document
+    scene, document = desk.work.picture(), desk.work.document
     if scene is None:
         return
     method, size = method_of(document.display.method, document.material), desk.stage.viewport.size
-    look, scattering = (document.look.exposure, document.look.tone), scattering_of(document.display.scattering)
+    look = document.look.exposure, tone_of(document.look, scene)
+    ways = scattering_of(document.display.scattering), caustics_of(desk, scene)
     if kind == "turntable":
-        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], scattering)
+        desk.work.export(path, write_turntable, scene, method, size, look, desk.export["pictures"], *ways)
     else:
-        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"], scattering)
+        desk.work.export(path, write_picture, scene, method, size, look, desk.export["transparent"], *ways)
+
+
+def recipe(desk: Desk, kind: str) -> str | None:
+    """Text of a command, or of ``python``, that makes the picture from here; None before there is one."""
+    work = desk.work
+    if (scene := work.picture()) is None or work.loaded is None:
+        return None
+    if work.shown_bake is not None:
+        work.refuse(InputError("a recipe", "the model is painted with a map", "clear 'show on the model' first"))
+        return None
+    shot = Shot(work.document, work.loaded, scene, desk.stage.viewport.size, caustics_of(desk, scene))
+    if kind == "python":
+        work.tell("info", "copied as Python")
+        return python_code(shot)
+    text, left_out = command_line(shot)
+    if left_out:
+        work.tell("warning", f"no option of the copied command says: {', '.join(left_out)}; Python does")
+    else:
+        work.tell("info", "copied as a command")
+    return text
+
+
+def caustics_of(desk: Desk, scene: Scene) -> Caustics | None:
+    """Photons of a file: as many as the picture on show has, and what ``translucent render`` follows at least."""
+    document = desk.work.document
+    if not document.display.caustics:
+        return None
+    light, method = desk.stage.photons.light, method_of(document.display.method, document.material)
+    caustics = Caustics(max(light.photons if light is not None else 0, Caustics().photons))
+    try:
+        desk.stage.renderer.plan(scene, method, caustics=caustics)
+    except InputError as error:
+        desk.work.tell("warning", f"without caustics: {error}")
+        return None
+    return caustics
 
 
 def _save_medium(desk: Desk, path: str) -> None:

@@ -250,7 +250,7 @@ class _Window:
         from translucent.gpu.context import open_context
         from translucent.preview.desk import Desk
         from translucent.preview.dialogs import accept_drops
-        from translucent.preview.recent import read_recent
+        from translucent.preview.preferences import read_recent
         from translucent.preview.stage import Stage
 
         implot.create_context()
@@ -268,10 +268,11 @@ class _Window:
     def _closed(self) -> None:
         from imgui_bundle import implot
 
-        from translucent.preview.recent import write_recent
+        from translucent.preview.preferences import write_recent, write_stage
 
         if self.script is None:
             write_recent(self.work.recent)
+            write_stage(self.work.document.look.stage)
         if self.desk is not None:
             self.desk.stage.close()
             self.desk = None

@@ -25,6 +25,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
 from translucent.gpu.ledger import Ledger, ProgramName
+from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.viewport import MODES, RIGHT_SIDES, Shown, Viewport
 from translucent.planning.passes import PassName
@@ -47,6 +48,9 @@ SIDES = {True: 64, False: 60}
 
 #: Largest number of triangles whose normals are made without the worker process.
 SMOOTHED_AT_ONCE = 50_000
+
+#: Largest number of directions of the environment that throw shadows.
+SHADOWS = 16
 
 #: Number of nested boxes that stand in for a mesh: rays then cross as many layers as methods can tell apart.
 BOXES = 4
@@ -176,12 +180,26 @@ def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], de
             for number, plan in enumerate(plans):
                 report(number / len(plans), str(plan.method))
                 engine.draw(scene, picture, plan, 0.0, "none")
+                if plan.caustics is not None:
+                    _light_by_photons(engine, scene, plan)
         except TranslucentError as error:
             trouble = str(error)
         finally:
             gl.finish()
             picture.release()
     return Compiled(frozenset(ledger.needed), trouble)
+
+
+def _light_by_photons(engine: GpuRenderer, scene: Scene, plan: RenderPlan) -> None:
+    """Draw a picture by photons that have been followed before."""
+    viewport = Viewport(engine)
+    viewport.resize(FRAME)
+    light = PhotonLight(engine, scene, viewport.size, plan)
+    light.step(0.0)
+    light.show()
+    viewport.step(0, scene, plan, 1, photons=light.texture)
+    light.release()
+    viewport.release()
 
 
 def show_frames(report: Report, scene: Scene, plan: RenderPlan, device: str) -> None:
@@ -228,12 +246,15 @@ def stand_in(scene: Scene) -> Scene:
         scene,
         objects=[_object_like(item) for item in scene.objects],
         environment=_environment_like(scene.environment),
+        environment_shadows=min(scene.environment_shadows, SHADOWS),
     )
 
 
 def _object_like(item: Object) -> Object:
     surface = None if item.surface is None else _surface_like(item.surface)
-    return dataclasses.replace(item, mesh=_boxes(item.mesh), surface=surface)
+    # What is as flat as a ground takes part in shadows in another way than boxes.
+    simple = item.medium is None and len(item.mesh.faces) <= len(Box().tessellate().faces)
+    return dataclasses.replace(item, mesh=item.mesh if simple else _boxes(item.mesh), surface=surface)
 
 
 def _boxes(mesh: Mesh) -> Mesh:

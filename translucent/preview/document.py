@@ -17,6 +17,7 @@ from translucent.scene.camera import MAX_COORDINATE
 from translucent.scene.environment import MAX_EXPOSURE
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.showcase import DEFAULT_COLOR
+from translucent.scene.stages import NO_STAGE, STAGES
 from translucent.scene.surface import MAX_DISPERSION
 from translucent.units import METRES_PER_UNIT
 
@@ -25,8 +26,12 @@ Source = Literal["file", "color", "preset", "coefficients"]
 Mode = Literal["picture", "thickness", "transmittance", "validity"]
 Compare = Literal["off", "method", "reference", "error"]
 
-#: Name of the method, and of the way of scattering, that leaves the choice to the planner.
+#: Name of the method, of the way of scattering, of the stage and of the tone curve that leaves the choice to what
+#: ``translucent render`` picks.
 AUTO = "auto"
+
+#: Names of stages.
+STAGE_WORDS = (AUTO, NO_STAGE, *STAGES)
 
 #: Units of length that panels offer.
 SHOWN_UNITS = ("mm", "cm", "m", "in")
@@ -85,26 +90,30 @@ class Material:
 
 @dataclass(frozen=True)
 class Look:
-    """Look: lights, background, exposure and tone curve.
+    """Look: stage, lights, background, exposure and tone curve.
 
     Attributes
     ----------
+    stage : str
+        What the model stands on and before: ``auto``, ``none``, or a name of `STAGES`.
     environment, background : str
         As ``translucent render`` takes them; no background: the environment itself. No environment: the scene's own.
     rotation : float
-        Of the environment about +Y, in degrees.
+        Of the environment about +Y, in degrees; of a stage, with its lights.
     exposure : float
         Stops.
-    tone : {"none", "neutral", "agx"}
+    tone : {"auto", "none", "neutral", "agx"}
+        By itself neutral on a stage, else none.
     light : bool
         A directional light besides, from `light_yaw` and `light_pitch` (degrees) with `light_irradiance` (W/m^2).
     """
 
+    stage: str = NO_STAGE
     environment: str = ""
     background: str = ""
     rotation: float = 0.0
     exposure: float = 0.0
-    tone: str = "none"
+    tone: str = AUTO
     light: bool = False
     light_yaw: float = 45.0
     light_pitch: float = 45.0
@@ -132,6 +141,8 @@ class Display:
         Refine the edges while the view is still.
     converge : bool
         Path trace the picture while the view is still.
+    caustics : bool
+        Add the light of photons from lamps to the picture while the view is still.
     unit : str
         In which lengths are shown.
     """
@@ -145,12 +156,23 @@ class Display:
     inset: bool = True
     antialias: bool = True
     converge: bool = False
+    caustics: bool = False
     unit: str = "mm"
 
     @property
     def converges(self) -> bool:
         """Whether a still picture is path traced: there is one, and nothing beside it."""
         return self.converge and self.mode == "picture" and self.compare == "off"
+
+    @property
+    def follows_photons(self) -> bool:
+        """Whether photons light a still picture: one alone that is not path traced."""
+        return self.caustics and self.mode == "picture" and self.compare == "off" and not self.converge
+
+    @property
+    def pictured(self) -> bool:
+        """Whether pictures are on show, and neither quantities nor the reference, which are of the model alone."""
+        return self.mode == "picture" and self.compare in ("off", "method")
 
 
 @dataclass(frozen=True)
@@ -219,9 +241,10 @@ RANGES: dict[str, _Range] = {
     "material.transmission": _Range(0.0, 1.0),
     "material.dispersion": _Range(0.0, MAX_DISPERSION),
     "material.thickness": _POSITIVE,
+    "look.stage": _Range(words=STAGE_WORDS),
     "look.rotation": _Range(-1e6, 1e6),
     "look.exposure": _Range(-MAX_EXPOSURE, MAX_EXPOSURE),
-    "look.tone": _Range(words=TONES),
+    "look.tone": _Range(words=(AUTO, *TONES)),
     "look.light_yaw": _Range(-1e6, 1e6),
     "look.light_pitch": _Range(-MAX_PITCH, MAX_PITCH),
     "look.light_irradiance": _Range(0.0, MAX_RADIANCE),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.frames.animation import check_animation, write_animation
 from translucent.frames.writing import SUFFIXES, check_output
+from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method
 from translucent.planning.scattering import Scattering
 from translucent.preview.tasks import Report
@@ -49,11 +50,13 @@ def write_picture(
     look: Look = (0.0, "none"),
     transparent: bool = False,
     scattering: Scattering | None = None,
+    caustics: Caustics | None = None,
 ) -> None:
     """Write a .png, or an .exr with all quantities; transparent, it lacks what is seen beside and behind the bodies."""
     report(None, "drawing")
     with Renderer() as renderer:
-        frame = renderer.render(scene, size, method, samples=16, transparent=transparent, scattering=scattering)
+        ways: dict[str, Any] = {"scattering": scattering, "caustics": caustics}
+        frame = renderer.render(scene, size, method, samples=16, transparent=transparent, **ways)
     report(None, "writing")
     frame.save(path, *look)
 
@@ -67,6 +70,7 @@ def write_turntable(
     look: Look = (0.0, "none"),
     count: int = 48,
     scattering: Scattering | None = None,
+    caustics: Caustics | None = None,
 ) -> None:
     """Write an animation of the model from all around."""
     with Renderer() as renderer:
@@ -74,6 +78,7 @@ def write_turntable(
         def pictures() -> Iterator[npt.NDArray[np.uint8]]:
             for i, seen in enumerate(turntable(scene, count)):
                 report(i / count, f"picture {i + 1} of {count}")
-                yield renderer.render(seen, size, method, samples=4, scattering=scattering).to_srgb8(*look)
+                frame = renderer.render(seen, size, method, samples=4, scattering=scattering, caustics=caustics)
+                yield frame.to_srgb8(*look)
 
         write_animation(Path(path), pictures(), FPS)

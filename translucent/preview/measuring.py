@@ -139,8 +139,11 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
 
 
 def straight(scene: Scene) -> Scene:
-    """Scene without the optical effects of interfaces, so that every method and the reference see the same rays."""
-    return dataclasses.replace(scene, objects=[_index_matched(item) for item in scene.objects])
+    """Scene without the optical effects of interfaces, so that every method and the reference see the same rays.
+
+    The ground of a stage is left out, too: it ends no ray that it does not shadow, and shadows take the reference long.
+    """
+    return dataclasses.replace(scene, objects=[_index_matched(item) for item in scene.shown], environment_shadows=0)
 
 
 def _index_matched(item: Object) -> Object:

@@ -18,8 +18,9 @@ HELP = (
     ("F", "frame the model, or what was clicked"),
     ("O", "orthographic or perspective"),
     ("C", "converge: path trace the still picture"),
+    ("P", "photons: caustics in the still picture"),
     ("L drag", "move the light"),
-    ("E drag", "turn the environment"),
+    ("E drag", "turn the environment, or the stage with its lamps"),
     ("Ctrl Z, Ctrl Y", "undo, redo"),
     ("Ctrl O", "open"),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -17,26 +17,15 @@ from translucent.media.medium import Medium
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
 from translucent.preview.document import AUTO, Document, Look, Material, Model
+from translucent.preview.loaded import Loaded
 from translucent.preview.orbiting import camera_of
+from translucent.preview.staging import environment_of, stage_name, standing
 from translucent.scene.environment import Environment
 from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Object, Scene
-from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable, named_environment
+from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable
+from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """Loaded model: its scene, and the material that its bodies came with."""
-
-    model: Model
-    scene: Scene
-    material: Material
-
-    @property
-    def triangles(self) -> int:
-        """Number of triangles that are drawn."""
-        return sum(len(item.mesh.faces) for item in self.scene.objects)
 
 
 def load(model: Model, allow_outside: bool = False) -> Loaded:
@@ -113,11 +102,17 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         raise InputError("a picture", "nobody has framed the model", "frame it first")
     scene, look = loaded.scene, document.look
     light = _light(look.light_yaw, look.light_pitch, look.light_irradiance) if look.light else None
+    objects, camera = _objects(document.material, scene), camera_of(document.orbit)
+    if (name := stage_name(look, loaded)) != NO_STAGE and document.display.pictured:
+        on = standing(loaded, name, look.environment, look.background, look.rotation)
+        ground = tuple(item for item in on.objects if item.shadow_catcher)
+        lights = on.lights if light is None else (*on.lights, light)
+        return dataclasses.replace(on, objects=(*objects, *ground), camera=camera, lights=lights)
     lights = scene.lights if light is None else (*scene.lights, light)
     return dataclasses.replace(
         scene,
-        objects=_objects(document.material, scene),
-        camera=camera_of(document.orbit),
+        objects=objects,
+        camera=camera,
         lights=lights,
         environment=_environment(look.environment, look.background, look.rotation, scene),
     )
@@ -127,9 +122,19 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
 def _objects(material: Material, scene: Scene) -> tuple[Object, ...]:
     """Objects of the scene with the material in its bodies; cached, so that turning the camera makes none anew."""
     if material.source == "file" and scene.bodies:
-        return tuple(scene.objects)
+        return tuple(scene.objects) if hasattr(scene, "has_camera") else tuple(_bent(scene.objects, material.ior))
     medium, chosen = medium_of(material), set(map(id, fillable(scene)))
     return tuple(_filled(item, material, medium) if id(item) in chosen else item for item in scene.objects)
+
+
+def _bent(objects: Sequence[Object], ior: float) -> list[Object]:
+    """Bodies of a bare mesh with this index of refraction."""
+    return [
+        item
+        if item.medium is None or item.medium.ior == ior
+        else dataclasses.replace(item, medium=dataclasses.replace(item.medium, ior=ior))
+        for item in objects
+    ]
 
 
 def _filled(item: Object, material: Material, medium: Medium) -> Object:
@@ -166,17 +171,6 @@ def _environment(name: str, background: str, rotation: float, scene: Scene) -> E
     if lit.kind == "image" and rotation:
         lit = dataclasses.replace(lit, rotation=lit.rotation + rotation)
     return lit.with_background(environment_of(background)) if background else lit
-
-
-def environment_of(name: str) -> Environment:
-    """Environment of a name, or of a file as it is now; the last ones are cached."""
-    path = Path(name)
-    return _environment_of(name, path.stat().st_mtime_ns if path.is_file() else 0)
-
-
-@lru_cache(maxsize=4)
-def _environment_of(name: str, written: int) -> Environment:
-    return named_environment(name)
 
 
 @lru_cache(maxsize=4)

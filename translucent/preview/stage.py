@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 from translucent.assets import newest_shader
 from translucent.errors import TranslucentError
@@ -13,19 +13,22 @@ from translucent.geometry.normals import drawn_normals
 from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
-from translucent.gpu.viewport import Probe, Shown, Viewport
+from translucent.gpu.viewport import Probe, Viewport
 from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
+from translucent.planning.shadow_maps import ShadowMaps
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
 from translucent.preview.diffusing import Diffusing
-from translucent.preview.measuring import Truth
+from translucent.preview.photons import Photons
+from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of, scattering_of
+from translucent.preview.staging import tone_of
 from translucent.preview.tasks import Task
-from translucent.preview.timing import Timing, kind
+from translucent.preview.timing import Pace, Timing
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -40,10 +43,11 @@ FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 #: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
 COARSEST_TRACED = 3.0
 
+#: Shadows of a picture that moves: those of a few directions of the environment.
+QUICK_SHADOWS = ShadowMaps(directions=8)
+
 #: Seconds between checks of the shader files.
 WATCH = 0.5
-
-Factor = TypeVar("Factor", int, float)
 
 
 class Stage:
@@ -67,6 +71,8 @@ class Stage:
         The compiler's message, while the last good shaders go on.
     converging : Converging
         Paths of the still picture.
+    photons : Photons
+        That light it, unless it is made of paths.
     simpler : str
         What is drawn more simply while the picture moves, and why, or nothing.
     drawing : float
@@ -93,12 +99,11 @@ class Stage:
         self._shown: tuple[object, ...] = ()
         self._postponed: tuple[object, ...] = ()
         self._asked: Task | None = None
-        self._presented: tuple[object, ...] = ()
-        self._costs: dict[tuple[str, ...], float] = {}
+        self._presenting = Presenting()
+        self._pace = Pace()
         self._strides = [4, 4]
-        self._truth: Truth | None = None
         self._scattering: Scattering | None = None
-        self._diffusing, self.converging = Diffusing(), Converging()
+        self._diffusing, self.converging, self.photons = Diffusing(), Converging(), Photons()
         self._watched, self._newest = time.monotonic(), newest_shader()
 
     def current(self) -> AbstractContextManager[Any]:
@@ -147,6 +152,8 @@ class Stage:
             return True
         if (not display.converges or wanted != self._shown) and self.converging.stop():
             self._shown = ()  # the interactive picture is drawn again
+        if (not display.follows_photons or wanted != self._shown) and self.photons.stop(self.viewport):
+            self._shown = ()
         fresh = wanted != self._shown
         if not fresh:
             self._begin(workspace, scene)
@@ -158,8 +165,8 @@ class Stage:
             ]
             self._shown = wanted
             self.viewport.restart()
-            self._truth = None
-            self._strides = [self._factor(plan, STRIDES) for plan in self.plans]
+            self._presenting.truth = None
+            self._strides = [self._pace.factor(plan, STRIDES, BUDGET) for plan in self.plans]
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.lacks_normals(scene, self._drawn_plans):
                 self._postpone(workspace, wanted)
@@ -168,31 +175,51 @@ class Stage:
                 return self._draw_at_once(scene, methods[0], workspace)
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
-        more = drawn = any(self._step(side, scene, display.antialias) for side in sides)
+        lit = display.follows_photons and self.viewport.steps(0) >= self._strides[0] ** 2
+        more = drawn = not lit and any(self._step(side, scene, display.antialias) for side in sides)
         if display.converges and not drawn:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, BUDGET)
-        self._present(workspace, scene, changed=drawn)
+        if lit:
+            more, drawn = self._light_by_photons(scene, methods[0], display.antialias)
+            if self.photons.light is None and not more:  # there are no photons to follow
+                more = drawn = self._step(0, scene, display.antialias)
+        self._presenting.present(workspace, scene, self.viewport, self._shown, changed=drawn)
         return more
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, interfaces, scattering = workspace.document.look, self._quick_interfaces(self.plans[0]), self._scattering
-        if interfaces is not None:
-            self._moving = self.renderer.plan(scene, method, interfaces=interfaces, scattering=self._scattering)
-        begun, factor = time.perf_counter(), self._factor(self._moving or self.plans[0], FACTORS)
+        look, scattering, interfaces = workspace.document.look, self._scattering, None
+        shadows = QUICK_SHADOWS if scene.environment_shadows else None
+        if shadows is not None:
+            self._moving = self.renderer.plan(scene, method, scattering=scattering, shadows=shadows)
+        if self._traces_slowly(self.plans[0]) or self._traces_slowly(self._moving):
+            interfaces = ScreenInterfaces()
+            self._moving = self.renderer.plan(
+                scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
+            )
+        begun, factor = time.perf_counter(), self._pace.factor(self._moving or self.plans[0], FACTORS, BUDGET)
         try:
             with self.viewport.at_once(factor) as framebuffer:
                 plan = self.renderer.draw(
-                    scene, framebuffer, method, look.exposure, look.tone, interfaces=interfaces, scattering=scattering
+                    scene,
+                    framebuffer,
+                    method,
+                    look.exposure,
+                    tone_of(look, scene),
+                    interfaces=interfaces,
+                    scattering=scattering,
+                    shadows=shadows,
                 )
         except PostponedError as error:
             if error.program is None:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
-        if self._moving is not None:
+        if interfaces is not None:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
-        self._presented = ()
+        elif shadows is not None:
+            self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
+        self._presenting.shown = ()
         return True
 
     def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
@@ -207,17 +234,16 @@ class Stage:
         """Remark on how diffused light is shown while it is not known; empty if it is known."""
         return self._diffusing.told
 
-    def _quick_interfaces(self, plan: RenderPlan | None) -> ScreenInterfaces | None:
-        """Interfaces for a picture that moves, if tracing them is known to take too long; else None."""
+    def _traces_slowly(self, plan: RenderPlan | None) -> bool:
+        """Whether tracing interfaces is known to take too long for a picture that moves."""
         if plan is None or not plan.has(PassName.TRACED):
-            return None
-        slow = self._costs.get(kind(plan), 0.0) / COARSEST_TRACED**2 > BUDGET
-        return ScreenInterfaces() if slow else None
+            return False
+        return self._pace.known(plan) / COARSEST_TRACED**2 > BUDGET
 
     def _step(self, side: int, scene: Scene, antialias: bool) -> bool:
         """Draw the next sample of a side, if there is one left to draw."""
         stride, plan = self._strides[side], self.plans[side]
-        samples = (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
+        samples = self._samples(stride, antialias)
         if plan is None or self.viewport.steps(side) >= stride * stride * (1 + samples):
             return False
         self.simpler, begun = "", time.perf_counter()
@@ -225,67 +251,37 @@ class Stage:
         self._finish(side, plan, stride, begun)
         return True
 
+    def _samples(self, stride: int, antialias: bool) -> int:
+        return (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
+
+    def _light_by_photons(self, scene: Scene, method: Method | None, antialias: bool) -> tuple[bool, bool]:
+        """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
+        photons = self.photons
+        expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
+        if not photons.ready(scene, self.renderer, self.viewport, method, self._scattering, BUDGET, expected):
+            return False, False
+        if not photons.drawing or photons.plan is None or photons.light is None:
+            return True, False
+        if photons.side == 1 and not self.viewport.steps(1):
+            self._strides[1] = self._pace.factor(photons.plan, STRIDES, BUDGET)
+        stride, begun = self._strides[photons.side], time.perf_counter()
+        samples = self._samples(stride, antialias)
+        light = photons.light.texture
+        self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=light)
+        self._finish(0, photons.plan, stride, begun)
+        if photons.take_over(self.viewport, stride, samples):
+            self._strides[0], self.plans[0] = stride, photons.plan
+        return True, photons.side == 0
+
     def _finish(self, side: int, plan: RenderPlan, stride: float, begun: float) -> None:
         self.renderer.gpu.context.gl.finish()
         wall = time.perf_counter() - begun
-        seconds = wall * stride * stride
-        known = self._costs.get(kind(plan))
-        # The first of its kind compiles shaders.
-        self._costs[kind(plan)] = seconds if known is None or seconds < known else 0.8 * known + 0.2 * seconds
+        self._pace.note(plan, wall * stride * stride)
         self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
-
-    def _factor(self, plan: RenderPlan | None, factors: tuple[Factor, ...]) -> Factor:
-        """Smallest factor of reduction at which a picture is expected to be drawn quickly."""
-        known = None if plan is None else self._costs.get(kind(plan))
-        if known is None:
-            return factors[0] if plan is None else factors[-2:][0]
-        return next((factor for factor in factors if known / factor**2 <= BUDGET), factors[-1])
-
-    def _present(self, workspace: Workspace, scene: Scene, changed: bool) -> None:
-        display, look = workspace.document.display, workspace.document.look
-        wanted_method = method_of(display.method, workspace.document.material)
-        if display.compare in ("reference", "error"):
-            truth = workspace.truth
-            straight = display.compare == "error"
-            if self._truth is not None and straight and not self._truth.straight:
-                self._truth = None
-            fits = truth is not None and truth.scene is scene and truth.method == wanted_method
-            if fits and truth is not None and truth is not self._truth and truth.straight >= straight:
-                self.viewport.put(truth.frame)
-                self._truth, changed = truth, True
-        right = {"off": "same", "method": "second", "reference": "second", "error": "difference"}[display.compare]
-        if display.compare in ("reference", "error") and self._truth is None:
-            right = "same"
-        shown = Shown(
-            display.mode,
-            right,
-            display.split,
-            self.thickest(workspace),
-            self.worst(workspace),
-            look.exposure,
-            look.tone,
-        )
-        wanted = (shown, self._shown)
-        if changed or wanted != self._presented:
-            self.viewport.present(shown)
-            self._presented = wanted
 
     def has_truth(self) -> bool:
         """Whether the split shows the reference."""
-        return self._truth is not None
-
-    def thickest(self, workspace: Workspace) -> float:
-        """Length in metres of the last false color: the thickest that was measured, or a guess."""
-        measured = workspace.measured
-        if measured is not None and measured.seen.thickness.size:
-            return float(measured.seen.thickness.max()) or 1.0
-        return workspace.loaded.scene.diagonal or 1.0 if workspace.loaded else 1.0
-
-    def worst(self, workspace: Workspace) -> float:
-        """Largest error in metres that has a color of its own."""
-        measured = workspace.measured
-        least = 1e-7 * self.thickest(workspace)
-        return max(measured.errors[0].p99, least) if measured is not None and measured.errors else 10 * least
+        return self._presenting.truth is not None
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:
         """Values of a pixel of a side, once it is final."""
@@ -315,7 +311,8 @@ class Stage:
 
     @property
     def _drawn_plans(self) -> list[RenderPlan]:
-        return [plan for plan in (*self.plans, self._moving, self.converging.plan) if plan is not None]
+        still = self.converging.plan, self.photons.plan
+        return [plan for plan in (*self.plans, self._moving, *still) if plan is not None]
 
     def _postpone(self, workspace: Workspace, wanted: tuple[object, ...], program: ProgramName | None = None) -> None:
         """Request missing programs; until they are there, the same picture is not tried again."""
@@ -382,18 +379,20 @@ class Stage:
 
     def _take_over(self, fresh: Renderer) -> None:
         self.converging.stop()
+        self.photons.stop(self.viewport)
         size, self.shader_problem = self.viewport.size, ""
         self.viewport.release()
         self.renderer.close()
         self.renderer = fresh
         self.viewport = Viewport(fresh.gpu)
         self.viewport.resize(size)
-        self._shown = self._presented = ()
+        self._shown = self._presenting.shown = ()
 
     def close(self) -> None:
         """Free all resources."""
         with self.current():
             self.converging.stop()
+            self.photons.stop(self.viewport)
             self.viewport.release()
             self.renderer.close()
         if self._own is not None:

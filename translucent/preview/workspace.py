@@ -18,17 +18,20 @@ from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, SetOrbit
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
-from translucent.preview.document import Document, Model, Orbit
+from translucent.preview.document import Display, Document, Model, Orbit
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
+from translucent.preview.loaded import Loaded
 from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
-from translucent.preview.scenes import Loaded, load, medium_of, scene_of
+from translucent.preview.scenes import load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
+from translucent.preview.staging import own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
 from translucent.preview.worker import PARTING, Companion, in_a_process
 from translucent.scene.scene import Scene
-from translucent.scene.showcase import fillable
+from translucent.scene.showcase import fillable, framing
+from translucent.scene.stages import NO_STAGE, stage_named
 
 #: Largest number of messages that the window keeps.
 MAX_MESSAGES = 50
@@ -184,13 +187,15 @@ class Workspace:
             lane.poll(self.refuse)
         if self.loaded is None or self.document.model != self.loaded.model:
             self._want(self.document.model)
+        else:
+            self._complete()  # a stage may be ready
 
     def scene(self) -> Scene | None:
         """Scene on show; the same object for as long as nothing about it changes."""
         loaded = self.loaded
         if loaded is None or self.document.orbit is None:
             return None
-        document = self._lighting.lit(self.document)
+        document = self._lighting.lit(self.document, loaded)
         if (bake := self.shown_bake) is not None:
             return bake.seen_from(self.document.orbit)
         if self._scene is not None:
@@ -201,6 +206,14 @@ class Workspace:
         scene = scene_of(document, loaded)
         self._scene = document, loaded, scene
         return scene
+
+    def picture(self) -> Scene | None:
+        """Scene of a picture from here, whatever quantity is on show."""
+        if (scene := self.scene()) is None or self.document.display.pictured or self.shown_bake is not None:
+            return scene
+        assert self.loaded is not None
+        document = self._lighting.lit(self.document, self.loaded)
+        return scene_of(dataclasses.replace(document, display=Display()), self.loaded)
 
     @property
     def shown_bake(self) -> Bake | None:
@@ -215,6 +228,7 @@ class Workspace:
 
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
+        self._lighting.begun = True
         if self.lanes["light"].task is None:
             self.lanes["light"].start("", prepare, lambda _: None)
 
@@ -360,22 +374,27 @@ class Workspace:
         if self.loaded is None:
             return
         present = self.document
-        if present.material.source == "file" and present.material != self.loaded.material:
-            self.history = self.history.done(Adopt(self.loaded.material))
+        own = own_material(self._lighting.lit(present, self.loaded).look, self.loaded)
+        if present.material.source == "file" and present.material != own:
+            self.history = self.history.done(Adopt(own))
         if present.orbit is None:
-            self.history = self.history.done(SetOrbit(_first_orbit(self.loaded, self.size)))
+            stage = stage_name(present.look, self.loaded)
+            self.history = self.history.done(SetOrbit(_first_orbit(self.loaded, self.size, stage)))
 
 
-def _first_orbit(loaded: Loaded, size: tuple[int, int]) -> Orbit:
-    """First orbit of a model: that of the file's own camera, or a framed view."""
+def _first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
+    """First orbit of a model: that of the file's own camera, or a framed view, on a stage with room for shadows."""
     from translucent.gltf.load import GltfScene
 
-    if isinstance(loaded.scene, GltfScene):
-        return orbiting.orbit_of(loaded.scene.camera, loaded.scene.bounds.mean(axis=0))
-    return orbiting.framed(None, loaded.scene.objects, size)
+    scene = loaded.scene
+    if stage != NO_STAGE and not getattr(scene, "has_camera", False):
+        return orbiting.orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
+    if isinstance(scene, GltfScene):
+        return orbiting.orbit_of(scene.camera, scene.bounds.mean(axis=0))
+    return orbiting.framed(None, scene.objects, size)
 
 
 def _lit_alike(first: Document, second: Document) -> bool:
-    """Whether two looks differ only in exposure and tone curve."""
+    """Whether two looks differ only in exposure and tone curve, before the same kind of backdrop."""
     developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
-    return developed == second.look
+    return developed == second.look and first.display.pictured == second.display.pictured

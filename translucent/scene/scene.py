@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, get_args
+from importlib import import_module
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -285,6 +286,16 @@ class Scene(Frozen):
 
     def __repr__(self) -> str:
         return f"Scene of {len(self.objects)} objects, {len(self.lights)} lights, {self.environment.kind} environment"
+
+    def _repr_mimebundle_(self, **_: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        """A small picture and what is in the scene, for notebooks."""
+        # By name: a scene is a value, and knows of no renderer.
+        found: tuple[dict[str, Any], dict[str, Any]] = import_module("translucent.notebook.showing").scene_bundle(self)
+        return found
+
+    def _repr_html_(self) -> str:
+        """The same, for those that know no bundles."""
+        return str(self._repr_mimebundle_()[0]["text/html"])
 
     @cached_property
     def bodies(self) -> tuple[Object, ...]:

@@ -37,6 +37,9 @@ ROOM = 1.1
 #: Names of environments for `named_environment`, besides colors and pictures.
 ENVIRONMENT_NAMES = ("light-table", "studio", "checkerboard")
 
+#: Most names of objects that an error lists.
+MOST_NAMES = 20
+
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
@@ -136,25 +139,26 @@ def framing(
     return Camera.framing(middle + ROOM * (points - middle), size, stage.view, fov_y, up)
 
 
-def with_roughness(scene: AnyScene, roughness: float | None) -> AnyScene:
-    """Scene with this roughness of all surfaces of media; the scene itself for None."""
+def with_roughness(scene: AnyScene, roughness: float | None, among: Sequence[Object] | None = None) -> AnyScene:
+    """Scene with this roughness of all surfaces of media, or of those of some objects; the scene itself for None."""
     if roughness is None:
         return scene
+    chosen = set(map(id, scene.objects if among is None else among))
 
     def finish(item: Object) -> Object:
-        if item.medium is None or item.covers:
+        if item.medium is None or item.covers or id(item) not in chosen:
             return item
         return dataclasses.replace(item, surface=dataclasses.replace(item.surface or Surface(), roughness=roughness))
 
     return dataclasses.replace(scene, objects=[finish(item) for item in scene.objects])
 
 
-def filled(scene: AnyScene, medium: Medium) -> AnyScene:
-    """Scene with this medium in all its translucent objects, or in all objects if none is translucent.
+def filled(scene: AnyScene, medium: Medium, among: Sequence[Object] | None = None) -> AnyScene:
+    """Scene with this medium in some objects; or in all translucent ones, or in all objects if none is translucent.
 
     Thin sheets become bodies: they had no inside that a medium could fill.
     """
-    chosen = set(map(id, fillable(scene)))
+    chosen = set(map(id, fillable(scene) if among is None else among))
 
     def fill(item: Object) -> Object:
         surface = item.surface
@@ -163,6 +167,28 @@ def filled(scene: AnyScene, medium: Medium) -> AnyScene:
         return dataclasses.replace(item, medium=medium, sheet_thickness=None, surface=surface)
 
     return dataclasses.replace(scene, objects=[fill(item) if id(item) in chosen else item for item in scene.objects])
+
+
+def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
+    """Objects of a name: those whose mesh has it, or, where none has, the parts of one, as ``Cup`` of ``Cup[0]``.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    names = [item.mesh.name for item in scene.objects]
+    for items in (
+        [item for item in scene.objects if item.mesh.name == name],
+        [item for item in scene.objects if item.mesh.name.startswith(f"{name}[")],
+    ):
+        if items:
+            return tuple(items)
+    known = list(dict.fromkeys(names))
+    others = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
+    do = f"use one of {', '.join(map(repr, known[:MOST_NAMES]))}{others}"
+    near = close_names(name, known)
+    raise InputError(f"object {name!r}", "no object has that name", f"{did_you_mean(near)} {do}" if near else do)
 
 
 def fillable(scene: Scene) -> tuple[Object, ...]:

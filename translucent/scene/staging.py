@@ -46,7 +46,12 @@ GROUND_NAME = "ground"
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
-def staged(scene: AnyScene, stage: str | Stage = DEFAULT_STAGE, environment: Environment | None = None) -> AnyScene:
+def staged(
+    scene: AnyScene,
+    stage: str | Stage = DEFAULT_STAGE,
+    environment: Environment | None = None,
+    turn: float = 0.0,
+) -> AnyScene:
     """Scene on a stage: its objects on a ground, lit as its camera sees them; +Y is up.
 
     The ground comes after the objects. It is a little below their lowest point, and is seen from above only.
@@ -59,6 +64,8 @@ def staged(scene: AnyScene, stage: str | Stage = DEFAULT_STAGE, environment: Env
         A stage, or its name; ``none`` gives the scene itself.
     environment : Environment, optional
         In place of the stage's, whose lights stay out, too.
+    turn : float
+        Of the stage with its lights and its environment about +Y, in degrees, counterclockwise as seen from above.
 
     Raises
     ------
@@ -71,7 +78,7 @@ def staged(scene: AnyScene, stage: str | Stage = DEFAULT_STAGE, environment: Env
     if len(scene.shown) < len(scene.objects):
         do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
         raise InputError("a stage for a scene", "it has a ground that catches shadows", do)
-    axes = view_axes(scene.camera)
+    axes = view_axes(scene.camera) @ _about_y(turn).T
     ground = Object(ground_mesh(scene, axes), surface=_finish(chosen), shadow_catcher=True)
     lights = scene.lights or (() if environment else tuple(_light(key, axes) for key in chosen.keys))
     azimuth = float(np.degrees(np.arctan2(axes[2, 0], -axes[2, 2])))
@@ -92,6 +99,14 @@ def view_axes(camera: Camera) -> Array:
         ahead = -np.sign(camera.forward[1]) * camera.up * (1.0, 0.0, 1.0)
     ahead /= np.linalg.norm(ahead)
     return np.stack([np.cross(ahead, (0.0, 1.0, 0.0)), (0.0, 1.0, 0.0), ahead])
+
+
+def _about_y(degrees: float) -> Array:
+    """(3, 3): turn about +Y, counterclockwise as seen from above."""
+    if not np.isfinite(degrees):
+        raise InputError(f"stage turned by {degrees}", "not finite", "give degrees")
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
 
 def stage_lights(stage: Stage) -> list[DirectionalLight]:

@@ -1,11 +1,11 @@
 /** One unsorted, additive pass: metres of every ray inside bodies. shaders/thickness/signed_depth.frag is what it draws. */
 import {
   Box3,
-  Camera,
   FloatType,
   HalfFloatType,
   Mesh,
   NearestFilter,
+  OrthographicCamera,
   BufferGeometry,
   BufferAttribute,
   RGFormat,
@@ -16,7 +16,7 @@ import {
   Vector3,
   WebGLRenderTarget,
 } from "three";
-import type { Material, Object3D, Texture, WebGLRenderer } from "three";
+import type { Camera, Material, Object3D, Texture, WebGLRenderer } from "three";
 import { StandIn, checkBody, visibleMeshes } from "./bodies.js";
 import { TranslucentError } from "./errors.js";
 import { extinctionOf } from "./extinction.js";
@@ -83,7 +83,8 @@ export class ExactThicknessPass {
   private readonly resolvers: Record<string, Material> = {};
   private readonly screen: Mesh;
   private readonly stage = new Scene();
-  private readonly eye = new Camera();
+  // Any: the shaders place bodies themselves. One of these knows reversed and logarithmic depth.
+  private readonly eye = new OrthographicCamera();
   private layout = "";
 
   constructor(renderer: WebGLRenderer, options: ExactThicknessOptions = {}) {
@@ -211,6 +212,15 @@ export class ExactThicknessPass {
       }
     }
     return found;
+  }
+
+  /** Metres inside bodies at a pixel of the last `render`, from the top left; null where there is no number to trust. */
+  at(x: number, y: number): number | null {
+    if (!this.result) return null;
+    const texel = new Float32Array(4);
+    const up = this.result.height - 1 - Math.floor(y);
+    this.renderer.readRenderTargetPixels(this.result, Math.floor(x), up, 1, 1, texel);
+    return texel[2] > 0 ? texel[0] : null;
   }
 
   /** Free all that is on the graphics card; the pass may be used again. */

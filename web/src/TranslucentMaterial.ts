@@ -57,11 +57,10 @@ vec3 exactPoint(vec2 place, float axial) {
 vec3 exactBehind(vec3 p, vec3 direction, float roughness, float ior) {
   vec2 place = exactPlace(p);
   vec4 seen = getTransmissionSample(place, roughness, ior);
-#ifdef ENVMAP_TYPE_CUBE_UV
+#ifdef USE_ENVMAP
   bool opaque = exactUse[2] && exactTexel(exactEnds, place).r < 1e4 && all(equal(place, clamp(place, 0.0, 1.0)));
-  vec3 outwards = normalize((vec4(direction, 0.0) * viewMatrix).xyz);
-  vec3 far = textureCubeUV(envMap, envMapRotation * outwards, applyIorToRoughness(roughness, ior)).rgb * envMapIntensity;
-  return opaque ? seen.rgb : far;
+  // What a mirror that faces this way would show.
+  return opaque ? seen.rgb : getIBLRadiance(direction, direction, applyIorToRoughness(roughness, ior));
 #else
   return seen.rgb;
 #endif
@@ -137,6 +136,11 @@ const TRANSMITTED = `
   #ifdef USE_TRANSMISSIONMAP
   material.transmission *= texture2D(transmissionMap, vTransmissionMapUv).r;
   #endif
+  // What three.js mirrors by Schlick's approximation, as Fresnel has it: at ior 1, nothing.
+  float exactCosine = clamp(dot(normal, isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(vViewPosition)), 0.0, 1.0);
+  float exactRatio = (material.ior - 1.0) / (material.ior + 1.0);
+  float exactSchlick = mix(pow(1.0 - exactCosine, 5.0), 1.0, exactRatio * exactRatio);
+  totalSpecular *= tl_fresnel_dielectric(exactCosine, material.ior) / max(exactSchlick, 1e-6);
   vec3 exactLight = exactTransmitted(-vViewPosition, normal, material.roughness, material.ior, thickness);
   totalDiffuse = mix(totalDiffuse, exactLight * diffuseColor.rgb, material.transmission);
 #endif

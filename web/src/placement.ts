@@ -95,8 +95,9 @@ export function place(one: StandIn, view: View, range: DepthRange): void {
   viewFromOffset.premultiply(view.camera.matrixWorldInverse);
   const clip = uniforms.clip_from_offset.value.multiplyMatrices(view.camera.projectionMatrix, viewFromOffset).elements;
   clip[2] = clip[6] = clip[10] = clip[14] = 0; // no depth: nothing is clipped but what is behind
-  // Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it.
-  if (!view.orthographic) clip[14] = -NEAR_SURFACE * one.worldBox.getSize(low).length();
+  // Triangles through the eye itself have no image: they project to 0/0. Clip them just ahead of it, where z is w; that is
+  // the far end of depths from -1 to 1 as from 0 to 1 (reversedDepthBuffer).
+  if (!view.orthographic) clip[14] = NEAR_SURFACE * one.worldBox.getSize(low).length();
   const e = viewFromOffset.elements;
   const cut = isCut(one, view);
   uniforms.axis.value.set(-e[2], -e[6], -e[10], cut ? -e[14] : 0);

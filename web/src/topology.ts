@@ -55,13 +55,18 @@ function welded(geometry: BufferGeometry): Int32Array {
   const size = 2 ** Math.ceil(Math.log2(2 * n + 1));
   const table = new Int32Array(size).fill(-1);
   const first = new Int32Array(n);
+  // To the last digit of the largest coordinate: where a sphere closes, sin(2 pi) is no 0.
+  if (!geometry.boundingBox) geometry.computeBoundingBox();
+  const { min, max } = geometry.boundingBox!;
+  const large = 2 * Math.max(...[...min.toArray(), ...max.toArray()].map(Math.abs));
+  const rounded = (x: number): number => Math.fround(Math.fround(x + large) - large);
   const bits = new Float32Array(3);
   const words = new Int32Array(bits.buffer);
   const places = new Float32Array(3 * n);
   for (let i = 0; i < n; i++) {
-    bits[0] = position.getX(i) + 0; // -0 is 0
-    bits[1] = position.getY(i) + 0;
-    bits[2] = position.getZ(i) + 0;
+    bits[0] = rounded(position.getX(i));
+    bits[1] = rounded(position.getY(i));
+    bits[2] = rounded(position.getZ(i));
     places.set(bits, 3 * i);
     let slot = (Math.imul(words[0], 73856093) ^ Math.imul(words[1], 19349663) ^ Math.imul(words[2], 83492791)) >>> 0;
     slot = (slot ^ (slot >>> 15)) & (size - 1);

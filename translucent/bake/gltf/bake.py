@@ -30,8 +30,8 @@ def bake_gltf(job: Job, about: Record, progress: Progress | None = None) -> tupl
     output, vertices, inside = Path(job["output"]), bool(job.get("vertices")), stays_gltf(job)
     size = job.get("settings", {}).get("size", 1024)
     builder = GlbBuilder(read_gltf(job["model"], bool(job.get("outside"))))
-    uv = {"needs_uv": not vertices, "new_uv": bool(job.get("unwrap")), "plain_uv": not inside}
-    targets = find_targets(builder, metres, size=size, **uv)
+    new = bool(job.get("unwrap"))
+    targets = find_targets(builder, metres, size=size, needs_uv=not vertices, new_uv=new, plain_uv=not inside)
     if job.get("high") is not None and len(targets) > 1:
         raise InputError(f"high mesh {job['high']!r}", f"{len(targets)} objects get thickness", "bake them one by one")
     if lost := left_out(builder.file(), targets):

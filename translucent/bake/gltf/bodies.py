@@ -82,10 +82,14 @@ class Bodies:
 
     def around(self, key: PrimitiveKey) -> Mesh | None:
         """Body of an open primitive: joined with the other open ones of its mesh, if that closes edges."""
-        if self._outline(key).diagnosis.closed:
-            return None
-        joined = self._join(key[0])
+        joined = self.joined(key)
         return None if joined is None else joined[0]
+
+    def joined(self, key: PrimitiveKey) -> tuple[Mesh, int] | None:
+        """Body `around` an open primitive, and where its faces begin there; None of what stands alone."""
+        if self._outline(key).diagnosis.closed or (joined := self._join(key[0])) is None:
+            return None
+        return joined[0], joined[1][key]
 
     def wound(self, key: PrimitiveKey, mesh: Mesh) -> Mesh:
         """Mesh of a primitive, with the winding of its faces in the body `around` it."""

@@ -12,6 +12,7 @@ them in 0..1), else TEXCOORD_0, else new ones as the next set.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,6 +73,7 @@ def find_targets(
     new_uv: bool = False,
     plain_uv: bool = False,
     size: int = 1024,
+    only: Collection[PrimitiveKey] | None = None,
 ) -> list[Target]:
     """The primitives that get thickness; those without UVs get new ones in the builder.
 
@@ -88,6 +90,8 @@ def find_targets(
         Take UVs as they are, without the transform of the thickness texture that a material has.
     size : int
         Texels along each side of the map to come, which the gaps between new charts depend on.
+    only : collection of (int, int), optional
+        Mesh and primitive of those that count. Default: all.
 
     Raises
     ------
@@ -99,7 +103,11 @@ def find_targets(
     if packed := [name for name in _COMPRESSIONS if name in required]:
         raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
     materials, bodies = materials_of(file), Bodies(file, metres)
-    lit = {key: _material(materials, builder.primitive(*key)) for key in _keys(file, materials)}
+    lit = {
+        key: _material(materials, builder.primitive(*key))
+        for key in _keys(file, materials)
+        if only is None or key in only
+    }
     # All that is read of the file as it is, before anything is added to it.
     chosen = {key: bodies.around(key) for key, material in lit.items() if not _is_sheet(material, key, bodies)}
     found: list[Target] = []

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
 from translucent.errors import RenderError
-from translucent.gpu.constants import PHOTON_WIDTH
+from translucent.gpu.constants import CONSTANTS, PHOTON_WIDTH
 from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.ledger import before_making
-from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, shadow_switches
+from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, OpaquePass, shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed
 from translucent.gpu.passes.variants import Variants, look_switches
 from translucent.gpu.photon_aims import PhotonAim, photon_aims
@@ -32,6 +33,16 @@ ENOUGH = 8.0
 BATCH = PHOTON_WIDTH * 512
 
 
+@dataclass(frozen=True, eq=False)
+class Tracer:
+    """Means to follow the photons of a scene: where they aim, where a batch has landed, program and textures."""
+
+    aims: list[PhotonAim]
+    landed: moderngl.Framebuffer
+    program: moderngl.Program
+    textures: tuple[moderngl.Texture, ...]
+
+
 class CausticsPass:
     """Photons that interfaces turn onto opaque objects; see ``shaders/transport/photons.frag``."""
 
@@ -42,6 +53,8 @@ class CausticsPass:
         self._shade = Variants(
             gl, "geometry/fullscreen.vert", "shade/caustics.frag", photon_spread=3, paint=4, **_RECEIVED
         )
+        self._known = Variants(gl, "geometry/fullscreen.vert", "shade/known_photons.frag", photon_light=0)
+        self._opaque = OpaquePass(gl)
         self._plain = Variants(gl, "geometry/body.vert", "shade/paint.frag", **FINISH_UNITS)
         self._finished = Variants(gl, "geometry/interface.vert", "shade/paint.frag", **FINISH_UNITS)
         self._maps = FinishMaps(gl)
@@ -49,25 +62,33 @@ class CausticsPass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Follow the photons of this sample, and add their light to the opaque objects."""
+        if job.photon_light is not None:
+            return self._add_known(job, *job.photon_light)
+        with ExitStack() as stack:
+            tracer = self.begin(stack, job)
+            for number, aim in enumerate(tracer.aims):
+                begin, end = (aim.photons * (job.sample + i) // job.samples for i in range(2))
+                self.follow(job, tracer, number, begin, end)
+        self.paint(job, spec.objects)
+        return self.shade(job, job.targets.view("opaque", 1))
+
+    def begin(self, stack: ExitStack, job: FrameJob) -> Tracer:
+        """Get ready to follow photons in the scene of a job, and forget those that have landed."""
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
-        with ExitStack() as stack:
-            landed = self._landed(stack)
-            program, textures = self._tracer(stack, job)
-            irradiance = job.targets.photons()
-            irradiance.clear()
-            aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
-            for number, aim in enumerate(aims):
-                self._aim(program, aim, number, job)
-                begin, end = (aim.photons * (job.sample + i) // job.samples for i in range(2))
-                for first in range(begin, end, BATCH):
-                    count = min(BATCH, end - first)
-                    for unit, texture in enumerate(textures):
-                        texture.use(unit)
-                    self._follow(program, landed, first, count)
-                    self._add(job, landed, count)
-        self._paint(job, spec.objects)
-        self._show(job)
+        job.targets.photons().clear()
+        aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
+        return Tracer(aims, self._landed(stack), *self._tracer(stack, job))
+
+    def follow(self, job: FrameJob, tracer: Tracer, number: int, begin: int, end: int) -> None:
+        """Follow photons of the aim of this number, and add up where the picture shows that they have landed."""
+        self._aim(tracer.program, tracer.aims[number], number, job)
+        for first in range(begin, end, BATCH):
+            count = min(BATCH, end - first)
+            for unit, texture in enumerate(tracer.textures):
+                texture.use(unit)
+            self._follow(tracer.program, tracer.landed, first, count)
+            self._add(job, tracer.landed, count)
 
     def _landed(self, stack: ExitStack) -> moderngl.Framebuffer:
         """Textures for a batch of photons where they have landed."""
@@ -151,7 +172,13 @@ class CausticsPass:
         self._add_up(job.targets.photons())
         self._splat.render(moderngl.POINTS, vertices=count)
 
-    def _paint(self, job: FrameJob, objects: tuple[int, ...]) -> None:
+    def draw_depth(self, job: FrameJob, objects: tuple[int, ...]) -> None:
+        """Draw where opaque objects are, and nothing else of them."""
+        ends = job.targets.opaque_ends()
+        ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
+        self._opaque.draw_depth(job, objects, ends)
+
+    def paint(self, job: FrameJob, objects: tuple[int, ...]) -> None:
         """Draw what opaque objects reflect diffusely, as `OpaquePass` draws their radiance."""
         framebuffer = job.targets.paint()
         framebuffer.use()
@@ -171,7 +198,8 @@ class CausticsPass:
             job.draw(program, (i,))
         self._gl.depth_func = "<"
 
-    def _show(self, job: FrameJob) -> None:
+    def shade(self, job: FrameJob, into: moderngl.Framebuffer, rounds: int = 1) -> None:
+        """Add the light that opaque objects reflect of the photons that have landed, the mean of so many rounds."""
         paint, normal = job.targets.paint().color_attachments
         depth = job.targets.opaque().color_attachments[0]
         for unit, texture in enumerate((job.targets.photons().color_attachments[0], depth, normal)):
@@ -183,8 +211,19 @@ class CausticsPass:
         self._spread.draw_fullscreen(program)
         job.targets.photon_spread().color_attachments[0].use(3)
         paint.use(4)
+        shading = self._shade.program()
+        set_uniform(shading, "share", 1.0 / rounds)
+        self._add_up(into)
+        self._shade.draw_fullscreen(shading)
+
+    def _add_known(self, job: FrameJob, light: moderngl.Texture, stride: int, phase: tuple[int, int]) -> None:
+        """Add light of photons to the opaque objects that the larger picture has for these pixels."""
+        program = self._known.program()
+        set_uniform(program, "stride", stride)
+        set_uniform(program, "phase", (phase[0], stride - 1 - phase[1]))  # stored with row 0 at the bottom
+        light.use(0)
         self._add_up(job.targets.view("opaque", 1))
-        self._shade.draw_fullscreen(self._shade.program())
+        self._known.draw_fullscreen(program)
 
     def _add_up(self, framebuffer: moderngl.Framebuffer) -> None:
         framebuffer.use()

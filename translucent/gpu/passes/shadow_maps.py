@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import weakref
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
@@ -15,6 +16,7 @@ from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
+from translucent.gpu.ledger import before_making
 from translucent.gpu.light_cameras import outermost
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
@@ -25,7 +27,7 @@ from translucent.gpu.passes.thin_layer import ThinLayerPass
 from translucent.gpu.passes.transmittance import TransmittancePass
 from translucent.gpu.placement import AxialRange, PlacedScene, depth_range
 from translucent.gpu.resources import Resources
-from translucent.gpu.shadow_atlas import ShadowView, ShadowViews
+from translucent.gpu.shadow_atlas import Seen, ShadowView, ShadowViews
 from translucent.gpu.shadow_cameras import ShadowThrowers, holds_eye
 from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
@@ -111,65 +113,109 @@ class ShadowMapsPass:
         self._resolve = TransmittancePass(gl)
         self._made: dict[PassName, Callable[[FrameJob, PassSpec], None]] = {}
         self._targets: dict[int, Targets] = {}
+        self._placed: tuple[object, ShadowViews] | None = None
         self._plans: dict[Hashable, tuple[Scene, RenderPlan]] = {}
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Render the maps, if objects or lights have changed, and write the uniforms."""
-        atlas, scene = job.resources.shadows, job.scene
-        if atlas.held != (seen := _seen(job)):
-            self._render(job)
-            atlas.held = seen
+        """Render those of the maps that the frame reads and that are not there, and write the uniforms.
+
+        Where a window waits, they may take several frames; what is there stays until objects or lights change.
+        """
+        job.resources.photons_carry = bool(job.plan.opaque_to_shadows)
+        atlas, scene, count = job.resources.shadows, job.scene, job.scene.environment_shadows
+        # Of several samples of a pixel, each looks into its share of the directions.
+        first, step = job.sample % job.samples, job.samples
+        most = job.plan.shadows.directions
+        if few := most is not None and most * step < count:
+            step = -(-count // most)
+            first %= step
+        seen = _seen(job)
+        if atlas.held is None or not atlas.held.fits(seen, path_only=not atlas.spectral):
+            atlas.held = None
+        if few and (atlas.held is None or atlas.held.step == step):
+            seen, first, step, few = replace(seen, step=step), 0, 1, False  # no more than these
+        elif atlas.held is not None and atlas.held.step > 1:
+            atlas.held = None
+        if atlas.held is None or not atlas.drawn.issuperset(self._read(atlas.views, first, step)):
+            self._render(job, seen, first, step)
         assert atlas.views is not None
         center = media_center(scene)
-        # Of several samples of a pixel, each looks into its share of the directions; no picture is read beyond these.
-        turns = (0, max(len(atlas.views.sky), 1)) if job.averaged else (job.sample, job.samples)
         extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
+        turns = first, -step if few else step
+        if job.averaged:
+            turns = 0, max(len(atlas.views.sky), 1)  # no picture is read of what is drawn now
         job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
-        count = scene.environment_shadows
-        irradiance = shadow_directions(scene.environment, count)[1] if count else np.zeros((0, 3))
+        assert atlas.held is not None
+        irradiance = shadow_directions(scene.environment, count)[1][:: atlas.held.step] if count else np.zeros((0, 3))
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
         job.uniforms.bind()
 
-    def _render(self, job: FrameJob) -> None:
-        """Render all maps."""
+    def _render(self, job: FrameJob, seen: Seen, first: int, step: int) -> None:
+        """Render the maps of lights, and of every so-many-th direction of the environment."""
         scene, atlas = job.scene, job.resources.shadows
-        corners = [outermost(item) for item in scene.objects]
-        lights, sky = (
-            [ShadowThrowers(light, scene, corners) for light in group] for group in (scene.lights, _sky_lights(scene))
-        )
         # Where all bodies are drawn as sheets, these throw the shadows, too.
         method = job.plan.method if job.plan.method.makes_sheets else None
         dark = _darkened(scene, job.plan.opaque_to_shadows)
         opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
         everything = self._planned(dark, method, opaque)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
-        in_place = all(step.name in _IN_PLACE for step in everything[2].passes)
-        limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
-        seen_by, seen_from_sky = (
-            [(found.cameras(), found.in_the_way if in_place else opaque) for found in group] for group in (lights, sky)
-        )
-        views = ShadowViews.of(seen_by, seen_from_sky, job.plan.shadows.size, limit)
-        atlas.make(views, spectral=everything[2].spectral or not in_place or dark is not scene)
+        in_place = all(one.name in _IN_PLACE for one in everything[2].passes)
+        if atlas.held is None:
+            views = self._views(job, seen, opaque, in_place=in_place)
+            atlas.make(views, spectral=everything[2].spectral or not in_place or dark is not scene)
+            atlas.held = seen
+        assert atlas.views is not None
         center = media_center(scene)
         used = {everything[0]}
-        for view in views:
+        for view in self._read(atlas.views, first, step):
+            if view in atlas.drawn:
+                continue
+            if job.plan.shadows.directions is None:
+                before_making(self._gl)
             if view.size not in self._targets:
                 self._targets[view.size] = Targets(self._gl, (view.size, view.size))
             # Where no opaque object is in the way, none has to be drawn; photons are those of lights alone.
-            clear = dark is scene or view in views.sky
-            key, seen, chosen = self._planned(scene if clear else dark, method, view.opaque)
+            clear = dark is scene or view in atlas.views.sky
+            key, lit, chosen = self._planned(scene if clear else dark, method, view.opaque)
             used.add(key)
             chosen = chosen if dark is scene else replace(chosen, spectral=True)
-            before = replace(seen, camera=view.camera), chosen, self._targets[view.size], job.resources
-            if in_place:
-                self._add_up(MapJob(self._gl, *before, view, center))
-            else:
-                self._copy(FrameJob(self._gl, *before), view, center)
+            before = replace(lit, camera=view.camera), chosen, self._targets[view.size], job.resources
+            try:
+                if in_place:
+                    self._add_up(MapJob(self._gl, *before, view, center))
+                else:
+                    self._copy(FrameJob(self._gl, *before), view, center)
+            except BaseException:
+                atlas.held = None  # half of a map cannot be told from a whole one
+                raise
+            atlas.drawn.add(view)
         for key in self._plans.keys() - used:
             del self._plans[key]
-        for size in self._targets.keys() - {view.size for view in views}:
+        for size in self._targets.keys() - {view.size for view in atlas.views}:
             self._targets.pop(size).release()
         job.uniforms.bind()
+
+    def _read(self, views: ShadowViews | None, first: int, step: int) -> list[ShadowView]:
+        """Maps that a frame reads."""
+        return [] if views is None else [*itertools.chain(*views.lights), *views.sky[first::step]]
+
+    def _views(self, job: FrameJob, seen: Seen, opaque: tuple[int, ...], *, in_place: bool) -> ShadowViews:
+        """Places of all maps; where they are stays the same when only media change."""
+        key = seen.places, seen.step, in_place
+        if self._placed is None or self._placed[0] != key:
+            scene = job.scene
+            corners = [outermost(item) for item in scene.objects]
+            lights, sky = (
+                [ShadowThrowers(light, scene, corners) for light in group]
+                for group in (scene.lights, _sky_lights(scene)[:: seen.step])
+            )
+            seen_by, seen_from_sky = (
+                [(found.cameras(), found.in_the_way if in_place else opaque) for found in group]
+                for group in (lights, sky)
+            )
+            limit = int(self._gl.info["GL_MAX_TEXTURE_SIZE"])
+            self._placed = key, ShadowViews.of(seen_by, seen_from_sky, job.plan.shadows.size, limit)
+        return self._placed[1]
 
     def _planned(
         self, scene: Scene, method: Method | None, opaque: tuple[int, ...]
@@ -265,14 +311,13 @@ def _sky_lights(scene: Scene) -> list[Light]:
     return [DirectionalLight(-direction, 1.0) for direction in towards]
 
 
-def _seen(job: FrameJob) -> object:
-    """Key of the maps, equal for frames in which lights see the same; keeps nothing alive."""
+def _seen(job: FrameJob) -> Seen:
+    """What lights see in a frame; keeps nothing alive."""
     scene = job.scene
     objects = tuple(
         (
             weakref.ref(item.mesh),
             item.matrix.tobytes(),
-            None if item.medium is None else np.asarray(item.medium.extinction).tobytes(),
             item.priority,
             item.sheet_thickness,
             item.covers,
@@ -282,7 +327,11 @@ def _seen(job: FrameJob) -> object:
         )
         for item in scene.objects
     )
+    media = tuple(
+        None if item.medium is None else np.asarray(item.medium.extinction).tobytes() for item in scene.objects
+    )
     lights = tuple(light_key(light) for light in scene.lights)
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
     sheets = job.plan.method if job.plan.method.makes_sheets else None
-    return objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows
+    places = objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows
+    return Seen((places, tuple(medium is None for medium in media)), media)

@@ -34,5 +34,5 @@ class SignedDepthPass:
             for kind in kinds:
                 variants.program(**plain, **kind)
         if job.projected_depth:
-            job.gl.enable(moderngl.DEPTH_TEST)
+            job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         job.draw(variants.program(**plain, **chosen), spec.objects)

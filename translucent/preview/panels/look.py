@@ -6,9 +6,23 @@ from imgui_bundle import imgui
 
 from translucent.formulas.tone import TONES
 from translucent.preview.actions import Change, SetOrbit
+from translucent.preview.answers import recipe
 from translucent.preview.desk import FAINT, Desk, begin_rows, check, choice, fact, row, slider, wrapped
+from translucent.preview.document import AUTO, STAGE_WORDS
 
 ENVIRONMENTS = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
+
+STAGE_TIP = (
+    "A ground that catches shadows, lamps and soft boxes, as --stage of translucent render; auto: studio, unless the\n"
+    "model brings a camera, lights or a ground, or an environment is chosen. Quantities and the reference go without."
+)
+ROTATION_TIP = "Of the environment; of a stage with its lamps. Or drag with E held."
+TONE_TIP = "auto: neutral on a stage, where light sources are brighter than white, else none."
+
+RECIPES = (
+    ("Copy command", "command", "translucent render with options for this picture, its stage and caustics"),
+    ("Copy Python", "python", "A script that makes this picture, with all that no option says"),
+)
 
 
 def look_panel(desk: Desk) -> None:
@@ -25,11 +39,12 @@ def look_panel(desk: Desk) -> None:
     if imgui.button("Reset") and orbit is not None:
         desk.work.do(SetOrbit(None))
         desk.work.reframe()
-    imgui.separator_text("Environment")
+    imgui.separator_text("Stage and environment")
     if begin_rows("environment"):
-        _environment(desk, "lights with", "look.environment", "the model's own")
+        choice(desk, "stage", "look.stage", STAGE_WORDS, tip=STAGE_TIP)
+        _environment(desk, "lights with", "look.environment", "the stage's, or the model's own")
         _environment(desk, "background", "look.background", "the same")
-        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
+        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg", tip=ROTATION_TIP)
         imgui.end_table()
     imgui.separator_text("Light")
     if begin_rows("light"):
@@ -42,7 +57,7 @@ def look_panel(desk: Desk) -> None:
     imgui.separator_text("Picture")
     if begin_rows("picture"):
         slider(desk, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
-        choice(desk, "tone curve", "look.tone", TONES)
+        choice(desk, "tone curve", "look.tone", (AUTO, *TONES), tip=TONE_TIP)
         imgui.end_table()
 
 
@@ -70,6 +85,13 @@ def files_panel(desk: Desk) -> None:
         imgui.same_line()
     if imgui.button("Turntable ..."):
         desk.ask_file("turntable")
+    for label, kind, tip in RECIPES:
+        if imgui.button(label):
+            _copy(desk, kind)
+        if imgui.is_item_hovered():
+            imgui.set_tooltip(tip)
+        imgui.same_line()
+    imgui.new_line()
     imgui.separator_text("Session")
     if imgui.button("Open session ..."):
         desk.ask_file("open session")
@@ -84,6 +106,12 @@ def files_panel(desk: Desk) -> None:
 
     if hasattr(tl, "bake_thickness"):
         _bake(desk)
+
+
+def _copy(desk: Desk, kind: str) -> None:
+    """Copy how to make this picture without the window."""
+    if (text := recipe(desk, kind)) is not None:
+        imgui.set_clipboard_text(text)
 
 
 def _bake(desk: Desk) -> None:

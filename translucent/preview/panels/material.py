@@ -11,7 +11,7 @@ from imgui_bundle import imgui, implot
 
 from translucent.errors import InputError
 from translucent.formulas.color import to_hex
-from translucent.materials import text_block
+from translucent.materials import TITLES, text_block
 from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
 from translucent.media.presets import presets
@@ -32,9 +32,6 @@ from translucent.preview.desk import (
 from translucent.preview.document import SHOWN_UNITS, Material
 from translucent.preview.scenes import medium_of
 from translucent.units import metres_per_unit
-
-#: Systems that the medium is copied for, with their names on buttons.
-COPIES = {"gltf": "glTF", "openpbr": "OpenPBR", "blender": "Blender", "unreal": "Unreal", "json": "JSON"}
 
 #: Colors of curves: red, green and blue that are told apart on a dark background.
 CURVES = ((0.95, 0.36, 0.33, 1.0), (0.38, 0.80, 0.42, 1.0), (0.36, 0.58, 1.0, 1.0))
@@ -230,9 +227,9 @@ def _numbers(desk: Desk, material: Material) -> None:
 
 def _copies(desk: Desk, material: Material) -> None:
     width = imgui.get_content_region_avail().x
-    for target, label in COPIES.items():
+    for target, label in TITLES.items():
         size = imgui.calc_text_size(label).x + 2 * imgui.get_style().frame_padding.x
-        if target != next(iter(COPIES)):
+        if target != next(iter(TITLES)):
             imgui.same_line()
             if imgui.get_cursor_pos_x() + size > width:
                 imgui.new_line()
@@ -243,7 +240,7 @@ def _copies(desk: Desk, material: Material) -> None:
 def copied_text(material: Material, target: str) -> str:
     """Text that is copied for a target, as ``translucent extinction --as`` prints it."""
     medium, distance = medium_of(material), float(numbers.told(material)["distance"])
-    return text_block(target, medium, medium.transmittance(distance), distance)
+    return text_block(target, medium, medium.transmittance(distance), distance, material.roughness)
 
 
 def _copy(material: Material, target: str) -> None:

@@ -16,6 +16,11 @@ SCATTERING_TIP = "Light scattered many times: it diffuses in the body, leaves as
 
 CONVERGE_TIP = "Path trace the picture while nothing changes: all light, with less noise the longer it goes on."
 
+CAUSTICS_TIP = (
+    "Photons carry the light of lamps through interfaces onto opaque objects while nothing changes: --caustics of\n"
+    "translucent render, more and more of them. The picture that moves has none, and neither has one that converges."
+)
+
 #: Advice about invalid pixels, by a word in the plan's limits or the diagnosis.
 CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
 
@@ -36,6 +41,7 @@ def method_panel(desk: Desk) -> None:
             slider(desk, "split", "display.split", 0.0, 1.0, "%.2f")
         check(desk, "reference inset", "display.inset", tip="The reference in a corner, while the view is still.")
         check(desk, "smooth edges", "display.antialias", tip="More samples while the view is still.")
+        check(desk, "caustics (P)", "display.caustics", tip=CAUSTICS_TIP)
         check(desk, "converge (C)", "display.converge", tip=CONVERGE_TIP)
         imgui.end_table()
     for side, (plan, timing) in enumerate(zip(desk.stage.plans, desk.stage.timings, strict=True)):

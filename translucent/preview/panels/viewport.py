@@ -12,6 +12,7 @@ from translucent.preview import numbers
 from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.desk import Desk, Probed, em
 from translucent.preview.measuring import Crossing
+from translucent.preview.scales import thickest, worst
 from translucent.units import metres_per_unit
 
 #: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
@@ -91,6 +92,8 @@ def _keys(desk: Desk) -> None:
         desk.frame()
     if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
         desk.change("display.converge", not desk.get("display.converge"), step=True)
+    if imgui.is_key_pressed(imgui.Key.p):
+        desk.change("display.caustics", not desk.get("display.caustics"), step=True)
     if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
         (desk.work.redo if io.key_shift else desk.work.undo)()
     elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
@@ -125,10 +128,10 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     _label(over, ImVec2(max(x - width - em(0.8), corner.x + em(0.3)), top), left)
     _label(over, ImVec2(min(x + em(0.8), corner.x + room.x - imgui.calc_text_size(name).x - em(0.5)), top), name)
     if display.compare == "error" and desk.stage.has_truth():
-        worst = desk.stage.worst(desk.work) / metres_per_unit(display.unit)
+        most = worst(desk.work) / metres_per_unit(display.unit)
         lines = (
-            f"blue: {worst:.2g} {display.unit} thinner",
-            f"red: {worst:.2g} {display.unit} thicker",
+            f"blue: {most:.2g} {display.unit} thinner",
+            f"red: {most:.2g} {display.unit} thicker",
             "orange: not valid",
         )
         for i, line in enumerate(lines, 1):
@@ -155,7 +158,7 @@ def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
         color = 0xFF000000 | blue << 16 | green << 8 | red
         begin, end = left + width * i / parts, left + width * (i + 1) / parts
         over.add_rect_filled(ImVec2(begin, top), ImVec2(end + 1.0, top + height), color)
-    most = desk.stage.thickest(desk.work) / metres_per_unit(display.unit)
+    most = thickest(desk.work) / metres_per_unit(display.unit)
     free = left - em(1.0)
     for value in marks(most):
         text = f"{value:.4g}"
@@ -262,11 +265,8 @@ def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) ->
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
     stage = desk.stage
-    lines = [
-        text
-        for text in (stage.problem, stage.shader_problem, stage.simpler, stage.diffusing, stage.converging.told)
-        if text
-    ]
+    known = stage.simpler, stage.diffusing, stage.converging.told, stage.photons.told
+    lines = [text for text in (stage.problem, stage.shader_problem, *known) if text]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
     lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]
     for text in lines:

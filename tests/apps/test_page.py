@@ -1,0 +1,178 @@
+"""Pages without a browser: what is written, and what is refused."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import gzip
+import json
+import re
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import translucent as tl
+from tests.command_line import Run, one_error_line, strict_json
+from translucent.gpu.recording.frames import FrameRecorder
+from translucent.page.container import MAGIC, Container
+from translucent.page.plans import TEXTURE_UNITS, plan_page
+from translucent.page.simplify import simplified, triangles
+from translucent.planning.notes import NoteKind
+from translucent.scene.showcase import showcase
+
+_SAMPLER = re.compile(r"^uniform [iu]?sampler\w+ (\w+)", re.MULTILINE)
+
+
+@pytest.fixture
+def run(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    """The command, with a script in place of the viewer's, which is built with npm."""
+    script = tmp_path / "page.js"
+    script.write_text("'</script>';", encoding="utf-8")
+    monkeypatch.setattr("translucent.page.write.web_path", lambda _: script)
+    return partial(run, "page")
+
+
+def contents(path: Path) -> tuple[dict[str, Any], bytes]:
+    text = re.search(r'id="scene">([^<]*)<', path.read_text(encoding="utf-8"))
+    assert text is not None
+    content = gzip.decompress(base64.b64decode(text[1]))
+    assert content.startswith(MAGIC)
+    length = int.from_bytes(content[8:16], "little")
+    return json.loads(content[16 : 16 + length]), content[16 + length :]
+
+
+def ball(**more: Any) -> tl.Object:
+    made = trimesh.creation.icosphere(2, 0.02)
+    mesh = tl.Mesh(made.vertices, made.faces, name="ball.ply")
+    return tl.Object(mesh, **{"medium": tl.Medium.from_color((0.5, 0.8, 0.6), 0.02, ior=1.5), **more})
+
+
+def scene_of(*objects: tl.Object, **more: Any) -> tl.Scene:
+    return tl.Scene(objects, tl.Camera.look_at((0.03, 0.03, 0.09), (0, 0, 0), fov_y=30), **more)
+
+
+def test_a_page_is_one_file_that_fetches_nothing(run: Run, cube: Path, tmp_path: Path) -> None:
+    out = tmp_path / "cube.html"
+    told = strict_json(run(str(cube), "-o", str(out), "--poster", "none", "--stage", "none", "--json").out)
+    assert told["bytes"] == out.stat().st_size < 1_500_000
+    text = out.read_text(encoding="utf-8")
+    assert "default-src 'none'" in text
+    assert not re.search(r'(src|href)="(?!data:)', text)
+    assert "<script>'<\\/script>';</script>" in text  # a script ends only where it does
+    header, _ = contents(out)
+    assert header["name"] == "cube"
+    assert header["scene"]["size"] == [1280, 800]
+    assert [medium["editable"] for medium in header["scene"]["media"]] == [True]
+    assert len(header["shifts"]) == header["samples"] == 16
+    assert header["notes"] == told["notes"]
+
+
+def test_positions_are_those_of_the_mesh(run: Run, cube: Path, tmp_path: Path) -> None:
+    out = tmp_path / "cube.html"
+    assert run(str(cube), "-o", str(out), "--poster", "none", "--stage", "none").code == 0
+    header, data = contents(out)
+    mesh = tl.load_mesh(cube)
+    section = header["sections"][header["meshes"][0]["offsets"]]
+    count = int(np.prod(section["shape"]))
+    planes = np.frombuffer(data, np.uint8, 4 * count, section["offset"]).reshape(4, count).astype(np.uint32)
+    folded = sum(planes[i] << np.uint32(8 * i) for i in range(4))
+    steps = (folded >> 1) ^ (0 - (folded & 1)).astype(np.uint32)
+    words = np.cumsum(steps.reshape(section["shape"]), axis=0, dtype=np.uint32)
+    np.testing.assert_array_equal(words.view(np.float32), (mesh.vertices - mesh.center).astype(np.float32))
+
+
+def test_light_is_rounded_by_less_than_told() -> None:
+    rng = np.random.default_rng(3)
+    light = rng.lognormal(size=(5, 7, 3)).astype(np.float32)
+    into = Container()
+    into.add(light, "picture", 13)
+    content = gzip.decompress(into.packed({}))
+    length = int.from_bytes(content[8:16], "little")
+    planes = np.frombuffer(content, np.uint8, 4 * light.size, 16 + length).reshape(4, -1).astype(np.uint32)
+    folded = sum(planes[i] << np.uint32(8 * i) for i in range(4))
+    steps = ((folded >> 1) ^ (0 - (folded & 1)).astype(np.uint32)).reshape(light.shape)
+    words = np.cumsum(np.cumsum(steps, axis=1, dtype=np.uint32), axis=0, dtype=np.uint32)
+    found = (words << np.uint32(10)).view(np.float32)
+    np.testing.assert_allclose(found, light, rtol=2.0**-14)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["-o", "cube.png"], ["not an .html file", "viewer.html"]),
+        (["-o", "nowhere/cube.html"], ["no folder"]),
+        (["--method", "fragment-lists"], ["WebGL2", "SignedDepth"]),
+        (["--method", "path-traced"], ["random paths"]),
+        (["--poster", "absent.png"], ["absent.png", "no such file"]),
+        (["--samples", "0"], ["samples 0", "1 to 256"]),
+        (["--simplify", "3"], ["--simplify 3"]),
+        (["--size", "4"], ["--size"]),
+    ],
+    ids=lambda v: " ".join(v),
+)
+def test_bad_input_is_told_and_leaves_nothing(
+    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: list[str], words: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    output = [] if "-o" in more else ["-o", "cube.html"]
+    line = one_error_line(run(str(cube), *output, "--poster", "none", *more))
+    assert all(word in line for word in words), line
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_poster_is_a_picture(run: Run, cube: Path, tmp_path: Path) -> None:
+    out = tmp_path / "cube.html"
+    assert run(str(cube), "-o", str(out), "--poster", str(cube)).code == 2
+    picture = tmp_path / "poster.png"
+    picture.write_bytes(b"\x89PNG rest")
+    assert run(str(cube), "-o", str(out), "--poster", str(picture), "--stage", "none").code == 0
+    assert 'src="data:image/png;base64,' in out.read_text(encoding="utf-8")
+
+
+def test_many_triangles_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("translucent.page.plans.MANY_TRIANGLES", 300)
+    monkeypatch.setattr("translucent.page.plans.MOST_TRACED", 300)
+    planned = plan_page(scene_of(ball()))
+    assert planned.plan.interfaces == tl.FrontInterface()
+    kinds = [note.kind for note in planned.notes]
+    assert NoteKind.MANY_TRIANGLES in kinds
+    assert triangles(planned.scene) == 320
+
+
+@pytest.mark.parametrize("overlap", ["add", "priority"])
+def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> None:
+    """Of a scene with all that traced interfaces read: shadows, light that diffuses, a picture as environment."""
+    milk = tl.preset("skim_milk").medium
+    scene = showcase(ball().mesh, milk, (64, 40))
+    bodies = [*scene.objects, ball(transform=np.diag([0.4, 0.4, 0.4, 1.0]), priority=1)]
+    scene = dataclasses.replace(scene, objects=bodies, overlap=overlap)
+    planned = plan_page(scene, scattering=tl.Diffusion(resolution=8), shadows=tl.ShadowMaps(64))
+    recorder = FrameRecorder(4, planned.most_layers, planned.texture_units)
+    frame = recorder.record(planned.scene, planned.plan)
+    assert planned.plan.traced is False
+    assert frame.single
+    assert frame.averaged
+    for vertex, fragment in recorder.gl.programs:
+        assert len(set(_SAMPLER.findall(vertex + fragment))) <= TEXTURE_UNITS
+
+
+def test_a_coarser_copy_has_the_same_volume() -> None:
+    pytest.importorskip("fast_simplification", reason="fast-simplification is not installed")
+    scene = scene_of(ball())
+    coarse = simplified(scene, 200)
+    assert triangles(coarse) <= 210
+    mesh = coarse.objects[0].mesh
+    assert mesh.diagnosis.solid
+    assert mesh.volume == pytest.approx(scene.objects[0].mesh.volume, rel=0.05)
+
+
+def test_without_the_package_a_coarser_copy_is_told_how(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "fast_simplification", None)
+    with pytest.raises(tl.InputError, match="pip install fast-simplification"):
+        simplified(scene_of(ball()), 200)

@@ -1,0 +1,210 @@
+"""Pages of `translucent page` in headless Chromium, opened from disk, against the renderer with the same choices."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import trimesh
+
+import translucent as tl
+from tests.browser.pages import WebPage, decoded
+
+SIZE = (160, 100)
+
+#: Root mean square error over mean radiance that a page may have.
+BAR = 1e-3
+
+_READ = """async ({ size, samples }) => {
+  const viewer = await translucent;
+  return encoded(viewer.render({ size, samples }));
+}"""
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[tl.Renderer]:
+    with tl.Renderer() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def tools() -> str:
+    return """globalThis.encoded = (values) => {
+      const bytes = new Uint8Array(values.buffer);
+      let text = "";
+      for (let i = 0; i < bytes.length; i += 32768) text += String.fromCharCode(...bytes.subarray(i, i + 32768));
+      return btoa(text);
+    };"""
+
+
+def radiance(page: WebPage, size: tuple[int, int] = SIZE, samples: int = 16) -> npt.NDArray[np.float64]:
+    text = page.run(_READ, {"size": size, "samples": samples})
+    return decoded(text, "f4").reshape(size[1], size[0], 4)[..., :3].astype(np.float64)
+
+
+def error(found: npt.NDArray[np.float64], frame: tl.Frame) -> float:
+    """Root mean square error over mean radiance.
+
+    SwiftShader puts vertices down on 1/16 of a pixel, OpenGL here on 1/256: pixels at outlines cover a little more or
+    less, by whatever bent rays make of it.
+    """
+    return float(np.sqrt(np.square(found - frame.radiance).mean()) / frame.radiance.mean())
+
+
+def ball(medium: tl.Medium, **more: Any) -> tl.Object:
+    made = trimesh.creation.icosphere(4, 0.02)
+    return tl.Object(tl.Mesh(made.vertices, made.faces, name="ball.ply"), medium, **more)
+
+
+def scene_of(body: tl.Object, **more: Any) -> tl.Scene:
+    camera = tl.Camera.look_at((0.03, 0.03, 0.09), (0, 0, 0), fov_y=30)
+    return tl.Scene([body], camera, environment=SKY, **more)
+
+
+SKY = tl.Environment.gradient((0.3, 0.4, 0.5), (1.0, 0.9, 0.8))
+RED = tl.Medium.from_color((0.7, 0.2, 0.1), 0.02)
+GLASS = tl.Medium.from_color((0.5, 0.8, 0.6), 0.02, ior=1.5)
+
+
+def opened(page: WebPage, scene: tl.Scene, folder: Path, tools: str, **choices: Any) -> None:
+    """A page of a scene, that draws nothing of its own accord, and no more than it is asked for."""
+    file = folder / "page.html"
+    tl.write_page(scene, file, size=SIZE, **choices)
+    page.page.add_init_script(tools)
+    page.open(file)
+
+
+def test_absorbing_body(web_page: WebPage, web_dist: Path, renderer: tl.Renderer, tmp_path: Path, tools: str) -> None:
+    scene = scene_of(ball(RED))
+    opened(web_page, scene, tmp_path, tools)
+    assert error(radiance(web_page), renderer.render(scene, SIZE, samples=16)) < BAR
+
+
+def test_traced_glass_before_opaque(
+    web_page: WebPage, web_dist: Path, renderer: tl.Renderer, tmp_path: Path, tools: str
+) -> None:
+    """Rays bent twice, onto a floor with the colored shadow of the ball."""
+    floor = trimesh.creation.box((0.1, 0.002, 0.1))
+    floor.apply_translation((0, -0.022, 0))
+    ground = tl.Object(tl.Mesh(floor.vertices, floor.faces, name="floor.ply"), None, color=(0.6, 0.5, 0.4))
+    scene = scene_of(ball(GLASS), lights=[tl.DirectionalLight((-0.4, -1, -0.3), 2.0)])
+    scene = dataclasses.replace(scene, objects=[*scene.objects, ground])
+    opened(web_page, scene, tmp_path, tools, shadows=tl.ShadowMaps(256))
+    frame = renderer.render(scene, SIZE, shadows=tl.ShadowMaps(256))
+    found = radiance(web_page, samples=1)
+    # What is sharp, outlines, their refracted images and the highlight, depends on the grid of vertices; see `error`.
+    difference = np.abs(found - frame.radiance).max(axis=-1) / frame.radiance.mean()
+    assert np.quantile(difference, 0.95) < BAR
+    assert np.quantile(difference, 0.99) < 10 * BAR
+
+
+def test_material_of_the_panel(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    """A material that is set gives, pixel by pixel, what a page has that was written with it; so does one set back."""
+    medium = tl.Medium.from_color("#30c060", 0.01, ior=1.4)
+    rough = scene_of(ball(medium, surface=tl.Surface(roughness=0.4)))
+    opened(web_page, rough, tmp_path, tools)
+    first = radiance(web_page, samples=1)
+    web_page.run("async () => (await translucent).setMaterial({ ior: 1, roughness: 0 })")
+    clear = radiance(web_page, samples=1)
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    red = radiance(web_page, samples=1)
+    web_page.run("async () => (await translucent).setMaterial({ color: '#30c060', distance: 0.01 })")
+    np.testing.assert_array_equal(radiance(web_page, samples=1), clear)
+    web_page.run("async () => (await translucent).setMaterial({ ior: 1.4, roughness: 0.4 })")
+    np.testing.assert_array_equal(radiance(web_page, samples=1), first)
+    web_page.run("async () => (await translucent).resetMaterial()")
+    np.testing.assert_array_equal(radiance(web_page, samples=1), red)
+
+
+def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    """Keys and the panel; the probe against the ball's thickness; a context that is lost and comes back."""
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    page = web_page.page
+    page.wait_for_function("async () => (window.viewer = await translucent).still")
+    where = "viewer.state().camera.eye"
+    start = page.evaluate(where)
+    page.keyboard.press("ArrowRight")
+    turned = page.evaluate(where)
+    assert np.linalg.norm(turned) == pytest.approx(np.linalg.norm(start))
+    angles = [np.arctan2(eye[0], eye[2]) for eye in (start, turned)]
+    assert angles[0] - angles[1] == pytest.approx(np.pi / 36)
+    page.keyboard.press("+")
+    assert np.linalg.norm(page.evaluate(where)) < 0.95 * np.linalg.norm(start)
+    page.keyboard.press("r")
+    assert page.evaluate(where) == pytest.approx(start)
+    page.keyboard.press("t")
+    page.wait_for_function("() => viewer.still")
+    found = page.evaluate("viewer.probe(0.5, 0.5)")
+    assert found["valid"]
+    assert found["count"] == 0
+    assert found["thickness"] == pytest.approx(0.04, rel=2e-3)
+    assert found["transmittance"] == pytest.approx(RED.transmittance(found["thickness"]), rel=1e-4)
+    scale = page.locator(".scale .marks").inner_text()
+    assert "39.97" in scale
+    assert scale.endswith("mm")
+    page.keyboard.press("t")
+    page.locator("#color").fill("#3070c0")
+    held = page.evaluate("viewer.state().media[0]")
+    assert held["extinction"] == pytest.approx(tl.Medium.from_color("#3070c0", held["distance"]).extinction)
+    page.evaluate("(window.loser = viewer.gl.getExtension('WEBGL_lose_context')).loseContext()")
+    page.wait_for_function("() => viewer.lost")
+    assert "graphics card" in page.locator(".told").inner_text()
+    page.evaluate("window.before = viewer.player")
+    page.evaluate("loser.restoreContext()")
+    page.wait_for_function("() => !viewer.lost && viewer.still && viewer.player !== before")
+    assert page.evaluate("viewer.probe(0.5, 0.5)")["covered"]
+
+
+def test_touch_on_a_phone(chromium: Any, web_dist: Path, tmp_path: Path) -> None:
+    """On a narrow page the panel lies below the picture; a finger turns, and none of it scrolls."""
+    file = tmp_path / "page.html"
+    tl.write_page(scene_of(ball(RED)), file, size=SIZE)
+    page = WebPage(chromium, (390, 844), has_touch=True, is_mobile=True)
+    try:
+        page.open(file)
+        page.page.wait_for_function("async () => (window.viewer = await translucent).still")
+        canvas, panel = (page.page.locator(name).bounding_box() for name in (".stage canvas", ".panel"))
+        assert canvas
+        assert panel
+        assert canvas["y"] + canvas["height"] <= panel["y"]
+        before = page.run("() => viewer.state().camera.eye")
+        touch = page.page.context.new_cdp_session(page.page)
+        for kind, at in (("touchStart", 100), ("touchMove", 140), ("touchMove", 200), ("touchEnd", None)):
+            points = [] if at is None else [{"x": at, "y": 200}]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        page.page.wait_for_function("(eye) => Math.abs(viewer.state().camera.eye[0] - eye[0]) > 1e-3", arg=before)
+        assert page.run("() => document.documentElement.scrollHeight") <= 844
+        assert page.errors == []
+    finally:
+        page.close()
+
+
+def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    web_page.page.add_init_script(
+        "const own = HTMLCanvasElement.prototype.getContext;"
+        "HTMLCanvasElement.prototype.getContext = function (kind, ...more) {"
+        " return kind === 'webgl2' ? null : own.call(this, kind, ...more); };"
+    )
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    web_page.run("async () => (await translucent).failed")
+    assert "no WebGL2" in web_page.page.locator(".told").inner_text()
+    assert any("no WebGL2" in text for text in web_page.messages)
+    assert web_page.page.locator("#ior").is_disabled()
+
+
+def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    """Where there is no blending of 32-bit floats, thickness is added up in 16 bits, and the page says so."""
+    web_page.page.add_init_script(
+        "const own = WebGL2RenderingContext.prototype.getExtension;"
+        "WebGL2RenderingContext.prototype.getExtension = function (name) {"
+        " return name === 'EXT_float_blend' ? null : own.call(this, name); };"
+    )
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    web_page.page.wait_for_function("async () => (window.viewer = await translucent).still")
+    assert "16 bits" in web_page.page.locator(".notes").inner_text()
+    assert web_page.page.evaluate("viewer.probe(0.5, 0.5).thickness") == pytest.approx(0.04, rel=5e-3)

@@ -1,0 +1,135 @@
+"""Photons in the still picture: the same light at any number, more and more of them, and none while things move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import translucent as tl
+from tests.preview.waiting import SIZE, finish, pixels, wait
+from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.photon_light import PhotonLight
+from translucent.gpu.viewport import Viewport
+from translucent.preview import photons
+from translucent.preview.actions import Change, Turn
+from translucent.preview.document import Document, Model
+from translucent.preview.exports import write_picture
+from translucent.preview.stage import Stage
+from translucent.preview.workspace import Workspace
+
+#: A ball of glass on a floor, under the sun.
+GLASS = tl.Object(Sphere().tessellate(32), tl.Medium((0.1, 0.2, 0.4), ior=1.5))
+FLOOR = tl.Object(Box((-4.0, -1.2, -4.0), (4.0, -1.1, 4.0)).tessellate(), color=(0.7, 0.7, 0.7))
+SUN = tl.DirectionalLight((0.4, -1.0, 0.2), 3.0)
+LIT = tl.Scene([GLASS, FLOOR], tl.Camera.look_at((0, 3, 6), (0, -0.5, 0)), [SUN], tl.Environment.constant("#202020"))
+ROUND = 1 << 12
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    made = Stage()
+    yield made
+    made.close()
+
+
+def test_rounds_add_up_to_the_photons_of_one_frame(stage: Stage) -> None:
+    """They are the same photons, so that energy is right whatever their number; and the picture is drawn in parts."""
+    plan = stage.renderer.plan(LIT, caustics=tl.Caustics(ROUND))
+    with stage.current():
+        viewport = Viewport(stage.renderer.gpu)
+        viewport.resize(SIZE)
+        light = PhotonLight(stage.renderer.gpu, LIT, viewport.size, plan)
+        errors, lights = [], []
+        for rounds in (4, 8, 16):
+            while light.rounds < rounds:
+                light._at_once = 4
+                light.step(0.0)
+            light.show()
+            errors.append(light.error)
+            lights.append(light._shown[1])
+        assert light.photons == 16 * ROUND
+        for _ in range(4):
+            viewport.step(0, LIT, plan, 2, photons=light.texture)
+        side = viewport._side(0, SIZE)
+        kept = np.frombuffer(side.light.read(components=4, dtype="f4"), np.float32).reshape(SIZE[1], SIZE[0], 4)
+        place = [side.kept(x, y) for y in range(SIZE[1]) for x in range(SIZE[0])]
+        shown = np.array([kept[y, x, :3] for x, y in place]).reshape(SIZE[1], SIZE[0], 3)
+        assert viewport.mean_radiance() == pytest.approx(shown.mean(), rel=1e-5)
+        frame = stage.renderer.render(LIT, SIZE, caustics=tl.Caustics(16 * ROUND))
+        light.release()
+        viewport.release()
+    # What is seen through glass is looked up in each part of the picture; silhouettes may fall to either side.
+    off = np.abs(shown - frame.radiance) > 1e-5 + 1e-4 * frame.radiance
+    assert off[~frame.coverage].mean() < 1e-3
+    means = [values.mean(dtype=np.float64) for values in lights]
+    assert means[0] > 0
+    np.testing.assert_allclose(means, means[-1], rtol=0.02)  # 16,384 photons: 1 / sqrt(n) of them is 0.8 %
+    assert errors[0] == np.inf
+    assert np.inf > errors[1] > errors[2] > 0
+    truth = float(np.sqrt(np.square(lights[1] - lights[2], dtype=np.float64).mean()))
+    assert errors[2] == pytest.approx(truth, rel=1e-6)
+
+
+def test_photons_light_the_still_picture_until_something_changes(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in {"ROUND": ROUND, "MOST_PHOTONS": 8 * ROUND, "SHARE": 0.0}.items():
+        monkeypatch.setattr(photons, name, value)
+    assert work.loaded is not None
+    monkeypatch.setattr(work, "scene", lambda: LIT)
+    work.do(Change("display.antialias", False))
+    finish(stage, work)
+    without = pixels(stage)
+    work.do(Change("display.caustics", True))
+    told = []
+    while stage.draw(work, SIZE):
+        told.append(stage.photons.told)
+    assert stage.problem == ""
+    assert any(text.startswith("caustics: not in the picture yet; ") for text in told)
+    assert any("photons in the picture, standard error" in text for text in told)
+    assert stage.photons.told.startswith(f"caustics: {stage.photons.light.photons:,} photons in the picture")  # type: ignore[union-attr]
+    count = stage.photons.light.photons  # type: ignore[union-attr]
+    with stage.current():
+        frame = stage.renderer.render(LIT, SIZE, caustics=tl.Caustics(count))
+    assert (np.abs(pixels(stage) - frame.to_srgb8().astype(int))[~frame.coverage] > 1).mean() < 1e-3
+    assert np.abs(pixels(stage) - without).mean() > 0.5
+    work.do(Change("display.caustics", False))
+    finish(stage, work)
+    assert stage.photons.told == ""
+    assert (np.abs(pixels(stage) - without)[~frame.coverage] > 1).mean() < 2e-3
+
+
+def test_what_has_no_caustics_says_why_and_keeps_its_picture(stage: Stage, work: Workspace) -> None:
+    work.do(Change("display.caustics", True))
+    finish(stage, work)
+    assert stage.photons.told.startswith("no caustics; the scene has no lights")
+    assert stage.viewport.steps(0) > stage._strides[0] ** 2  # edges become smooth all the same
+    work.do(Turn(10.0, 0.0))
+    assert stage.draw(work, SIZE)
+    work.do(Change("display.mode", "thickness"))
+    finish(stage, work)
+    assert stage.photons.told == ""
+
+
+def test_files_have_the_photons(tmp_path: Path) -> None:
+    photons = tl.Caustics(ROUND)
+    write_picture(lambda *_: None, str(tmp_path / "a.png"), LIT, None, (32, 24), caustics=photons)
+    with tl.Renderer() as renderer:
+        frame = renderer.render(LIT, (32, 24), samples=16, caustics=photons)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png")), frame.to_srgb8())
+
+
+def test_a_model_on_a_stage_is_measured_without_it() -> None:
+    from translucent.preview.measuring import straight
+
+    made = Workspace(Document(Model("sphere")))
+    wait(made, lambda: made.loaded is not None)
+    assert made.loaded is not None
+    seen = straight(tl.staged(made.loaded.scene, "night"))
+    made.close()
+    assert len(seen.objects) == 1
+    assert seen.environment_shadows == 0

@@ -1,0 +1,208 @@
+"""Scenes of glTF files at a time of their animations, and in a variant of their materials."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+
+import translucent as tl
+from tests.values.gltf_writer import WINE, Json, Writer, glass, load
+from translucent.gltf.animations import sample
+
+HALF = math.sqrt(0.5)
+#: About y, by 0 and by 90 degrees.
+TURNS = [[0.0, 0.0, 0.0, 1.0], [0.0, HALF, 0.0, HALF]]
+
+
+def animated(path: str, times: list[float], values: Any, mode: str | None = "LINEAR", **node: Any) -> Writer:
+    """A box on a node that is moved, hung on another one."""
+    writer = Writer()
+    writer.add("nodes", mesh=writer.mesh(), name="Box", **node)
+    writer.add("nodes", children=[0], translation=[0.0, 0.0, 7.0])
+    animate(writer, path, times, values, mode)
+    return writer
+
+
+def animate(writer: Writer, path: str, times: list[float], values: Any, mode: str | None = "LINEAR") -> None:
+    sampler: Json = {"input": writer.accessor(times), "output": writer.accessor(values)}
+    if mode is not None:
+        sampler["interpolation"] = mode
+    writer.add("animations", channels=[{"sampler": 0, "target": {"node": 0, "path": path}}], samplers=[sampler])
+
+
+def pose(writer: Writer, tmp_path: Path, time: float) -> np.ndarray:
+    (item,) = load(writer, tmp_path, time=time).objects
+    return np.asarray(item.transform)
+
+
+@pytest.mark.parametrize(("time", "x"), [(0.0, 1.0), (1.0, 1.0), (1.25, 1.5), (2.0, 3.0), (9.0, 3.0)])
+def test_a_node_stands_between_its_keys(tmp_path: Path, time: float, x: float) -> None:
+    """And at the first before them, and at the last behind."""
+    found = pose(animated("translation", [1, 2], [[1, 0, 0], [3, 0, 0]], None), tmp_path, time)
+    np.testing.assert_allclose(found[:3, 3], [x, 0, 7], atol=1e-6)
+
+
+@pytest.mark.parametrize(("time", "scale"), [(0.0, 1.0), (1.9, 1.0), (2.0, 3.0)])
+def test_steps_hold_until_the_next_key(tmp_path: Path, time: float, scale: float) -> None:
+    found = pose(animated("scale", [1, 2], [[1, 1, 1], [3, 3, 3]], "STEP"), tmp_path, time)
+    np.testing.assert_allclose(found[:3, :3], scale * np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rotations_take_the_shorter_arc(tmp_path: Path, sign: float) -> None:
+    found = pose(animated("rotation", [0, 1], [TURNS[0], [sign * v for v in TURNS[1]]]), tmp_path, 1 / 3)
+    expected = Rotation.from_rotvec([0, math.radians(30), 0]).as_matrix()
+    np.testing.assert_allclose(found[:3, :3], expected, atol=1e-6)
+
+
+def test_arcs_are_those_of_another_library() -> None:
+    rng = np.random.default_rng(3)
+    for turns in rng.normal(size=(20, 2, 4)):
+        turns /= np.linalg.norm(turns, axis=1)[:, None]
+        expected = Slerp([0, 1], Rotation.from_quat(turns))([0.3]).as_quat()[0]
+        found = sample(np.array([0.0, 1.0]), turns[:, None], 0.3, "LINEAR", arc=True)
+        assert abs(float(found @ expected)) == pytest.approx(1, abs=1e-12)
+
+
+def test_cubic_splines_follow_their_tangents() -> None:
+    """Of a cubic, the derivative as tangents gives the cubic itself."""
+    times = np.array([0.0, 0.5, 2.0])
+    keys = np.stack([3 * times**2 - 1, times**3 - times, 3 * times**2 - 1], axis=1)[..., None]
+    for t in (0.1, 0.5, 1.7):
+        np.testing.assert_allclose(sample(times, keys, t, "CUBICSPLINE", arc=False), t**3 - t, atol=1e-14)
+
+
+def test_animations_play_at_once_and_the_first_moves_what_two_do(tmp_path: Path) -> None:
+    writer = animated("translation", [0], [[1, 0, 0]])
+    animate(writer, "translation", [0], [[9, 9, 9]])
+    animate(writer, "scale", [0], [[2, 2, 2]])
+    with pytest.warns(tl.TranslucentWarning, match="animations that move what another does"):
+        found = pose(writer, tmp_path, 0)
+    np.testing.assert_allclose(found[:3, 3], [1, 0, 7])
+    assert found[0, 0] == 2
+
+
+def test_what_is_moved_may_be_anything(tmp_path: Path) -> None:
+    writer = animated("scale", [0], [[1, 1, 1]])
+    writer.tree["animations"][0]["channels"][0]["target"]["path"] = ["scale"]
+    with pytest.warns(tl.TranslucentWarning, match="animated properties"):
+        pose(writer, tmp_path, 0)
+
+
+def test_without_a_time_nodes_stand_as_written_and_animations_are_told(tmp_path: Path) -> None:
+    writer = animated("translation", [0], [[1, 0, 0]], translation=[5.0, 0.0, 0.0])
+    with pytest.warns(tl.TranslucentWarning, match=r"animations \(1\)"):
+        (item,) = load(writer, tmp_path).objects
+    assert item.transform[0, 3] == 5
+
+
+def test_morph_targets_and_skins_are_told(tmp_path: Path) -> None:
+    writer = animated("weights", [0], [1.0])
+    writer.add("skins", joints=[0])
+    with pytest.warns(tl.TranslucentWarning) as caught:
+        pose(writer, tmp_path, 1.0)
+    assert "animated weights (number 0); skins (1)" in str(caught[0].message)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"samplers": []}, "sampler 0 is not one of its samplers"),
+        ({"channels": 3}, "channels is not a list"),
+        ({"channels": [{"sampler": 0}]}, "a channel has no target"),
+        ({"samplers": [{"interpolation": "SWING"}]}, "no object with an interpolation of glTF 2.0"),
+        ({"samplers": [{"input": 9, "output": 9}]}, "accessors 9 is not one of"),
+    ],
+)
+def test_a_broken_animation_is_refused(tmp_path: Path, change: Json, message: str) -> None:
+    writer = animated("translation", [0], [[1, 0, 0]])
+    writer.tree["animations"][0] |= change
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        pose(writer, tmp_path, 0)
+
+
+@pytest.mark.parametrize(
+    ("times", "values", "message"),
+    [
+        ([0, 1], [[1, 0, 0]], "1 values for 2 keys"),
+        ([1, 0], [[1, 0, 0]] * 2, "not in the order of time"),
+        ([math.nan], [[1, 0, 0]], "not finite"),
+    ],
+)
+def test_broken_keys_are_refused(tmp_path: Path, times: list[float], values: Any, message: str) -> None:
+    with pytest.raises(tl.InputError, match=message):
+        pose(animated("translation", times, values), tmp_path, 0)
+
+
+def test_other_broken_animations_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(tl.InputError, match="which has a matrix"):
+        pose(animated("scale", [0], [[1, 1, 1]], matrix=np.eye(4).ravel().tolist()), tmp_path, 0)
+    with pytest.raises(tl.InputError, match="a rotation of length 0"):
+        pose(animated("rotation", [0], [[0, 0, 0, 0]]), tmp_path, 0)
+    still = Writer()
+    still.add("nodes", mesh=still.mesh())
+    with pytest.raises(tl.InputError, match="it has no animations; leave the time out"):
+        pose(still, tmp_path, 0)
+    for time in (-1.0, math.inf, math.nan):
+        with pytest.raises(tl.InputError, match="negative or not finite"):
+            pose(animated("scale", [0], [[1, 1, 1]]), tmp_path, time)
+
+
+# Variants
+
+
+def varied() -> Writer:
+    """Two boxes, of which one has another medium in the variants Red and Late, and one none of its own."""
+    writer = Writer()
+    own, other = writer.material(name="Own", extensions=glass()), writer.material(name="Other", extensions=WINE)
+    mapping = {"KHR_materials_variants": {"mappings": [{"material": other, "variants": [1, 2]}]}}
+    writer.add("nodes", mesh=writer.mesh(writer.primitive(material=own, extensions=mapping)), name="A")
+    writer.add("nodes", mesh=writer.mesh(writer.primitive(material=own)), name="B", translation=[9.0, 0.0, 0.0])
+    names = [{"name": name} for name in ("Clear", "Red", "Late")]
+    writer.tree["extensions"] = {"KHR_materials_variants": {"variants": names}}
+    writer.tree["extensionsUsed"] = ["KHR_materials_variants"]
+    return writer
+
+
+@pytest.mark.parametrize(("variant", "red"), [(None, False), ("Clear", False), ("Red", True), ("Late", True)])
+def test_a_variant_has_its_materials(tmp_path: Path, variant: str | None, red: bool) -> None:
+    scene = load(varied(), tmp_path, variant=variant)
+    assert scene.variants == ("Clear", "Red", "Late")
+    assert scene.left_out == ()
+    first, second = scene.objects
+    assert bool(first.medium.extinction.any()) == red
+    assert not second.medium.extinction.any()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("Latte", "no such variant; did you mean Late? use one of Clear, Red, Late"),
+        ("x", "use one of Clear, Red, Late"),
+    ],
+)
+def test_an_unknown_variant_names_the_known_ones(tmp_path: Path, name: str, message: str) -> None:
+    with pytest.raises(tl.InputError, match=re.escape(message)):
+        load(varied(), tmp_path, variant=name)
+
+
+def test_a_file_without_variants_says_so(tmp_path: Path) -> None:
+    writer = Writer()
+    writer.add("nodes", mesh=writer.mesh())
+    with pytest.raises(tl.InputError, match="it has no variants"):
+        load(writer, tmp_path, variant="Red")
+
+
+@pytest.mark.parametrize("mappings", [3, [3], [{}], [{"variants": [1]}], [{"variants": [1], "material": 99}]])
+def test_broken_mappings_are_refused(tmp_path: Path, mappings: Any) -> None:
+    writer = varied()
+    primitive = writer.tree["meshes"][0]["primitives"][0]
+    primitive["extensions"]["KHR_materials_variants"]["mappings"] = mappings
+    with pytest.raises(tl.InputError):
+        load(writer, tmp_path, variant="Red")

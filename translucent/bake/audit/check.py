@@ -1,0 +1,142 @@
+"""The audit of a glTF file: every material that light passes, every body that it fills."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from translucent.bake.audit.body import Body, Placement, measure_body
+from translucent.bake.audit.finding import SEVERITIES, MaterialCheck, MaterialFinding
+from translucent.bake.audit.material_rules import material_findings, scale_findings
+from translucent.bake.audit.mesh_rules import mesh_findings, overlap_findings
+from translucent.bake.audit.thickness_rules import attenuation_findings, thickness_findings
+from translucent.bake.audit.viewers import viewer_colors
+from translucent.bake.gltf.bodies import Bodies, triangle_primitives
+from translucent.errors import InputError, TranslucentWarning
+from translucent.gltf.fields import label
+from translucent.gltf.file import GltfFile, read_gltf
+from translucent.gltf.materials import materials_of
+from translucent.gltf.scene_media import node_transforms
+
+_COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+def check_materials(path: str | Path, *, allow_outside: bool = False) -> MaterialCheck:
+    """Check whether a glTF file's translucent materials say what its meshes are.
+
+    Compared are thicknessFactor and thicknessTexture with the true thickness of each mesh, by rays along its normals
+    and along views; the attenuation, at that thickness; holes, winding and bodies that cross; scales of nodes; and
+    what viewers are known to do differently.
+
+    Parameters
+    ----------
+    path : path
+        A .glb or .gltf file. Nothing is written; see `fix_materials`.
+    allow_outside : bool
+        Whether buffers and images may lie outside the file's folder.
+
+    Returns
+    -------
+    MaterialCheck
+
+    Raises
+    ------
+    InputError
+        If the file is broken or compressed, or a value has a wrong type or is out of its range.
+    RenderError
+        If embreex, which traces the rays, is not installed.
+    """
+    return check_file(read_gltf(path, allow_outside))
+
+
+def check_file(file: GltfFile) -> MaterialCheck:
+    """Check an open file; see `check_materials`."""
+    required = file.tree.get("extensionsRequired", [])
+    if packed := [name for name in _COMPRESSIONS if name in required]:
+        raise InputError(f"glTF {str(file.path)!r}", f"it requires {packed[0]}", "export it without compression")
+    materials, entries = materials_of(file), file.items("materials")
+    found: list[MaterialFinding] = []
+    for material in materials:
+        if material.transmits or material.has_volume:
+            found += material_findings(material, entries[material.index])
+    measured = _bodies(file)
+    for body in measured:
+        found += thickness_findings(body)
+        found += attenuation_findings(body)
+        found += scale_findings(body)
+        found += mesh_findings(file, body)
+    found += overlap_findings(measured)
+    found = _gathered(found)
+    found.sort(key=lambda one: SEVERITIES.index(one.severity))
+    return MaterialCheck(file.path, tuple(found), tuple(_told(body) for body in measured))
+
+
+def _gathered(found: list[MaterialFinding]) -> list[MaterialFinding]:
+    """Findings with one alone of those that are of the whole file, which tells how many bodies it is true of."""
+    sizes = [one for one in found if one.code == "size-unusual"]
+    if len(sizes) < 2:
+        return found
+    first = dataclasses.replace(sizes[0], where=f"{sizes[0].where}, and {len(sizes) - 1} other bodies alike")
+    return [one for one in found if one.code != "size-unusual"] + [first]
+
+
+def _bodies(file: GltfFile) -> list[Body]:
+    """Bodies whose material lets light in."""
+    materials, bodies, placed = materials_of(file), Bodies(file, 1.0), _placements(file)
+    found = []
+    for key, primitive in triangle_primitives(file).items():
+        index = primitive.get("material")
+        if index is None or not materials[index].transmits or not placed[key[0]]:
+            continue
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TranslucentWarning)  # of faces that are turned, which findings tell
+            body = measure_body(file, bodies, key, materials[index], tuple(placed[key[0]]))
+        if body is not None:
+            found.append(body)
+    return found
+
+
+def _placements(file: GltfFile) -> dict[int, list[Placement]]:
+    """Nodes that show each mesh, but those that flatten it."""
+    transforms, nodes = node_transforms(file), file.items("nodes")
+    placed: dict[int, list[Placement]] = defaultdict(list)
+    for index, node in enumerate(nodes):
+        if "mesh" in node and np.linalg.matrix_rank(transforms[index][:3, :3]) == 3:
+            placed[node["mesh"]].append(Placement(label(nodes, index).strip("'"), transforms[index]))
+    return placed
+
+
+def _told(body: Body) -> dict[str, Any]:
+    """Measurements of a body for people and programs."""
+    normals, views = body.beneath * body.world_normals(), body.chords * body.world_views()
+    return {
+        "material": body.material.index,
+        "name": body.material.name,
+        "mesh": body.key[0],
+        "primitive": body.key[1],
+        "mesh_name": body.name,
+        "nodes": [one.name for one in body.placements],
+        "closed": body.mesh.diagnosis.closed,
+        "stated": _statistics(body.stated * body.world_normals()),
+        "along_normals": _statistics(normals),
+        "along_views": _statistics(views),
+        "mesh_space": {
+            "stated": _statistics(body.stated),
+            "along_normals": _statistics(body.beneath),
+            "along_views": _statistics(body.chords),
+        },
+        "escaped": body.escaped,
+        "colors": {name: color.tolist() for name, color in viewer_colors(body).items()},
+    }
+
+
+def _statistics(lengths: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float] | None:
+    finite = lengths[np.isfinite(lengths)]
+    if not finite.size:
+        return None
+    return {"median": float(np.median(finite)), "p95": float(np.percentile(finite, 95))}

@@ -1,0 +1,71 @@
+"""Transmittance of other bodies on the straight way of light to a body in which it diffuses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from translucent.arrays import Array
+from translucent.formulas import optics
+from translucent.geometry.embree import EmbreeMesh
+from translucent.geometry.mesh import Mesh
+from translucent.scene.scene import Object, Scene
+
+#: Faces of one body on a line that are looked for.
+MOST_FACES = 64
+
+_EMBREE: WeakKeyDictionary[Mesh, EmbreeMesh] = WeakKeyDictionary()
+
+
+def dimming_bodies(scene: Scene, body: int) -> list[Object]:
+    """Other bodies that take of the light on its way to one: closed ones of one density, neither layers nor sheets."""
+    return [
+        item
+        for i, item in enumerate(scene.objects)
+        if i != body
+        and item.medium is not None
+        and item.density is None
+        and item.sheet_thickness is None
+        and not item.covers
+        and item.mesh.diagnosis.solid
+        and np.any(item.medium.extinction)
+    ]
+
+
+def light_passed(bodies: Sequence[Object], points: Array, directions: Array, distance: Array) -> Array:
+    """Transmittance (k, 3) from points (k, 3) in unit directions (k, 3) over distances (k,) in metres, or inf.
+
+    As in shadows, interfaces neither bend the way nor take of its light, and where bodies overlap their optical depths
+    add up.
+    """
+    depth = np.zeros((len(points), 3))
+    for body in bodies:
+        assert body.medium is not None
+        depth += _path(body, points, directions, distance)[:, None] * np.asarray(body.medium.extinction)
+    return optics.transmittance(depth)
+
+
+def _path(body: Object, points: Array, directions: Array, distance: Array) -> Array:
+    """(k,): metres inside a body on ways, from where faces are crossed: exits are ahead of every start inside."""
+    mesh = body.mesh
+    embree = _EMBREE.get(mesh) or _EMBREE.setdefault(mesh, EmbreeMesh(mesh))
+    into = np.linalg.inv(body.matrix[:3, :3])
+    origins, ways = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
+    unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    line, face = embree.candidates(
+        (origins - embree.center) / embree.radius,
+        unit,
+        np.full(len(points), MOST_FACES),
+        np.ones(len(mesh.faces), dtype=bool),
+    )
+    first, second, third = (mesh.vertices[mesh.faces[face, corner]] for corner in range(3))
+    normal = np.cross(second - first, third - first)
+    slope = (ways[line] * normal).sum(axis=1)
+    reached = ((first - origins[line]) * normal).sum(axis=1) / np.where(slope == 0.0, np.inf, slope)
+    ahead = reached > 0.0
+    # Inside a body as often as faces ahead are exits, less entries; each that is passed changes that.
+    sign = np.sign(slope)[ahead] * (-1.0 if mesh.diagnosis.inverted else 1.0)
+    line, end = line[ahead], np.minimum(reached[ahead], distance[line[ahead]])
+    return np.asarray(np.maximum(np.bincount(line, sign * end, len(points)), 0.0))

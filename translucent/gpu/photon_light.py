@@ -1,0 +1,109 @@
+"""Light of photons in a still picture, of which more and more are followed as long as nobody changes it."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.gpu.renderer import GpuRenderer
+from translucent.gpu.targets import Targets
+from translucent.planning.passes import PassName
+from translucent.planning.render_plan import RenderPlan
+from translucent.scene.scene import Scene
+
+#: Largest number of rounds that are followed at once.
+MOST_AT_ONCE = 256
+
+
+class PhotonLight:
+    """Light of photons on the opaque objects of a picture: the mean of rounds, each with the photons of the plan.
+
+    Each round follows other photons, and by itself expects the right light everywhere.
+
+    Parameters
+    ----------
+    engine : GpuRenderer
+    scene : Scene
+    size : (width, height)
+    plan : RenderPlan
+        With caustics.
+
+    Attributes
+    ----------
+    rounds : int
+        Rounds that have ended.
+    texture : moderngl.Texture
+        RGBA32F: radiance of that light, as of the last call of `show`.
+    error : float
+        Root mean square over the picture of its standard error, estimated from what the last two calls of `show`
+        differ by; infinite before there are two.
+    """
+
+    def __init__(self, engine: GpuRenderer, scene: Scene, size: tuple[int, int], plan: RenderPlan) -> None:
+        self._pass, gl = engine.photons, engine.context.gl
+        self._gl = gl
+        self.rounds, self.error = 0, np.inf
+        self._at_once, self._shown = 1, (0, np.zeros(0, np.float32))
+        objects = next(step.objects for step in plan.passes if step.name is PassName.CAUSTICS)
+        with ExitStack() as stack:
+            self.texture = gl.texture(size, 4, dtype="f4")
+            stack.callback(self.texture.release)
+            self._into = gl.framebuffer([self.texture])
+            stack.callback(self._into.release)
+            targets = Targets(gl, size)
+            stack.callback(targets.release)
+            self._job = engine.prepare(scene, size, plan, targets=targets)
+            stack.callback(self._job.release)
+            stack.callback(lambda: gl.detect_framebuffer(0).use())  # a released framebuffer must not be the bound one
+            self._pass.draw_depth(self._job, objects)
+            self._pass.paint(self._job, objects)
+            self._tracer = self._pass.begin(stack, self._job)
+            self._stack = stack.pop_all()
+
+    @property
+    def photons(self) -> int:
+        """Photons that have been followed."""
+        return self.rounds * sum(aim.photons for aim in self._tracer.aims)
+
+    def step(self, seconds: float) -> None:
+        """Follow photons for about so many seconds, one round at least."""
+        end = time.perf_counter() + seconds
+        while True:
+            begun = time.perf_counter()
+            last = self.rounds + self._at_once
+            self._job.uniforms.bind()
+            for number, aim in enumerate(self._tracer.aims):
+                self._pass.follow(self._job, self._tracer, number, self.rounds * aim.photons, last * aim.photons)
+            self._gl.finish()
+            self.rounds = last
+            spent = time.perf_counter() - begun
+            if spent < 0.25 * seconds:
+                self._at_once = min(2 * self._at_once, MOST_AT_ONCE)
+            elif spent > seconds:
+                self._at_once = max(self._at_once // 2, 1)
+            if time.perf_counter() + spent > end:
+                return
+
+    def show(self) -> None:
+        """Bring the texture up to date."""
+        self._job.uniforms.bind()
+        self._into.clear()
+        self._pass.shade(self._job, self._into, self.rounds)
+        before, light = self._shown[1], self._read()
+        if before.size:
+            # Half of the rounds were in both: their difference varies as the mean of all does.
+            with np.errstate(under="ignore"):
+                share = self._shown[0] / (self.rounds - self._shown[0])
+                self.error = float(np.sqrt(share * np.square(light - before, dtype=np.float64).mean()))
+        self._shown = self.rounds, light
+
+    def _read(self) -> npt.NDArray[np.float32]:
+        values = np.frombuffer(self._into.read(components=3, dtype="f4"), np.float32)
+        return values.copy()
+
+    def release(self) -> None:
+        """Free what belongs to it."""
+        self._stack.close()

@@ -1,0 +1,64 @@
+"""Numbers of texts that are pasted into an engine, read back. Nothing of a text is ever run.
+
+What is read is what the writers of this package wrote, also where somebody has changed a number since.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from translucent.arrays import Array
+from translucent.errors import InputError
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBERS = re.compile(_NUMBER)
+
+
+def stated_color(what: str, text: str, start: str) -> Array:
+    """(3,): a color behind `start`, each channel in 0..1; raises `InputError` otherwise."""
+    color = stated(what, text, start, 3)
+    if not ((color >= 0) & (color <= 1)).all():
+        raise InputError(what, f"a color {color.tolist()}, not in 0..1", "correct it")
+    return color
+
+
+def stated_length(what: str, text: str, start: str) -> float:
+    """A length behind `start`, > 0; raises `InputError` otherwise."""
+    length = float(stated(what, text, start)[0])
+    if not length > 0:
+        raise InputError(what, f"{start.strip()!r} is {length:g}, not above 0", "correct it")
+    return length
+
+
+def stated(what: str, text: str, start: str, count: int = 1, default: float | None = None) -> Array:
+    """(count,): the numbers that stand behind the first `start` of a text, in its line.
+
+    Parameters
+    ----------
+    what : str
+        Of whom an error speaks.
+    text : str
+    start : str
+        Literal text, right before the numbers or a bracket, a comma or a sign of equality before them.
+    count : int
+    default : float, optional
+        Value where the text has no `start`.
+
+    Raises
+    ------
+    InputError
+        If there is no `start` and no default, or there are not so many finite numbers behind it.
+    """
+    _, found, rest = text.partition(start)
+    if not found:
+        if default is None:
+            raise InputError(what, f"it has no {start.strip()!r}", "give the text as it was printed")
+        return np.full(count, default)
+    line = rest.partition("\n")[0]
+    numbers = np.array([float(number) for number in _NUMBERS.findall(line)[:count]])
+    if numbers.shape != (count,) or not np.isfinite(numbers).all():
+        kind = "a number" if count == 1 else f"{count} numbers"
+        raise InputError(what, f"{start.strip()!r} without {kind} behind it", "give the text as it was printed")
+    return numbers

@@ -1,0 +1,1 @@
+"""Notebooks: scenes that show themselves, and a viewer whose material and camera are Python objects."""

@@ -1,0 +1,329 @@
+"""Data of a page: the scene, its meshes, and the renderer's passes as steps, in one container."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from translucent.arrays import Array
+from translucent.errors import InputError
+from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.formulas.sampling import sample_shifts
+from translucent.formulas.tone import TONES
+from translucent.frames.aovs import false_colors
+from translucent.gpu.balance import face_counts
+from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
+from translucent.gpu.features import FrameFeatures
+from translucent.gpu.layout import BLOCKS, BODY, TABLES
+from translucent.gpu.lifting import lift
+from translucent.gpu.placement import PlacedScene
+from translucent.gpu.recording.context import INFO, RecordingContext
+from translucent.gpu.recording.frames import FrameRecorder, RecordedFrame
+from translucent.gpu.std140 import PackedTable, UniformBlock
+from translucent.gpu.uniforms import media_center
+from translucent.media.medium import Medium
+from translucent.media.presets import presets
+from translucent.page.container import LIGHT_BITS, Container
+from translucent.page.meshes import mesh_told, name_of
+from translucent.page.plans import PagePlan
+from translucent.page.variants import current, editable, variant
+from translucent.scene.lights import PositionalLight
+from translucent.scene.scene import Object, Scene
+from translucent.version import VERSION
+
+#: Indices of refraction from 1 to 3 for which pages know the share of diffuse light that an interface mirrors.
+MIRROR_STEPS = 65
+
+#: Samplers of textures that hold light.
+_LIGHT = ("light_map", "light_levels", "light_irradiance", "seen_map", "diffused_light")
+
+#: Steps of `RecordedFrame`, by their names in the header.
+_PARTS = ("once", "single", "averaged")
+
+
+def payload(planned: PagePlan, name: str, size: tuple[int, int], samples: int, exposure: float, tone: str) -> bytes:
+    """Data of a page that shows a scene.
+
+    Parameters
+    ----------
+    planned : PagePlan
+    name : str
+        For people.
+    size : (width, height)
+        Of the picture that the camera frames.
+    samples : int
+        Of each pixel, at rest.
+    exposure : float
+        Stops brighter.
+    tone : {"none", "neutral", "agx"}
+    """
+    scene = planned.scene
+    recorder = FrameRecorder(samples, planned.most_layers, planned.texture_units)
+    into = Container()
+    frames, aliases = _recorded(recorder, planned)
+    gl = recorder.gl
+    kept = _kept_contents(gl)
+    spectral_maps = recorder.resources.shadows.spectral
+    header = {
+        "version": VERSION,
+        "name": name,
+        "samples": samples,
+        "shifts": sample_shifts(samples).tolist(),
+        "exposure": exposure,
+        "tone": tone,
+        "notes": [{"kind": str(note.kind), "text": str(note)} for note in planned.notes],
+        "scene": _scene_told(planned, size, gl),
+        "presets": _presets_told(),
+        "inner_mirror": [diffuse_interface(ior).reflected for ior in np.linspace(1.0, 3.0, MIRROR_STEPS)],
+        "layout": {
+            "blocks": {block: _layout(item) for block, item in BLOCKS.items()},
+            "tables": {table: _layout(item) for table, item in TABLES.items()},
+        },
+        "present": _present_told(),
+        "false_colors": into.add(false_colors()),
+        "hierarchies": _hierarchies_told(recorder, scene, into),
+        "meshes": _meshes_told(gl, into),
+        "spectral_maps": spectral_maps,
+        "aliases": aliases,
+        "variants": {
+            key: _variant_told(frame, seen, gl, into, kept, spectral_maps) for key, (seen, frame) in frames.items()
+        },
+    }
+    sections = _Sections(gl, into, kept)
+    light = _light(frames)
+    header["textures"] = [sections.texture(told, i in light) for i, told in enumerate(gl.textures)]
+    header["programs"], header["framebuffers"] = gl.programs, gl.framebuffers
+    _number_blocks(header, sections)
+    return into.packed(header)
+
+
+def _recorded(
+    recorder: FrameRecorder, planned: PagePlan
+) -> tuple[dict[str, tuple[Scene, RecordedFrame]], dict[str, str]]:
+    """Frames of the scene and of its variants, and which of them each switch setting is shown by."""
+    frames = {"base": (planned.scene, recorder.record(planned.scene, planned.plan))}
+    aliases: dict[str, str] = {}
+    if all(editable(body) for body in planned.scene.objects):
+        return frames, aliases
+    now = current(planned.scene)
+    for bends in (False, True):
+        for rough in (False, True):
+            key = f"{'bends' if bends else 'straight'} {'rough' if rough else 'smooth'}"
+            if (bends, rough) == now:
+                aliases[key] = "base"
+                continue
+            seen = variant(planned.scene, bends=bends, rough=rough)
+            try:
+                frames[key] = seen, recorder.record(seen, planned.planned(seen))
+                aliases[key] = key
+            except InputError:
+                continue  # a way of drawing that was asked for cannot do it
+    return frames, aliases
+
+
+class _Sections:
+    """Numbers of sections for arrays of a recording."""
+
+    def __init__(self, gl: RecordingContext, into: Container, kept: frozenset[int]) -> None:
+        self._gl, self._into, self._kept = gl, into, kept
+        self._numbers: dict[int, int] = {}
+
+    def number(self, content: int, packing: str = "plain", bits: int = 23) -> int:
+        """Section of one of the contents."""
+        if content not in self._numbers:
+            self._numbers[content] = self._into.add(self._gl.contents[content], packing, bits)
+        return self._numbers[content]
+
+    def texture(self, told: Mapping[str, Any], light: bool) -> dict[str, Any]:
+        """What the header says of a texture; light is rounded."""
+        content = told["content"]
+        if content is None or content in self._kept:
+            return {**told, "content": None}
+        return {**told, "content": self.number(content, "picture" if light else "plain", LIGHT_BITS if light else 23)}
+
+
+def _light(frames: Mapping[str, tuple[Scene, RecordedFrame]]) -> set[int]:
+    """Textures that hold light."""
+    steps = [step for _, frame in frames.values() for part in _PARTS for step in getattr(frame, part)]
+    return {step["textures"][name] for step in steps for name in _LIGHT if name in step.get("textures", {})}
+
+
+def _kept_contents(gl: RecordingContext) -> frozenset[int]:
+    """Contents of hierarchies, which pages build themselves."""
+    return frozenset(told["content"] for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None)
+
+
+def _number_blocks(header: dict[str, Any], sections: _Sections) -> None:
+    """Put sections in place of contents in the steps."""
+    for told in header["variants"].values():
+        for part in _PARTS:
+            for step in told[part]:
+                if "blocks" in step:
+                    step["blocks"] = {name: sections.number(content) for name, content in step["blocks"].items()}
+
+
+def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) -> dict[str, Any]:
+    scene = planned.scene
+    camera = scene.camera
+    media = list(dict.fromkeys(body.medium for body in scene.objects if body.medium is not None and not body.covers))
+    numbers = [i for i, body in enumerate(scene.objects) if body.medium is not None]
+    throwing = [i for i in numbers if not scene.objects[i].covers] or numbers
+    return {
+        "size": list(size),
+        "camera": {
+            "eye": camera.eye.tolist(),
+            "right": camera.right.tolist(),
+            "up": camera.up.tolist(),
+            "forward": camera.forward.tolist(),
+            "fov_y": camera.fov_y,
+            "height": camera.height,
+        },
+        "diagonal": scene.diagonal,
+        "bounds": scene.bounds.tolist(),
+        "center": media_center(scene).tolist(),
+        "first_body": numbers[0],
+        "first_throwing": throwing[0],
+        "lights": [
+            {"position": np.asarray(light.position, np.float64).tolist()} if isinstance(light, PositionalLight) else {}
+            for light in scene.lights
+        ],
+        "media": [_medium_told(scene, medium, planned.distance) for medium in media],
+        "objects": [
+            {
+                "mesh": gl.number_of_mesh(body.mesh),
+                "matrix": body.matrix.ravel().tolist(),
+                "bounds": body.bounds.tolist(),
+                "inverted": body.mesh.diagnosis.inverted,
+                "opaque": body.medium is None,
+                "sheet": body.sheet_thickness,
+                "medium": media.index(body.medium) if body.medium in media and not body.covers else None,
+            }
+            for body in scene.objects
+        ],
+    }
+
+
+def _medium_told(scene: Scene, medium: Medium, distance: float | None) -> dict[str, Any]:
+    bodies = [body for body in scene.objects if body.medium is medium and not body.covers]
+    first = bodies[0]
+    why = next(filter(None, map(editable, bodies)), "")
+    extinction: Array = bounded_extinction(medium, scene.diagonal)
+    return {
+        "name": ", ".join(dict.fromkeys(name_of(body.mesh) for body in bodies)),
+        "extinction": extinction.tolist(),
+        "ior": medium.ior,
+        "roughness": 0.0 if first.surface is None else first.surface.roughness,
+        "distance": distance or _shown_distance(first),
+        "editable": not why,
+        "why": why,
+    }
+
+
+def _shown_distance(body: Object) -> float:
+    """Distance in metres, a round number, at which the color of a body's medium is shown."""
+    metres = body.mean_thickness
+    power = 10.0 ** np.floor(np.log10(metres)) if metres > 0 else 1.0
+    return float(power * min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(step * power - metres)))
+
+
+def _presets_told() -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "extinction": preset.medium.extinction.tolist(),
+            "ior": preset.medium.ior,
+            "roughness": preset.roughness,
+        }
+        for name, preset in presets().items()
+        if preset.regime == "absorbing"
+    ]
+
+
+def _layout(item: UniformBlock | PackedTable) -> dict[str, Any]:
+    fields = {}
+    for name, base, shape in item.fields:
+        offset = _offset(item, name)
+        fields[name] = [offset, base, int(np.prod(shape, dtype=int))]
+    binding = item.binding if isinstance(item, UniformBlock) else None
+    return {"binding": binding, "size": item.dtype.itemsize, "fields": fields}
+
+
+def _offset(item: UniformBlock | PackedTable, name: str) -> int:
+    fields = item.dtype.fields
+    assert fields is not None
+    return int(fields[name][1])
+
+
+def _present_told() -> dict[str, str]:
+    texts = {tone: lift("present/present.frag", {"TONE": i}, "webgl2").text for i, tone in enumerate(TONES)}
+    return {"vertex": lift("geometry/fullscreen.vert", {}, "webgl2").text, **texts}
+
+
+def _meshes_told(gl: RecordingContext, into: Container) -> list[dict[str, Any]]:
+    return [mesh_told(mesh, into, with_normals=True, with_looks=True) for mesh in gl.meshes]
+
+
+def _hierarchies_told(recorder: FrameRecorder, scene: Scene, into: Container) -> dict[str, Any] | None:
+    """Nodes of the hierarchy of objects, and the meshes whose hierarchies follow."""
+    gl = recorder.gl
+    meshes = list(dict.fromkeys(body.mesh for body in scene.objects))
+    traced = [told for told in gl.textures if told["dtype"] == "u4" and told["content"] is not None]
+    if not traced:
+        return None
+    nodes = gl.contents[traced[0]["content"]]
+    rows = -(-16 * len(scene.objects) // nodes.shape[1])
+    return {
+        "objects": into.add(np.ascontiguousarray(nodes[:rows]).reshape(-1, 4)),
+        "meshes": [gl.number_of_mesh(mesh) for mesh in meshes],
+    }
+
+
+def _variant_told(
+    frame: RecordedFrame,
+    scene: Scene,
+    gl: RecordingContext,
+    into: Container,
+    kept: frozenset[int],
+    spectral_maps: bool,
+) -> dict[str, Any]:
+    features = FrameFeatures(scene, frame.plan)
+    roles = BodyRoles.of(features, face_counts(scene, int(INFO["GL_SUBPIXEL_BITS"])))
+    names = {block.binding: name for name, block in BLOCKS.items()}
+    blocks = {names[binding]: into.add(_bytes(content)) for binding, content in frame.blocks.items()}
+    steps = {part: [dict(step) for step in getattr(frame, part)] for part in _PARTS}
+    if spectral_maps:
+        for step in steps["once"]:
+            if "Body" in step.get("blocks", {}):
+                step["object"] = _object_of(gl.contents[step["blocks"]["Body"]], gl.meshes[step["mesh"]], scene)
+    return {
+        **steps,
+        "blocks": blocks,
+        "bodies": [into.add(_bytes(content)) for content in frame.bodies],
+        "targets": frame.targets,
+        "roles": [
+            {"anchored": roles.anchored, "weight": weight, "subpixel": roles.counts.subpixel}
+            for weight in roles.counts.weights.tolist()
+        ],
+        "slots": [list(slot.objects) for slot in features.slots],
+        "spectral": frame.plan.spectral,
+        "makes_sheets": frame.plan.method.makes_sheets,
+        "counts_from_camera": frame.plan.method.counts_from_camera,
+        "starts_inside": PlacedScene.of(scene).starts_inside,
+    }
+
+
+def _object_of(content: npt.NDArray[Any], mesh: object, scene: Scene) -> int | None:
+    """Number of the object that a Body block of a map of shadows belongs to."""
+    extinction = np.frombuffer(content.tobytes(), BODY.dtype)["extinction"][0, :3]
+    for i, body in enumerate(scene.objects):
+        own = bounded_extinction(body.medium, scene.diagonal).astype(np.float32)
+        if body.mesh is mesh and body.medium is not None and np.array_equal(own, extinction):
+            return i
+    return None
+
+
+def _bytes(content: bytes) -> npt.NDArray[np.uint8]:
+    return np.frombuffer(content, np.uint8)

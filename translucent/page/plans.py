@@ -1,0 +1,145 @@
+"""Plans for pages: what WebGL2 can draw of a scene, and notes of what it leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from translucent.errors import InputError
+from translucent.page.simplify import triangles
+from translucent.planning.interfaces import FrontInterface, Interfaces
+from translucent.planning.methods import DepthPeeling, Method
+from translucent.planning.notes import Note, NoteKind
+from translucent.planning.passes import PassName
+from translucent.planning.plan import plan
+from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.scattering import Scattering
+from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS, ShadowMaps
+from translucent.scene.scene import Scene
+
+#: Textures that WebGL2 promises in a shader. Passes that trace rays have theirs put together, and so read as many as
+#: `UNITS_WITH_SHADOWS` in these.
+TEXTURE_UNITS = 16
+
+#: Triangles up to which a page traces rays: it builds their hierarchy when it is opened, 2 s for 300 000.
+MOST_TRACED = 600_000
+
+#: Triangles from which on a page is slow to load and to turn.
+MANY_TRIANGLES = 1_000_000
+
+#: Crossings of a ray that depth peeling finds in a page: each pass goes over the geometry once more.
+MOST_LAYERS = 16
+
+#: Passes that write to buffers, or take random paths, which pages have none of.
+_NOT_SHOWN = {
+    PassName.FRAGMENT_LISTS: "lists of fragments",
+    PassName.K_BUFFER: "a k-buffer",
+    PassName.LIGHT_VIEWS: "light that is scattered into the rays",
+    PassName.PATH_TRACE: "random paths",
+    PassName.CAUSTICS: "photons",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PagePlan:
+    """Plan of a page.
+
+    Attributes
+    ----------
+    scene : Scene
+    plan : RenderPlan
+    method, interfaces, scattering, shadows : optional
+        As they were asked for.
+    texture_units : int
+        As the planner is told.
+    distance : float, optional
+        In metres, at which panels show colors of media at first. Default: as far as each body is thick.
+    """
+
+    scene: Scene
+    plan: RenderPlan
+    method: Method | None
+    interfaces: Interfaces | None
+    scattering: Scattering | None
+    shadows: ShadowMaps | None
+    texture_units: int
+    distance: float | None = None
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What the page does not show, or not exactly."""
+        return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled)
+
+    @property
+    def own_notes(self) -> tuple[Note, ...]:
+        """Those that are not of the plan."""
+        found = []
+        if (count := triangles(self.scene)) > MANY_TRIANGLES:
+            text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
+            found.append(Note(NoteKind.MANY_TRIANGLES, text))
+        if self.plan.method.peels:
+            text = f"rays are followed through {self.most_layers} surfaces; beyond, pixels are marked"
+            found.append(Note(NoteKind.LAYER_LIMIT, text))
+        if any(body.density is not None for body in self.scene.objects):
+            found.append(Note(NoteKind.STEPS, "media of varying density stay as they are: no panel changes them"))
+        if sum(body.covers for body in self.scene.objects) > 1:
+            text = "layers are put over each other in the order in which the first camera sees them"
+            found.append(Note(NoteKind.LAYERS, text))
+        return tuple(found)
+
+    @property
+    def most_layers(self) -> int:
+        """Crossings that depth peeling is to find."""
+        return min(self.plan.method.layer_limit or MOST_LAYERS, MOST_LAYERS)
+
+    def planned(self, scene: Scene) -> RenderPlan:
+        """Plan of a variant of the scene."""
+        return _planned(scene, self.method, self.interfaces, self.scattering, self.shadows, self.texture_units)
+
+
+def plan_page(
+    scene: Scene,
+    method: Method | None = None,
+    *,
+    interfaces: Interfaces | None = None,
+    scattering: Scattering | None = None,
+    shadows: ShadowMaps | None = None,
+) -> PagePlan:
+    """Plan a page of a scene.
+
+    Raises
+    ------
+    InputError
+        If WebGL2 cannot draw the scene, or not by what was asked for.
+    """
+    if interfaces is None and triangles(scene) > MOST_TRACED:
+        interfaces = FrontInterface()
+    asked = method, interfaces, scattering, shadows
+    units = UNITS_WITH_SHADOWS
+    found = _planned(scene, *asked, units)
+    if found.has(PassName.SURFACES):
+        units = TEXTURE_UNITS
+        found = _planned(scene, *asked, units)
+    return PagePlan(scene, found, *asked, units)
+
+
+def _planned(
+    scene: Scene,
+    method: Method | None,
+    interfaces: Interfaces | None,
+    scattering: Scattering | None,
+    shadows: ShadowMaps | None,
+    units: int,
+) -> RenderPlan:
+    if method is not None and method.needs_storage:
+        found = "its passes write to buffers, which WebGL2 has none of"
+        raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for ordered intervals")
+    machine = Capabilities(shader_storage=False, texture_units=units)
+    chosen = plan(scene, method, machine, interfaces=interfaces, scattering=scattering, shadows=shadows)
+    for step in chosen.passes:
+        if (what := _NOT_SHOWN.get(step.name)) is not None:
+            raise InputError(f"a page of this scene with {chosen.method}", f"WebGL2 has no {what}", _instead(chosen))
+    return chosen
+
+
+def _instead(chosen: RenderPlan) -> str:
+    return "use another --method" if not isinstance(chosen.method, DepthPeeling) else "leave it out"

@@ -1,0 +1,208 @@
+"""Pages: one HTML file with the viewer's script, the scene, and a poster for the time until both are ready."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import os
+from pathlib import Path
+
+from translucent.assets import web_path
+from translucent.errors import InputError
+from translucent.files.paths import require_output, write_text_atomically
+from translucent.formulas.tone import tone_curve
+from translucent.frames.frame import check_exposure
+from translucent.page.meshes import name_of
+from translucent.page.payload import payload
+from translucent.page.plans import PagePlan, plan_page
+from translucent.planning.interfaces import Interfaces
+from translucent.planning.methods import Method
+from translucent.planning.scattering import Scattering
+from translucent.planning.shadow_maps import ShadowMaps
+from translucent.scene.camera import check_size
+from translucent.scene.scene import Scene
+from translucent.version import VERSION
+
+_TEMPLATE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="translucent {version}">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; \
+style-src 'unsafe-inline'; img-src data:">
+<title>{title}</title>
+<style>
+html, body {{ margin: 0; height: 100%; background: #131416; }}
+#viewer {{ position: fixed; inset: 0; height: 100dvh; }}
+#viewer > img {{ width: 100%; height: 100%; object-fit: contain; }}
+#viewer > .failed, noscript {{ position: absolute; left: 0; right: 0; bottom: 24px; text-align: center; color: #f0f1f3;
+  font: 14px system-ui, sans-serif; }}
+</style>
+</head>
+<body>
+<div id="viewer">{poster}<noscript>This page needs JavaScript to show its scene.</noscript></div>
+<script type="text/plain" id="scene">{scene}</script>
+<script>{script}</script>
+</body>
+</html>
+"""
+
+#: Samples of a pixel that pages add up at rest, as `translucent render` does; those of posters; and the most.
+SAMPLES, POSTER_SAMPLES, MOST_SAMPLES = 16, 4, 256
+
+
+def write_page(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[int, int] = (1280, 800),
+    method: Method | None = None,
+    interfaces: Interfaces | None = None,
+    scattering: Scattering | None = None,
+    shadows: ShadowMaps | None = None,
+    name: str | None = None,
+    exposure: float = 0.0,
+    tone: str = "neutral",
+    samples: int = SAMPLES,
+    poster: bytes | None = None,
+) -> PagePlan:
+    """Write a page that shows a scene in any browser with WebGL2: one file, which fetches nothing.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : str or PathLike
+        An .html file.
+    size : (width, height)
+        Of the picture that the scene's camera frames.
+    method, interfaces, scattering, shadows : optional
+        As for `Renderer.render`.
+    name : str, optional
+        Title of the page. Default: the name of the first body.
+    exposure : float
+        Stops brighter.
+    tone : {"none", "neutral", "agx"}
+        Tone curve.
+    samples : int
+        Of each pixel that are added up while nothing moves.
+    poster : bytes, optional
+        A picture, PNG, JPEG or WebP, that is there until the scene is.
+
+    Returns
+    -------
+    PagePlan
+        With notes of what the page leaves out.
+
+    Raises
+    ------
+    InputError
+        If WebGL2 cannot draw the scene, or not by what was asked for; if the path is no .html file, or nothing can be
+        written there.
+    """
+    file = Path(path)
+    check_output(file)
+    planned = plan_page(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
+    picture = None if poster is None else check_poster(poster, "poster")
+    save_page(planned, file, name or title_of(scene), check_size(size), samples, exposure, tone, picture)
+    return planned
+
+
+def check_output(path: Path) -> None:
+    """Raise `InputError` before any work is done if no page can be written to the path."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"page {str(path)!r}", "not an .html file", "name it for example viewer.html")
+    require_output(path, f"page {str(path)!r}")
+
+
+def save_page(
+    planned: PagePlan,
+    path: Path,
+    name: str,
+    size: tuple[int, int],
+    samples: int,
+    exposure: float,
+    tone: str,
+    poster: bytes | None,
+) -> int:
+    """Write a page; see `write_page`. Returns how many bytes it has."""
+    check_exposure(exposure)
+    tone_curve(tone)
+    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16")
+    text = page_html(planned, name, size, samples, exposure, tone, poster)
+    write_text_atomically(path, text)
+    return len(text.encode("utf-8"))
+
+
+def page_html(
+    planned: PagePlan,
+    name: str,
+    size: tuple[int, int],
+    samples: int = SAMPLES,
+    exposure: float = 0.0,
+    tone: str = "neutral",
+    poster: bytes | None = None,
+) -> str:
+    """Text of a page; see `write_page`."""
+    script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
+    data = payload(planned, name, size, samples, exposure, tone)
+    picture = "" if poster is None else f'<img alt="" src="{_data_url(poster)}">'
+    return _TEMPLATE.format(
+        version=VERSION,
+        title=html.escape(name),
+        poster=picture,
+        scene=base64.b64encode(data).decode("ascii"),
+        script=script,
+    )
+
+
+def title_of(scene: Scene) -> str:
+    """Title of a page: the name of the first body, without that of its file's kind."""
+    mesh = scene.bodies[0].mesh if scene.bodies else scene.objects[0].mesh
+    return name_of(mesh) or "scene"
+
+
+def poster_of(planned: PagePlan, size: tuple[int, int], exposure: float, tone: str) -> bytes:
+    """Picture of a scene as its page will show it, as JPEG.
+
+    Raises
+    ------
+    RenderError
+        If nothing can render here.
+    """
+    from PIL import Image
+
+    from translucent.renderer import Renderer
+
+    with Renderer() as renderer:
+        frame = renderer.render(
+            planned.scene,
+            size,
+            planned.method,
+            samples=POSTER_SAMPLES,
+            interfaces=planned.interfaces,
+            scattering=planned.scattering,
+            shadows=planned.shadows,
+        )
+    stream = io.BytesIO()
+    Image.fromarray(frame.to_srgb8(exposure, tone)).save(stream, "JPEG", quality=88)
+    return stream.getvalue()
+
+
+def check_poster(picture: bytes, asked: str) -> bytes:
+    """The picture; raises `InputError` if browsers show no such file."""
+    _kind(picture, asked)
+    return picture
+
+
+def _data_url(picture: bytes) -> str:
+    return f"data:image/{_kind(picture, 'poster')};base64,{base64.b64encode(picture).decode('ascii')}"
+
+
+def _kind(picture: bytes, asked: str) -> str:
+    for head, kind in {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp"}.items():
+        if picture.startswith(head):
+            return kind
+    raise InputError(asked, "no PNG, JPEG or WebP picture", "give one of these")

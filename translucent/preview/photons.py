@@ -1,0 +1,137 @@
+"""Light of photons in the still picture: more and more of them, as long as nobody changes anything."""
+
+from __future__ import annotations
+
+import time
+
+from translucent.errors import InputError
+from translucent.gpu.photon_light import PhotonLight
+from translucent.gpu.viewport import Viewport
+from translucent.planning.caustics import Caustics
+from translucent.planning.methods import Method
+from translucent.planning.render_plan import RenderPlan
+from translucent.planning.scattering import Scattering
+from translucent.renderer import Renderer
+from translucent.scene.scene import Scene
+
+#: Photons of a round, rounds after which they are first shown, and photons after which a picture is done.
+ROUND, FIRST_ROUNDS, MOST_PHOTONS = 1 << 14, 4, 1 << 26
+
+#: Seconds of following photons for each second of drawing, at least.
+SHARE = 0.1
+
+#: Noise of the picture, as a share of its mean radiance, at which it is done, too.
+QUIET = 1e-3
+
+
+class Photons:
+    """Photons of the scene on show, and pictures with their light: the next is drawn aside, and then takes over.
+
+    Each picture has twice the photons of the one before at least, and more where drawing it takes long.
+
+    Attributes
+    ----------
+    told : str
+        How many photons there are, and how noisy their light is; or why there are none; or nothing.
+    plan : RenderPlan, optional
+        With caustics, while photons are followed.
+    light : PhotonLight, optional
+    drawing : bool
+        A picture is to be drawn with the light as it is.
+    side : int
+        Of the viewport, on which it is: 1 until it has taken over.
+    """
+
+    def __init__(self) -> None:
+        self._reset()
+
+    def _reset(self) -> None:
+        self.told = ""
+        self.plan: RenderPlan | None = None
+        self.light: PhotonLight | None = None
+        self.drawing, self.side, self._on_show = False, 1, False
+        self._in_texture = self._in_picture = 0  # photons
+        self._scene: Scene | None = None
+        self._noise, self._next = float("inf"), FIRST_ROUNDS
+        self._following = self._drawing = self._begun = 0.0  # seconds spent, and when drawing began
+
+    def ready(
+        self,
+        scene: Scene,
+        renderer: Renderer,
+        viewport: Viewport,
+        method: Method | None,
+        scattering: Scattering | None,
+        seconds: float,
+        drawing: float,
+    ) -> bool:
+        """Follow photons for about so many seconds, unless a picture is being drawn; whether any are to be followed.
+
+        Pictures are expected to take `drawing` seconds.
+        """
+        try:
+            if self._scene is not scene:
+                self.stop(viewport)
+                self._scene = scene
+                self.plan = renderer.plan(scene, method, scattering=scattering, caustics=Caustics(ROUND))
+            if self.plan is None or self.done:
+                return False
+            if self.light is None:
+                self.light = PhotonLight(renderer.gpu, scene, viewport.size, self.plan)
+                self.told = "caustics: the first photons"
+                return True
+        except InputError as error:
+            self.told = f"no {error}" if str(error).startswith("caustics") else f"no caustics: {error}"
+            return False
+        if not self.drawing:
+            begun = time.perf_counter()
+            self.light.step(seconds)
+            self._following += time.perf_counter() - begun
+            due = self.light.rounds >= self._next and self._following >= SHARE * max(self._drawing, drawing)
+            if due or self.light.photons >= MOST_PHOTONS:
+                self.light.show()
+                self._in_texture = self.light.photons
+                viewport.restart(1)
+                self.drawing, self.side, self._begun = True, 1, time.perf_counter()
+            self._tell()
+        return True
+
+    @property
+    def done(self) -> bool:
+        """Whether more photons would change nothing to be seen."""
+        return not self.drawing and (self._in_picture >= MOST_PHOTONS or self._noise < QUIET)
+
+    def take_over(self, viewport: Viewport, stride: int, samples: int) -> bool:
+        """Put the picture that is drawn aside on show once it is whole; returns whether it was put there.
+
+        Where pictures take long, the first whole one takes over, and edges become smooth after that. When it is as good
+        as it gets with these photons, more are followed.
+        """
+        assert self.light is not None
+        drawn, whole, last = viewport.steps(self.side), stride * stride, stride * stride * (1 + samples)
+        if over := self.side == 1 and drawn == (whole if stride > 1 else last):
+            viewport.swap()
+            self.side, self._on_show = 0, True
+            self._in_picture = self._in_texture
+            mean = viewport.mean_radiance()
+            self._noise = self.light.error / mean if mean > 0 else 0.0
+        if drawn >= last:
+            self.drawing, self._next = False, 2 * self.light.rounds
+            self._drawing, self._following = time.perf_counter() - self._begun, 0.0
+        self._tell()
+        return over
+
+    def _tell(self) -> None:
+        assert self.light is not None
+        noise = f", standard error {self._noise:.2%}" if self._noise < 1e3 else ""
+        seen = f"{self._in_picture:,} photons in the picture{noise}" if self._in_picture else "not in the picture yet"
+        self.told = f"caustics: {seen}" if self.done else f"caustics: {seen}; {self.light.photons:,} so far"
+
+    def stop(self, viewport: Viewport) -> bool:
+        """End it; returns whether its picture was on show."""
+        was = self._on_show
+        if self.light is not None:
+            self.light.release()
+            viewport.restart(1)
+        self._reset()
+        return was

@@ -1,0 +1,157 @@
+// Media of a page as its panel changes them, and what blocks and tables hold of them.
+
+const BLACKEST = 1e-5;
+const MOST_DEPTH = 1e30;
+const USUAL_IOR = 1.5, USUAL_ROUGHNESS = 0.5;
+
+const linearOf = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
+const encodedOf = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+
+/** Linear color of text such as #7b1e3a. */
+export function colorOf(text) {
+  return [1, 3, 5].map((i) => linearOf(parseInt(text.slice(i, i + 2), 16) / 255));
+}
+
+/** Text of a linear color. */
+export function hexOf(color) {
+  const bytes = color.map((x) => Math.round(255 * encodedOf(Math.min(Math.max(x, 0), 1))));
+  return `#${bytes.map((x) => x.toString(16).padStart(2, "0")).join("")}`;
+}
+
+/** Extinction in 1/m by which white light has a linear color after metres. */
+export function extinctionOf(color, metres) {
+  return color.map((x) => -Math.log(Math.min(Math.max(x, BLACKEST), 1)) / metres);
+}
+
+/** Color that white light has after metres. */
+export function colorAfter(extinction, metres) {
+  return extinction.map((sigma) => Math.exp(-sigma * metres));
+}
+
+export class Materials {
+  constructor(page) {
+    this.page = page;
+    this.reset();
+  }
+
+  reset() {
+    this.media = this.page.scene.media.map(({ extinction, ior, roughness, distance }) => ({
+      extinction: [...extinction], ior, roughness, distance, changed: false,
+    }));
+  }
+
+  /** Change a medium; raises nothing for what is out of range, but keeps it in. */
+  set(index, { extinction, ior, roughness, distance }) {
+    const medium = this.media[index];
+    if (extinction) medium.extinction = extinction.map((x) => Math.max(0, Number(x)));
+    if (ior != null) medium.ior = Math.min(Math.max(Number(ior), 1), 3);
+    if (roughness != null) medium.roughness = Math.min(Math.max(Number(roughness), 0), 1);
+    if (distance != null && distance > 0) medium.distance = Number(distance);
+    medium.changed = true;
+  }
+
+  get #free() {
+    return this.media.filter((_, i) => this.page.scene.media[i].editable);
+  }
+
+  get #changed() {
+    return this.media.some((medium) => medium.changed);
+  }
+
+  /** Key of the variant whose passes and switches these media need. */
+  get variant() {
+    if (!this.#changed) return "base";
+    const bends = this.#free.some((medium) => medium.ior !== 1);
+    const rough = this.#free.some((medium) => medium.roughness > 0);
+    const key = `${bends ? "bends" : "straight"} ${rough ? "rough" : "smooth"}`;
+    return this.page.aliases[key] ?? "base";
+  }
+
+  /** Key of all that maps of shadows hold of media. */
+  get shadowKey() {
+    return this.page.spectral_maps ? this.media.map((medium) => medium.extinction.join()).join(";") : "";
+  }
+
+  /** Key of all that tables hold of media. */
+  get tableKey() {
+    return JSON.stringify([this.variant, this.media]);
+  }
+
+  #bounded(index) {
+    const limit = MOST_DEPTH / this.page.scene.diagonal;
+    return this.media[index].extinction.map((x) => Math.min(x, limit));
+  }
+
+  #editable(object) {
+    const { medium } = this.page.scene.objects[object];
+    return medium != null && this.page.scene.media[medium].editable ? medium : null;
+  }
+
+  roughness(object) {
+    const medium = object == null ? null : this.#editable(object);
+    return medium == null || !this.media[medium].changed ? null : this.media[medium].roughness;
+  }
+
+  /** Write the blocks of a frame. */
+  write(blocks, bodies, variant) {
+    const { scene } = this.page;
+    scene.objects.forEach((_, i) => this.#writeBody(bodies[i], i));
+    const first = this.#editable(scene.first_body);
+    if (blocks.Shade && first != null) blocks.Shade.extinction.set(this.#bounded(first));
+    if (blocks.Shadows && first != null && scene.first_throwing === scene.first_body) {
+      blocks.Shadows.shadow_extinction.set(this.#bounded(first));
+    }
+    if (blocks.Media) {
+      variant.slots.forEach((objects, i) => {
+        const medium = this.#editable(objects[0]);
+        if (medium != null) blocks.Media.slot_extinction.set(this.#bounded(medium), 4 * i);
+      });
+    }
+  }
+
+  #writeBody(fields, object) {
+    const medium = this.#editable(object);
+    if (medium == null) return;
+    fields.extinction.set(this.#bounded(medium));
+    fields.sheet_ior[0] = this.media[medium].ior;
+  }
+
+  /** Write the Body block of an object in a map of shadows. */
+  writeMap(fields, object) {
+    const medium = this.#editable(object);
+    if (medium != null) fields.extinction.set(this.#bounded(medium));
+  }
+
+  /** Write an object's row of the table of surfaces. */
+  writeSurface(row, object) {
+    const medium = this.#editable(object);
+    if (medium == null) return;
+    const { ior } = this.media[medium];
+    const sigma = this.#bounded(medium);
+    const sheet = this.page.scene.objects[object].sheet ?? 0;
+    row.ior[0] = ior;
+    if (row.is_sheet[0]) row.sheet_depth.set(sigma.map((x) => x * sheet));
+    row.stream_absorption.set(sigma.map((x) => 2 * x));
+    row.inner_mirror[0] = this.#innerMirror(ior);
+  }
+
+  #innerMirror(ior) {
+    const { inner_mirror: values } = this.page;
+    const at = ((ior - 1) / 2) * (values.length - 1);
+    const i = Math.min(Math.floor(at), values.length - 2);
+    return values[i] + (at - i) * (values[i + 1] - values[i]);
+  }
+
+  /** Write an object's row of the table of bodies that rays are traced through. */
+  writeTraced(row, object) {
+    const medium = this.#editable(object);
+    if (medium == null) return;
+    const { ior, roughness } = this.media[medium];
+    const metres = row.kind[0] === 1 || row.kind[0] === 4 ? this.page.scene.objects[object].sheet ?? 1 : 1;
+    row.extinction.set(this.#bounded(medium).map((x) => metres * x));
+    row.ior[0] = ior;
+    if (this.media[medium].changed) row.roughness[0] = roughness;
+  }
+}
+
+export { USUAL_IOR, USUAL_ROUGHNESS };
