@@ -79,6 +79,9 @@ def test_bodies_are_placed_as_each_alone() -> None:
             for name in ("clip_from_offset", "world_from_normal", "eye_from_offset", "axis", "starts_unknown"):
                 assert (together[i][name] == alone[name]).all()
         assert together["starts_unknown"].any() == (eye[0] == 0.5)
+        normals = together["world_from_normal"][:, :3, :3]
+        assert (normals[3:] == -normals[:3]).all()  # those of inverted meshes point inwards
+        assert (normals[2] == np.eye(3)).all()
 
 
 def _floor(count: int) -> tuple[tl.Scene, ShadowThrowers]:
