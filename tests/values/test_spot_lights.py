@@ -150,15 +150,15 @@ def test_a_spot_on_all_of_a_body_diffuses_as_a_point_light() -> None:
     body = scene().objects[0]
     diffusing = DiffusingBody(lit_body(body, None, tl.Diffusion(12).cell_size(body)), WAX, 0.0)
     place = (0.5, 0.2, 4.0)
-    point = diffusing.field(scene(tl.PointLight(place, 3.0)))
-    whole = diffusing.field(scene(tl.SpotLight(place, np.negative(place), 3.0, 20, 21)))
+    point = diffusing.field(scene(tl.PointLight(place, 3.0)), 0)
+    whole = diffusing.field(scene(tl.SpotLight(place, np.negative(place), 3.0, 20, 21)), 0)
     np.testing.assert_array_equal(whole.fluence, point.fluence)
-    some = diffusing.field(scene(tl.SpotLight(place, np.negative(place), 3.0, 0, 8)))
+    some = diffusing.field(scene(tl.SpotLight(place, np.negative(place), 3.0, 0, 8)), 0)
     assert 0.01 < some.entering.sum() / point.entering.sum() < 0.5
     # Inside, its power is what counts.
     inside = tl.SpotLight((0.1, 0, 0), DOWN, 3.0, 20, 40)
     as_point = tl.PointLight((0.1, 0, 0), 3.0 * inside.mean_share)
-    found, expected = diffusing.field(scene(inside)), diffusing.field(scene(as_point))
+    found, expected = diffusing.field(scene(inside), 0), diffusing.field(scene(as_point), 0)
     np.testing.assert_allclose(found.fluence, expected.fluence, rtol=2e-3)  # the solver starts from what it has found
 
 
