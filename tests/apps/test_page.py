@@ -107,7 +107,7 @@ def test_light_is_rounded_by_less_than_told() -> None:
         (["-o", "cube.png"], ["not an .html file", "viewer.html"]),
         (["-o", "nowhere/cube.html"], ["no folder"]),
         (["--method", "fragment-lists"], ["WebGL2", "SignedDepth"]),
-        (["--method", "path-traced"], ["random paths"]),
+        (["--method", "path-traced"], ["random paths", "PathTraced"]),
         (["--poster", "absent.png"], ["absent.png", "no such file"]),
         (["--samples", "0"], ["samples 0", "1 to 256"]),
         (["--simplify", "3"], ["--simplify 3"]),
