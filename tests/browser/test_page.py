@@ -193,8 +193,31 @@ def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     web_page.run("async () => (await translucent).failed")
     assert "no WebGL2" in web_page.page.locator(".told").inner_text()
+    assert is_seen(web_page.page, ".told")
     assert any("no WebGL2" in text for text in web_page.messages)
     assert web_page.page.locator("#ior").is_disabled()
+
+
+def is_seen(page: Any, name: str) -> bool:
+    """Whether nothing lies over the middle of an element, such as the poster."""
+    return bool(
+        page.locator(name).evaluate(
+            "(found) => { const box = found.getBoundingClientRect();"
+            " const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];"
+            " return found.getRootNode().elementFromPoint(x, y) === found; }"
+        )
+    )
+
+
+def test_without_targets_of_floats(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    web_page.page.add_init_script(
+        "const own = WebGL2RenderingContext.prototype.getExtension;"
+        "WebGL2RenderingContext.prototype.getExtension = function (name) {"
+        " return name.startsWith('EXT_color_buffer') ? null : own.call(this, name); };"
+    )
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    web_page.run("async () => (await translucent).failed")
+    assert "pictures of floats" in web_page.page.locator(".told").inner_text()
 
 
 def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:

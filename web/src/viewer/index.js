@@ -88,6 +88,10 @@ export class Viewer {
     else if (!caps.blend) told.push("Thickness in 16 bits, off by some 0.1 %: this WebGL2 cannot add up 32-bit floats.");
     if (!caps.linear) told.push("Light in 16 bits: this WebGL2 cannot interpolate 32-bit floats.");
     this.panel.notes(told);
+    if (!caps.targets) {
+      this.#refuse("This WebGL2 draws no pictures of floats, which the scene needs: update the browser, or take another one.");
+      return;
+    }
     if (caps.drawBuffers < 5) {
       this.#refuse(`This WebGL2 draws into ${caps.drawBuffers} pictures at once, and the scene needs 5.`);
       return;

@@ -52,7 +52,7 @@ details ul { margin: 8px 0 0; padding-left: 16px; color: #9ea2a9; display: grid;
 details dl { margin: 8px 0 0; display: grid; grid-template-columns: auto 1fr; gap: 4px 12px; color: #9ea2a9; }
 details dt { color: #d6d8dc; } details dd { margin: 0; }
 .mark { color: #f0b46a; }
-.told { position: absolute; left: 50%; bottom: 14px; transform: translateX(-50%); max-width: 90%; padding: 8px 14px; border-radius: 6px;
+.told { position: absolute; left: 50%; bottom: 14px; transform: translateX(-50%); width: max-content; max-width: 90%; padding: 8px 14px; border-radius: 6px;
   background: #2b2d31; color: #f0f1f3; display: none; }
 .told.on { display: block; }
 .poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
@@ -128,7 +128,7 @@ export class Panel {
     if (this.poster) {
       this.picture = this.poster.cloneNode();
       this.picture.className = "poster";
-      this.$(".stage").append(this.picture);
+      this.canvas.after(this.picture); // below what is told
     }
     element.replaceChildren(this.root);
     this.told = [];
