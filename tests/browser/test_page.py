@@ -151,6 +151,7 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     page.locator("#color").fill("#3070c0")
     held = page.evaluate("viewer.state().media[0]")
     assert held["extinction"] == pytest.approx(tl.Medium.from_color("#3070c0", held["distance"]).extinction)
+    fields_show_what_is_kept(page)
     page.evaluate("(window.loser = viewer.gl.getExtension('WEBGL_lose_context')).loseContext()")
     page.wait_for_function("() => viewer.lost")
     assert "graphics card" in page.locator(".told").inner_text()
@@ -158,6 +159,31 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     page.evaluate("loser.restoreContext()")
     page.wait_for_function("() => !viewer.lost && viewer.still && viewer.player !== before")
     assert page.evaluate("viewer.probe(0.5, 0.5)")["covered"]
+
+
+def fields_show_what_is_kept(page: Any) -> None:
+    """Numbers out of range, and presets that something else has changed, do not stay on the panel."""
+    for field, entered, shown in (
+        ("#ior-number", "99", "3"),
+        ("#ior-number", "", "3"),
+        ("#exposure-number", "50", "10"),
+    ):
+        page.locator(field).fill(entered)
+        page.keyboard.press("Enter")
+        assert page.locator(field).input_value() == shown
+    distance = page.locator("#distance").input_value()
+    page.locator("#distance").fill("-5")
+    page.keyboard.press("Enter")
+    assert page.locator("#distance").input_value() == distance
+    preset = page.locator("#preset")
+    preset.select_option("whisky")
+    assert preset.input_value() == "whisky"
+    page.locator("#roughness-number").fill("0.3")
+    page.keyboard.press("Enter")
+    assert preset.input_value() == ""
+    preset.select_option("whisky")
+    page.locator(".stage canvas").press("m")
+    assert preset.input_value() == ""
 
 
 def test_touch_on_a_phone(chromium: Any, web_dist: Path, tmp_path: Path) -> None:

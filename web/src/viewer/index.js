@@ -244,7 +244,7 @@ export class Viewer {
   }
 
   setExposure(stops) {
-    this.stops = stops;
+    this.stops = Math.min(Math.max(stops, -10), 10);
     if (this.still) {
       if (this.done > 0) this.#present("average", this.stops - Math.log2(this.done));
       else this.#present("radiance", this.stops);
@@ -262,7 +262,7 @@ export class Viewer {
     if (!held || !this.page.scene.media[medium].editable) return;
     const next = { ior: values.ior, roughness: values.roughness, distance: values.distance };
     const preset = this.page.presets.find(({ name }) => name === values.preset);
-    if (preset) Object.assign(next, { extinction: preset.extinction, ior: preset.ior, roughness: preset.roughness });
+    if (preset) Object.assign(next, { extinction: preset.extinction, ior: preset.ior, roughness: preset.roughness, preset: preset.name });
     if (values.color) next.extinction = extinctionOf(colorOf(values.color), values.distance ?? held.distance);
     if (values.extinction) next.extinction = values.extinction;
     this.materials.set(medium, next);
