@@ -162,6 +162,17 @@ def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> Non
         assert len(set(_SAMPLER.findall(vertex + fragment))) <= TEXTURE_UNITS
 
 
+def test_queries_are_not_drawn() -> None:
+    """WebGL2 refuses draws by shaders without outputs, as those of the query that ends depth peeling."""
+    scene = scene_of(ball(), ball(medium=None, color=(0.5, 0.5, 0.5)))
+    planned = plan_page(scene, tl.DepthPeeling(8))
+    recorder = FrameRecorder(4, planned.most_layers, planned.texture_units)
+    recorder.record(planned.scene, planned.plan)
+    fragments = [fragment for _, fragment in recorder.gl.programs]
+    assert any("previous" in text for text in fragments)
+    assert not any("found" in text and "discard" in text and not re.search(r"\bout vec", text) for text in fragments)
+
+
 def test_a_coarser_copy_has_the_same_volume() -> None:
     pytest.importorskip("fast_simplification", reason="fast-simplification is not installed")
     scene = scene_of(ball())
