@@ -107,7 +107,7 @@ def test_light_is_rounded_by_less_than_told() -> None:
         (["-o", "cube.png"], ["not an .html file", "viewer.html"]),
         (["-o", "nowhere/cube.html"], ["no folder"]),
         (["--method", "fragment-lists"], ["WebGL2", "SignedDepth"]),
-        (["--method", "path-traced"], ["random paths"]),
+        (["--method", "path-traced"], ["random paths", "PathTraced"]),
         (["--poster", "absent.png"], ["absent.png", "no such file"]),
         (["--samples", "0"], ["samples 0", "1 to 256"]),
         (["--simplify", "3"], ["--simplify 3"]),
@@ -160,6 +160,17 @@ def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> Non
     assert frame.averaged
     for vertex, fragment in recorder.gl.programs:
         assert len(set(_SAMPLER.findall(vertex + fragment))) <= TEXTURE_UNITS
+
+
+def test_queries_are_not_drawn() -> None:
+    """WebGL2 refuses draws by shaders without outputs, as those of the query that ends depth peeling."""
+    scene = scene_of(ball(), ball(medium=None, color=(0.5, 0.5, 0.5)))
+    planned = plan_page(scene, tl.DepthPeeling(8))
+    recorder = FrameRecorder(4, planned.most_layers, planned.texture_units)
+    recorder.record(planned.scene, planned.plan)
+    fragments = [fragment for _, fragment in recorder.gl.programs]
+    assert any("previous" in text for text in fragments)
+    assert not any("found" in text and "discard" in text and not re.search(r"\bout vec", text) for text in fragments)
 
 
 def test_a_coarser_copy_has_the_same_volume() -> None:

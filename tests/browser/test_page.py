@@ -151,6 +151,7 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     page.locator("#color").fill("#3070c0")
     held = page.evaluate("viewer.state().media[0]")
     assert held["extinction"] == pytest.approx(tl.Medium.from_color("#3070c0", held["distance"]).extinction)
+    fields_show_what_is_kept(page)
     page.evaluate("(window.loser = viewer.gl.getExtension('WEBGL_lose_context')).loseContext()")
     page.wait_for_function("() => viewer.lost")
     assert "graphics card" in page.locator(".told").inner_text()
@@ -158,6 +159,31 @@ def test_turning_probing_and_loss(web_page: WebPage, web_dist: Path, tmp_path: P
     page.evaluate("loser.restoreContext()")
     page.wait_for_function("() => !viewer.lost && viewer.still && viewer.player !== before")
     assert page.evaluate("viewer.probe(0.5, 0.5)")["covered"]
+
+
+def fields_show_what_is_kept(page: Any) -> None:
+    """Numbers out of range, and presets that something else has changed, do not stay on the panel."""
+    for field, entered, shown in (
+        ("#ior-number", "99", "3"),
+        ("#ior-number", "", "3"),
+        ("#exposure-number", "50", "10"),
+    ):
+        page.locator(field).fill(entered)
+        page.keyboard.press("Enter")
+        assert page.locator(field).input_value() == shown
+    distance = page.locator("#distance").input_value()
+    page.locator("#distance").fill("-5")
+    page.keyboard.press("Enter")
+    assert page.locator("#distance").input_value() == distance
+    preset = page.locator("#preset")
+    preset.select_option("whisky")
+    assert preset.input_value() == "whisky"
+    page.locator("#roughness-number").fill("0.3")
+    page.keyboard.press("Enter")
+    assert preset.input_value() == ""
+    preset.select_option("whisky")
+    page.locator(".stage canvas").press("m")
+    assert preset.input_value() == ""
 
 
 def test_touch_on_a_phone(chromium: Any, web_dist: Path, tmp_path: Path) -> None:
@@ -193,8 +219,31 @@ def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     web_page.run("async () => (await translucent).failed")
     assert "no WebGL2" in web_page.page.locator(".told").inner_text()
+    assert is_seen(web_page.page, ".told")
     assert any("no WebGL2" in text for text in web_page.messages)
     assert web_page.page.locator("#ior").is_disabled()
+
+
+def is_seen(page: Any, name: str) -> bool:
+    """Whether nothing lies over the middle of an element, such as the poster."""
+    return bool(
+        page.locator(name).evaluate(
+            "(found) => { const box = found.getBoundingClientRect();"
+            " const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];"
+            " return found.getRootNode().elementFromPoint(x, y) === found; }"
+        )
+    )
+
+
+def test_without_targets_of_floats(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    web_page.page.add_init_script(
+        "const own = WebGL2RenderingContext.prototype.getExtension;"
+        "WebGL2RenderingContext.prototype.getExtension = function (name) {"
+        " return name.startsWith('EXT_color_buffer') ? null : own.call(this, name); };"
+    )
+    opened(web_page, scene_of(ball(RED)), tmp_path, tools)
+    web_page.run("async () => (await translucent).failed")
+    assert "pictures of floats" in web_page.page.locator(".told").inner_text()
 
 
 def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:

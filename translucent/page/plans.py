@@ -137,7 +137,8 @@ def _planned(
     chosen = plan(scene, method, machine, interfaces=interfaces, scattering=scattering, shadows=shadows)
     for step in chosen.passes:
         if (what := _NOT_SHOWN.get(step.name)) is not None:
-            raise InputError(f"a page of this scene with {chosen.method}", f"WebGL2 has no {what}", _instead(chosen))
+            asked = f"a page of this scene with {method or chosen.method}"
+            raise InputError(asked, f"WebGL2 has no {what}", _instead(chosen))
     return chosen
 
 

@@ -77,6 +77,7 @@ class RecordingContext:
         self.meshes: list[Mesh] = []
         self.framebuffers: list[dict[str, Any]] = []
         self.steps: list[dict[str, Any]] = []
+        self.asking = False
         self.live = True
         self.live_blocks: dict[int, bytes] = {}
         self._numbers: dict[Any, int] = {}
@@ -135,7 +136,7 @@ class RecordingContext:
 
     def query(self, **_: Any) -> RecordedQuery:
         """Query."""
-        return RecordedQuery()
+        return RecordedQuery(self)
 
     def number(self, key: Any, items: list[Any], item: Any) -> int:
         """Number of an item in one of the lists, which has it once by its key."""

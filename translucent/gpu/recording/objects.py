@@ -27,6 +27,7 @@ class Recorder(Protocol):
     bound_textures: dict[int, RecordedTexture]
     framebuffer_in_use: RecordedFramebuffer | None
     most_layers: int
+    asking: bool
 
     def note_clear(self, framebuffer: RecordedFramebuffer, color: tuple[float, ...], depth: float) -> None:
         """Take down a clear."""
@@ -236,22 +237,31 @@ class RecordedArray:
     looks: str
 
     def render(self, mode: int | None = None, vertices: int = -1) -> None:
-        """Note a draw."""
-        self.gl.note_draw(self)
+        """Note a draw, unless it is a query's."""
+        if not self.gl.asking:
+            self.gl.note_draw(self)
 
     def release(self) -> None:
         """Do nothing: what was recorded stays."""
 
 
 class RecordedQuery:
-    """Query that always finds samples, so that passes which stop where nothing is left go on."""
+    """Query that always finds samples, so that passes which stop where nothing is left go on.
+
+    What is drawn for it is no step: players ask nothing, and WebGL2 refuses shaders without outputs.
+    """
 
     samples = 1
 
+    def __init__(self, gl: Recorder) -> None:
+        self._gl = gl
+
     def __enter__(self) -> RecordedQuery:
+        self._gl.asking = True
         return self
 
-    def __exit__(self, *_: object) -> None: ...
+    def __exit__(self, *_: object) -> None:
+        self._gl.asking = False
 
 
 class RecordedMeshes:

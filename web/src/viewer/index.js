@@ -88,6 +88,10 @@ export class Viewer {
     else if (!caps.blend) told.push("Thickness in 16 bits, off by some 0.1 %: this WebGL2 cannot add up 32-bit floats.");
     if (!caps.linear) told.push("Light in 16 bits: this WebGL2 cannot interpolate 32-bit floats.");
     this.panel.notes(told);
+    if (!caps.targets) {
+      this.#refuse("This WebGL2 draws no pictures of floats, which the scene needs: update the browser, or take another one.");
+      return;
+    }
     if (caps.drawBuffers < 5) {
       this.#refuse(`This WebGL2 draws into ${caps.drawBuffers} pictures at once, and the scene needs 5.`);
       return;
@@ -240,7 +244,7 @@ export class Viewer {
   }
 
   setExposure(stops) {
-    this.stops = stops;
+    this.stops = Math.min(Math.max(stops, -10), 10);
     if (this.still) {
       if (this.done > 0) this.#present("average", this.stops - Math.log2(this.done));
       else this.#present("radiance", this.stops);
@@ -258,7 +262,7 @@ export class Viewer {
     if (!held || !this.page.scene.media[medium].editable) return;
     const next = { ior: values.ior, roughness: values.roughness, distance: values.distance };
     const preset = this.page.presets.find(({ name }) => name === values.preset);
-    if (preset) Object.assign(next, { extinction: preset.extinction, ior: preset.ior, roughness: preset.roughness });
+    if (preset) Object.assign(next, { extinction: preset.extinction, ior: preset.ior, roughness: preset.roughness, preset: preset.name });
     if (values.color) next.extinction = extinctionOf(colorOf(values.color), values.distance ?? held.distance);
     if (values.extinction) next.extinction = values.extinction;
     this.materials.set(medium, next);

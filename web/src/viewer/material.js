@@ -36,13 +36,14 @@ export class Materials {
 
   reset() {
     this.media = this.page.scene.media.map(({ extinction, ior, roughness, distance }) => ({
-      extinction: [...extinction], ior, roughness, distance, changed: false,
+      extinction: [...extinction], ior, roughness, distance, preset: "", changed: false,
     }));
   }
 
   /** Change a medium; raises nothing for what is out of range, but keeps it in. */
-  set(index, { extinction, ior, roughness, distance }) {
+  set(index, { extinction, ior, roughness, distance, preset = "" }) {
     const medium = this.media[index];
+    medium.preset = preset;
     if (extinction) medium.extinction = extinction.map((x) => Math.max(0, Number(x)));
     if (ior != null) medium.ior = Math.min(Math.max(Number(ior), 1), 3);
     if (roughness != null) medium.roughness = Math.min(Math.max(Number(roughness), 0), 1);

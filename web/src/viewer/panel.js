@@ -9,7 +9,7 @@ const STYLE = `
 .viewer { position: relative; display: block; width: 100%; height: 100%; background: #131416; color: #d6d8dc;
   font: 13px/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; container-type: size; overflow: hidden; }
 .viewer * { box-sizing: border-box; font: inherit; color: inherit; }
-.layout { display: grid; width: 100%; height: 100%; grid-template: minmax(0, 1fr) 30px / minmax(0, 1fr) 300px; }
+.layout { display: grid; width: 100%; height: 100%; grid-template: minmax(0, 1fr) 30px / minmax(0, 1fr) 336px; }
 .layout.bare { grid-template-columns: minmax(0, 1fr) 0; }
 .layout.bare .panel { display: none; }
 .stage { position: relative; overflow: hidden; background: #131416; }
@@ -20,6 +20,8 @@ canvas:focus-visible { box-shadow: inset 0 0 0 2px #6f9fd8; }
   font-variant-numeric: tabular-nums; white-space: nowrap; overflow: hidden; color: #9ea2a9; }
 .probe b { color: #e8e9ec; font-weight: 600; }
 .probe .grow { flex: 1; }
+.probe .at { min-width: 0; overflow: hidden; text-overflow: ellipsis; }
+.probe .quality { flex: 0 99 auto; min-width: 0; overflow: hidden; text-overflow: ellipsis; }
 .chip { display: inline-block; width: 12px; height: 12px; border-radius: 3px; vertical-align: -1px; border: 1px solid #3a3d42; }
 .panel { grid-column: 2; grid-row: 1 / 3; overflow-y: auto; background: #191a1d; border-left: 1px solid #26282c;
   padding: 14px 16px 18px; display: flex; flex-direction: column; gap: 14px; scrollbar-color: #3a3d42 transparent; }
@@ -30,6 +32,7 @@ h1 { margin: 0; font-size: 14px; font-weight: 600; color: #f0f1f3; overflow-wrap
 .row > * { min-width: 0; }
 .row > span { flex: none; }
 #unit { width: 54px; flex: none; padding: 0 2px; }
+#distance { flex: 1; min-width: 84px; appearance: textfield; }
 input[type="number"], select { width: 100%; height: 28px; padding: 0 7px; background: #242629; border: 1px solid #34373c; border-radius: 5px; }
 input[type="color"] { width: 34px; height: 28px; flex: none; padding: 2px; background: #242629; border: 1px solid #34373c; border-radius: 5px; cursor: pointer; }
 input[type="range"] { flex: 1; min-width: 0; height: 28px; accent-color: #7fb0ea; cursor: pointer; }
@@ -52,7 +55,7 @@ details ul { margin: 8px 0 0; padding-left: 16px; color: #9ea2a9; display: grid;
 details dl { margin: 8px 0 0; display: grid; grid-template-columns: auto 1fr; gap: 4px 12px; color: #9ea2a9; }
 details dt { color: #d6d8dc; } details dd { margin: 0; }
 .mark { color: #f0b46a; }
-.told { position: absolute; left: 50%; bottom: 14px; transform: translateX(-50%); max-width: 90%; padding: 8px 14px; border-radius: 6px;
+.told { position: absolute; left: 50%; bottom: 14px; transform: translateX(-50%); width: max-content; max-width: 90%; padding: 8px 14px; border-radius: 6px;
   background: #2b2d31; color: #f0f1f3; display: none; }
 .told.on { display: block; }
 .poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
@@ -128,7 +131,7 @@ export class Panel {
     if (this.poster) {
       this.picture = this.poster.cloneNode();
       this.picture.className = "poster";
-      this.$(".stage").append(this.picture);
+      this.canvas.after(this.picture); // below what is told
     }
     element.replaceChildren(this.root);
     this.told = [];
@@ -157,8 +160,8 @@ export class Panel {
     this.refresh();
   }
 
-  /** Show the material as it is. */
-  refresh() {
+  /** Show the material as it is; in the number that has the focus, too, once it is entered. */
+  refresh(entered = false) {
     const { viewer } = this;
     const medium = viewer.materials.media[this.medium];
     if (!medium) return;
@@ -167,8 +170,9 @@ export class Panel {
     const active = this.shadow.activeElement;
     const set = (id, value) => {
       const field = this.$(id);
-      if (field !== active || field.type !== "number") field.value = value;
+      if (entered || field !== active || field.type !== "number") field.value = value;
     };
+    set("#preset", medium.preset);
     set("#color", hexOf(colorAfter(medium.extinction, medium.distance)));
     set("#distance", digits(medium.distance / UNITS[this.$("#unit").value], 4));
     set("#ior", medium.ior);
@@ -189,26 +193,27 @@ export class Panel {
     const { viewer } = this;
     const change = (values) => viewer.setMaterial(values, this.medium);
     const on = (id, type, what) => this.$(id).addEventListener(type, what);
-    on("#medium", "change", () => { this.medium = Number(this.$("#medium").value); this.$("#preset").value = ""; this.refresh(); });
+    on("#medium", "change", () => { this.medium = Number(this.$("#medium").value); this.refresh(); });
     on("#preset", "change", () => {
       const preset = this.$("#preset").value;
       if (preset) change({ preset });
       else viewer.resetMaterial();
     });
     const distance = () => Number(this.$("#distance").value) * UNITS[this.$("#unit").value];
-    on("#color", "input", () => { this.$("#preset").value = ""; change({ color: this.$("#color").value }); });
-    on("#distance", "change", () => { if (distance() > 0) change({ color: this.$("#color").value, distance: distance() }); else this.refresh(); });
-    on("#unit", "change", () => this.refresh());
+    on("#color", "input", () => change({ color: this.$("#color").value }));
+    on("#distance", "change", () => { if (distance() > 0) change({ color: this.$("#color").value, distance: distance() }); });
     for (const name of ["ior", "roughness"]) {
       on(`#${name}`, "input", () => change({ [name]: Number(this.$(`#${name}`).value) }));
-      on(`#${name}-number`, "change", () => change({ [name]: Number(this.$(`#${name}-number`).value) }));
+      on(`#${name}-number`, "change", ({ target }) => { if (target.value) change({ [name]: Number(target.value) }); });
     }
     for (const id of ["#exposure", "#exposure-number"]) {
       on(id, "input", () => { viewer.setExposure(Number(this.$(id).value) || 0); this.refresh(); });
     }
+    // After each field's own: what was out of range, or no number, shows what is kept.
+    on(".material", "change", () => this.refresh(true));
     for (const button of this.shadow.querySelectorAll("[data-show]")) button.addEventListener("click", () => this.show(button.dataset.show));
     on('[data-do="view"]', "click", () => viewer.view.reset());
-    on('[data-do="material"]', "click", () => { this.$("#preset").value = ""; viewer.resetMaterial(); });
+    on('[data-do="material"]', "click", () => viewer.resetMaterial());
     this.canvas.addEventListener("keydown", (event) => this.#key(event));
     this.canvas.addEventListener("pointermove", (event) => { this.pointer = event; this.#probe(); });
     this.canvas.addEventListener("pointerdown", (event) => { this.pointer = event; });

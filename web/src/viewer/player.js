@@ -13,9 +13,10 @@ export function capabilitiesOf(gl, half = false) {
   const color = gl.getExtension("EXT_color_buffer_float");
   const blend = gl.getExtension("EXT_float_blend");
   const linear = gl.getExtension("OES_texture_float_linear");
-  if (!color) gl.getExtension("EXT_color_buffer_half_float");
+  const targets = color ?? gl.getExtension("EXT_color_buffer_half_float");
   gl.getExtension("KHR_parallel_shader_compile");
   return {
+    targets: Boolean(targets),
     float: Boolean(color) && !half,
     blend: Boolean(color && blend) && !half,
     linear: Boolean(linear),
