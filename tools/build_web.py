@@ -12,9 +12,12 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import trimesh
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout, whichever is installed
 
 from translucent.assets import mesh_path
 from translucent.errors import InputError

@@ -31,6 +31,7 @@ from translucent.planning.scattering.choice import check_scattering
 from translucent.planning.shadow_maps import ShadowMaps, check_shadows
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import check_size
+from translucent.scene.checks import check_scene
 from translucent.scene.scene import Scene
 from translucent.scene.shadow_catchers import before_page, page_radiance
 from translucent.version import VERSION
@@ -128,6 +129,7 @@ class Renderer:
         shadows: ShadowMaps | None = None,
     ) -> RenderPlan:
         """Plan that `render` would run with this renderer, with or without a backdrop."""
+        check_scene(scene)
         if method is not None and not isinstance(method, Method):
             raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
         check_interfaces(interfaces)

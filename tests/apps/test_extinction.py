@@ -90,6 +90,7 @@ def test_a_filament_is_told_by_its_transmission_distance(run: Run) -> None:
     assert (code, err) == (0, "")
     assert "0.1        0.1        0.1 linear" in out.splitlines()[0]
     assert "filament TD     4 mm: where 10 % of the luminance of white light is left" in out.splitlines()
+    assert run("--td", "4").out == out
     told = json.loads(run("--td", "0.4", "--unit", "cm", "--td-transmittance", "0.05", "--json").out)
     assert told["extinction"] == pytest.approx([-math.log(0.05) / 4e-3] * 3, rel=1e-14)
     assert told["transmission_distance"] == {"distance": pytest.approx(4e-3, rel=1e-12), "transmittance": 0.05}

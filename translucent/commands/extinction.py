@@ -47,6 +47,9 @@ class _Wanted(NamedTuple):
     as_json: bool
 
 
+_DEFAULT = click.core.ParameterSource.DEFAULT
+
+
 @click.command(epilog="Example: translucent extinction '#7b1e3a' 1cm")
 @click.argument("color", required=False)
 @click.argument("distance", required=False)
@@ -66,7 +69,7 @@ class _Wanted(NamedTuple):
 @click.option("--fit", type=click.Path(path_type=Path), metavar="FILE", help="Fit to rows of distance,color[,weight].")
 @click.option("--preset", "preset_name", metavar="NAME", help="A named medium instead of a color at a distance.")
 @click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx or .usda file, or of what --as printed.")
-@click.option("--td", metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm.")
+@click.option("--td", metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm, or 4.")
 @click.option(
     "--td-transmittance",
     type=float,
@@ -115,6 +118,9 @@ def extinction(
     from translucent.units import metres_per_unit
 
     metres_per_unit(unit_out)
+    # Whoever prints gives millimetres.
+    if td is not None and td[-1:].isdigit() and click.get_current_context().get_parameter_source("unit") is _DEFAULT:
+        td = f"{td}mm"
     media: dict[str, object] = {
         "--batch": batch,
         "--fit": fit,

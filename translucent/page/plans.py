@@ -14,6 +14,7 @@ from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS, ShadowMaps
+from translucent.scene.checks import check_scene
 from translucent.scene.scene import Scene
 
 #: Textures that WebGL2 promises in a shader. Passes that trace rays have theirs put together, and so read as many as
@@ -111,6 +112,7 @@ def plan_page(
     InputError
         If WebGL2 cannot draw the scene, or not by what was asked for.
     """
+    check_scene(scene)
     if interfaces is None and triangles(scene) > MOST_TRACED:
         interfaces = FrontInterface()
     asked = method, interfaces, scattering, shadows

@@ -32,6 +32,7 @@ from translucent.planning.scattering import Scattering, SingleScattering
 from translucent.planning.scattering.choice import check_scattering, given_back, shown
 from translucent.planning.shadow_maps import ShadowMaps, check_shadows, shadow_passes, shadows_left_out
 from translucent.planning.slots import require_clear_priorities
+from translucent.scene.checks import check_scene
 from translucent.scene.scene import Scene, object_names
 
 
@@ -69,6 +70,7 @@ def plan(
         If no available method can render the scene, or not with interfaces, scattering, caustics or shadows as asked
         for.
     """
+    check_scene(scene)
     check_caustics(caustics)
     check_shadows(shadows)
     chosen = _plan(scene, method, capabilities, interfaces, scattering)

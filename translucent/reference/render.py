@@ -33,6 +33,7 @@ from translucent.reference.sheets import scene_crossings, sheet_hits, sheet_thic
 from translucent.reference.surface_light import SurfaceLight
 from translucent.reference.volume import Volume, volume_segments
 from translucent.scene.camera import check_size
+from translucent.scene.checks import check_scene
 from translucent.scene.scene import Scene
 
 #: Number of surfaces, times objects, that are sorted at a time: the working arrays stay below 500 MB.
@@ -102,6 +103,7 @@ def render(
         If the size is not one, a number not in its range, a surface has textures, or the planner refuses the scene.
     """
     start = time.perf_counter()
+    check_scene(scene)
     size = check_size(size)
     if not 1e-12 <= tolerance <= 1:
         raise InputError(f"tolerance {tolerance}", "not in 1e-12 to 1", f"use for example {TOLERANCE:g}")
