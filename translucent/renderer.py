@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, TypeAlias, get_args
+from typing import TYPE_CHECKING, get_args
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,6 +20,7 @@ from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.context import Backend, NoContextError
 from translucent.gpu.renderer import GpuRenderer
 from translucent.planning.caustics import Caustics, check_caustics
+from translucent.planning.choices import RenderChoices
 from translucent.planning.interface_choice import check_interfaces
 from translucent.planning.interfaces import Interfaces
 from translucent.planning.methods import Method
@@ -48,10 +49,6 @@ BACKENDS = (*get_args(Backend), "cpu")
 MAX_SAMPLES = 4096
 
 
-#: What a plan is made for beside the scene: method, whether over a backdrop, interfaces, scattering, caustics, shadows.
-_Asked: TypeAlias = tuple[Method | None, bool, Interfaces | None, Scattering | None, Caustics | None, ShadowMaps | None]
-
-
 class Renderer:
     """Renderer of scenes with OpenGL, or on the CPU. Use it as a context manager: leaving it frees everything.
 
@@ -76,7 +73,7 @@ class Renderer:
             raise InputError(f"backend {backend!r}", "not a known backend", f"use one of {', '.join(BACKENDS)}")
         if context is not None and backend is not None:
             raise InputError(f"backend {backend!r}", "a context is given, too", "give one of the two")
-        self._plans: WeakKeyDictionary[Scene, dict[_Asked, RenderPlan]] = WeakKeyDictionary()
+        self._plans: WeakKeyDictionary[Scene, dict[tuple[RenderChoices, bool], RenderPlan]] = WeakKeyDictionary()
         self._closed = False
         self._asked = backend, context
         self._made: GpuRenderer | CpuRenderer = _engine(backend, context)
@@ -140,7 +137,8 @@ class Renderer:
             found = "what is drawn elsewhere has no mesh that light could land on"
             raise InputError("caustics before a backdrop", found, "leave out one of the two")
         plans = self._plans.setdefault(scene, {})
-        if (key := (method, over_backdrop, interfaces, scattering, caustics, shadows)) not in plans:
+        asked = RenderChoices(method, interfaces, scattering, caustics, shadows)
+        if (key := (asked, over_backdrop)) not in plans:
             make = plan_over_backdrop if over_backdrop else partial(plan, caustics=caustics)
             plans[key] = make(
                 scene,
@@ -243,6 +241,9 @@ class Renderer:
             self._note_interruption(error)
             raise
         frame.provenance.update(self.provenance)
+        if not over_backdrop:  # such a scene is not all that is seen
+            asked = RenderChoices(method, interfaces, scattering, caustics, shadows)
+            frame = dataclasses.replace(frame, scene=scene, choices=asked)
         _warn(frame)
         return frame
 

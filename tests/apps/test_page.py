@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import dataclasses
 import gzip
+import io
 import json
 import re
 import sys
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 import translucent as tl
 from tests.command_line import Run, one_error_line, strict_json
@@ -22,6 +24,7 @@ from translucent.gpu.recording.frames import FrameRecorder
 from translucent.page.container import MAGIC, Container
 from translucent.page.plans import TEXTURE_UNITS, plan_page
 from translucent.page.simplify import simplified, triangles
+from translucent.planning.choices import RenderChoices
 from translucent.planning.notes import NoteKind
 from translucent.scene.showcase import showcase
 
@@ -112,6 +115,7 @@ def test_light_is_rounded_by_less_than_told() -> None:
         (["--samples", "0"], ["samples 0", "1 to 256"]),
         (["--simplify", "3"], ["--simplify 3"]),
         (["--size", "4"], ["--size"]),
+        (["--size", "99999x99999"], ["99999x99999", "8192"]),
     ],
     ids=lambda v: " ".join(v),
 )
@@ -187,3 +191,41 @@ def test_without_the_package_a_coarser_copy_is_told_how(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "fast_simplification", None)
     with pytest.raises(tl.InputError, match="pip install fast-simplification"):
         simplified(scene_of(ball()), 200)
+
+
+@pytest.fixture
+def no_script(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "page.js").write_text("", encoding="utf-8")
+    monkeypatch.setattr("translucent.page.write.web_path", lambda _: tmp_path / "page.js")
+
+
+@pytest.mark.usefixtures("no_script")
+def test_a_frame_writes_the_page_of_its_scene(renderer: tl.Renderer, tmp_path: Path) -> None:
+    """As `write_page` does with the same choices, and the frame's own picture before."""
+    scene = scene_of(ball())
+    choices: dict[str, Any] = {"interfaces": tl.FrontInterface()}
+    frame = renderer.render(scene, (40, 30), tl.DepthPeeling(4), **choices)
+    text = frame.to_html(1.0, "agx", name="Ball")
+    picture = re.search(r"data:image/jpeg;base64,([^\"]+)", text)
+    assert picture is not None
+    poster = base64.b64decode(picture[1])
+    with Image.open(io.BytesIO(poster)) as seen:
+        assert np.abs(np.asarray(seen, float) - frame.to_srgb8(1.0, "agx")).mean() < 3
+    path = tmp_path / "page.html"
+    look = {"name": "Ball", "exposure": 1.0, "tone": "agx", "poster": poster}
+    tl.write_page(scene, path, size=(40, 30), method=tl.DepthPeeling(4), **choices, **look)
+    assert text == path.read_text(encoding="utf-8")
+    clear = dataclasses.replace(frame, alpha=np.ones((30, 40)))
+    assert "data:image" not in clear.to_html()
+
+
+def test_what_has_no_page_says_what_to_do(renderer: tl.Renderer) -> None:
+    scene = scene_of(ball(medium=tl.Medium((1, 2, 3))))
+    frame = tl.reference.render(scene, (4, 3))
+    with tl.Renderer("cpu") as cpu:
+        assert frame.scene is cpu.render(scene, (4, 3)).scene is scene  # these have one
+    with pytest.raises(tl.InputError, match=r"caustics.*render without"):
+        dataclasses.replace(frame, choices=RenderChoices(caustics=tl.Caustics(100))).to_html()
+    behind = tl.Backdrop(np.zeros((3, 4, 3)), np.full((3, 4), np.inf))
+    with pytest.raises(tl.InputError, match=r"holds no scene.*tl.write_page"):
+        renderer.render(scene, (4, 3), backdrop=behind).to_html()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -245,26 +245,36 @@ def read_vector(option: str, text: str) -> list[float]:
     return values
 
 
-def medium_lines(scene: Scene) -> list[str]:
-    """Lines about the media of a scene's translucent objects, one per medium.
+def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -> list[str]:
+    """Lines about the media of a scene's translucent objects, one per medium, with a color after some way through it.
 
     Layers, which nothing fills, are not among them.
+
+    Parameters
+    ----------
+    scene : Scene
+    reach : callable, optional
+        Gives that way in metres for an object. Default: a tenth of its diagonal.
     """
     users: dict[Medium, list[Object]] = {}
     for body in scene.bodies:
         if body.medium is not None and not body.covers:
             users.setdefault(body.medium, []).append(body)
-    return [_medium_text(medium, bodies, several=len(users) > 1) for medium, bodies in users.items()]
+    way = reach or _tenth
+    return [_medium_text(medium, bodies, way(bodies[0]), several=len(users) > 1) for medium, bodies in users.items()]
 
 
-def _medium_text(medium: Medium, bodies: list[Object], *, several: bool) -> str:
+def _tenth(body: Object) -> float:
+    return 0.1 * float(np.linalg.norm(body.bounds[1] - body.bounds[0]))
+
+
+def _medium_text(medium: Medium, bodies: list[Object], reach: float, *, several: bool) -> str:
     from translucent.formulas.color import to_hex
 
     names = ", ".join(sorted({repr(body.mesh.name) for body in bodies}))
     whose = f"{names}: " if several else ""
     if (sheet := bodies[0].sheet_thickness) is not None:
         return f"{whose}thin, white light is {to_hex(medium.transmittance(sheet))} behind it"
-    reach = 0.1 * float(np.linalg.norm(bodies[0].bounds[1] - bodies[0].bounds[0]))
     sigma = ", ".join(f"{value:.4g}" for value in medium.extinction)
     seen = to_hex(medium.transmittance(reach))
     return f"{whose}extinction {sigma} 1/m: white light is {seen} after {reach:.3g} m"

@@ -129,12 +129,12 @@ def page(
     """
     from translucent.page.plans import plan_page
     from translucent.page.simplify import simplified, triangles
-    from translucent.page.write import check_output, poster_of, save_page
+    from translucent.page.write import check_output, check_page_size, poster_of, save_page
     from translucent.scene.stages import STAGED_TONE
 
     check_output(output)
     refuse_overwriting(output, model, environment, background)
-    pixels = read_size(size)
+    pixels = check_page_size(read_size(size))
     picture = _read_poster(poster)
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     options = CameraOptions(camera, eye, target, up, fov)
@@ -172,7 +172,7 @@ def page(
             echo(f"warning: no poster: {error}", err=True)
     written = save_page(planned, output, title or Path(model).stem, pixels, samples, exposure, curve, picture)
     notes = [{"kind": str(note.kind), "text": str(note)} for note in planned.notes]
-    media = medium_lines(scene)
+    media = medium_lines(scene, planned.panel_distance)  # as the panel shows them
     if as_json:
         told = {
             "output": str(output),

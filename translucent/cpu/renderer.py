@@ -25,6 +25,7 @@ from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
 from translucent.geometry.embree import EmbreeMesh, embree_versions
 from translucent.geometry.mesh import Mesh
+from translucent.planning.choices import RenderChoices
 from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering.choice import shown
 from translucent.reference.refraction import bends
@@ -105,7 +106,7 @@ class CpuRenderer:
         if self._closed:
             raise RenderError("rendering", "the renderer is closed", "make a new one")
         started = time.perf_counter()
-        scene = shown(scene, plan.given_back)
+        given, scene = scene, shown(scene, plan.given_back)
         shader = Shader.of(scene, plan, self._embree_meshes(scene))
         picture = Picture.of(scene.camera, size)
         arrays = _empty(picture.size)
@@ -120,7 +121,14 @@ class CpuRenderer:
                 spent = self._draw(shader, picture, bent, partial(_average, arrays, number), spread)
                 seconds = {name: seconds[name] + spent[name] for name in seconds}
         seconds["total"] = time.perf_counter() - started
-        return Frame(**arrays, plan=plan, seconds=seconds, provenance=self.provenance)
+        return Frame(
+            **arrays,
+            plan=plan,
+            seconds=seconds,
+            provenance=self.provenance,
+            scene=given,
+            choices=RenderChoices(),
+        )
 
     def close(self) -> None:
         """Free the cached meshes. Closing twice is fine."""

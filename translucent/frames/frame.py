@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,9 @@ from translucent.formulas.color import exposure_scale, linear_to_srgb
 from translucent.formulas.tone import tone_curve
 from translucent.frames.display import Bundle, frame_bundle, png
 from translucent.frames.writing import write_frame, write_pictures
+from translucent.planning.choices import RenderChoices
 from translucent.planning.render_plan import RenderPlan
+from translucent.scene.scene import Scene
 
 #: The arrays of a frame, under the names that .npz files use.
 ARRAYS = ("radiance", "transmittance", "optical_depth", "thickness", "coverage", "valid")
@@ -70,6 +73,10 @@ class Frame:
         whose plan has interfaces.
     standard_error : (h, w, 3) float, optional
         Of the radiance, where it is a mean over random paths; None where it has no noise to be told.
+    scene : Scene, optional
+        Scene that was rendered, for `to_html`. None of frames before a backdrop, which is no part of it.
+    choices : RenderChoices
+        How the renderer was asked to render it.
     """
 
     radiance: npt.NDArray[Any]
@@ -87,6 +94,8 @@ class Frame:
     passed: npt.NDArray[Any] | None = None
     normals: npt.NDArray[Any] | None = None
     standard_error: npt.NDArray[Any] | None = None
+    scene: Scene | None = None
+    choices: RenderChoices = field(default_factory=RenderChoices)
 
     def __repr__(self) -> str:
         covered, invalid = int(self.coverage.sum()), int((~self.valid).sum())
@@ -197,6 +206,30 @@ class Frame:
 
         pictures = aov_pictures(self.arrays, None if truth is None else truth.arrays)
         return write_pictures(Path(folder), pictures.items())
+
+    def to_html(self, exposure: float = 0.0, tone: str = "neutral", *, name: str | None = None) -> str:
+        """Text of a page that shows the frame's scene in any browser with WebGL2, as `write_page` writes it.
+
+        The view begins as the frame is seen, by the choices that it was rendered with; the frame's picture is there
+        until the scene is, unless it has an `alpha`: what is behind is always seen on a page.
+
+        Parameters
+        ----------
+        exposure : float
+            Stops brighter.
+        tone : {"none", "neutral", "agx"}
+            Tone curve.
+        name : str, optional
+            Title of the page. Default: the name of the first body.
+
+        Raises
+        ------
+        InputError
+            If the frame has no scene, or WebGL2 cannot draw it by these choices.
+        """
+        # By name: a frame is a value, and knows of no pages.
+        text: str = import_module("translucent.page.of_frame").frame_html(self, exposure, tone, name)
+        return text
 
     def _repr_mimebundle_(self, **_: Any) -> Bundle:
         """The picture, and thickness with a scale, for notebooks."""

@@ -31,7 +31,7 @@ from translucent.page.meshes import mesh_told, name_of
 from translucent.page.plans import PagePlan
 from translucent.page.variants import current, editable, variant
 from translucent.scene.lights import PositionalLight
-from translucent.scene.scene import Object, Scene
+from translucent.scene.scene import Scene
 from translucent.version import VERSION
 
 #: Indices of refraction from 1 to 3 for which pages know the share of diffuse light that an interface mirrors.
@@ -190,7 +190,7 @@ def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) 
             {"position": np.asarray(light.position, np.float64).tolist()} if isinstance(light, PositionalLight) else {}
             for light in scene.lights
         ],
-        "media": [_medium_told(scene, medium, planned.distance) for medium in media],
+        "media": [_medium_told(planned, medium) for medium in media],
         "objects": [
             {
                 "mesh": gl.number_of_mesh(body.mesh),
@@ -206,27 +206,20 @@ def _scene_told(planned: PagePlan, size: tuple[int, int], gl: RecordingContext) 
     }
 
 
-def _medium_told(scene: Scene, medium: Medium, distance: float | None) -> dict[str, Any]:
-    bodies = [body for body in scene.objects if body.medium is medium and not body.covers]
+def _medium_told(planned: PagePlan, medium: Medium) -> dict[str, Any]:
+    bodies = [body for body in planned.scene.objects if body.medium is medium and not body.covers]
     first = bodies[0]
     why = next(filter(None, map(editable, bodies)), "")
-    extinction: Array = bounded_extinction(medium, scene.diagonal)
+    extinction: Array = bounded_extinction(medium, planned.scene.diagonal)
     return {
         "name": ", ".join(dict.fromkeys(name_of(body.mesh) for body in bodies)),
         "extinction": extinction.tolist(),
         "ior": medium.ior,
         "roughness": 0.0 if first.surface is None else first.surface.roughness,
-        "distance": distance or _shown_distance(first),
+        "distance": planned.panel_distance(first),
         "editable": not why,
         "why": why,
     }
-
-
-def _shown_distance(body: Object) -> float:
-    """Distance in metres, a round number, at which the color of a body's medium is shown."""
-    metres = body.mean_thickness
-    power = 10.0 ** np.floor(np.log10(metres)) if metres > 0 else 1.0
-    return float(power * min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(step * power - metres)))
 
 
 def _presets_told() -> list[dict[str, Any]]:

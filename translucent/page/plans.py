@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
 
 from translucent.errors import InputError
 from translucent.page.simplify import triangles
@@ -15,7 +18,7 @@ from translucent.planning.render_plan import Capabilities, RenderPlan
 from translucent.planning.scattering import Scattering
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS, ShadowMaps
 from translucent.scene.checks import check_scene
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
 
 #: Textures that WebGL2 promises in a shader. Passes that trace rays have theirs put together, and so read as many as
 #: `UNITS_WITH_SHADOWS` in these.
@@ -77,9 +80,6 @@ class PagePlan:
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
             text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
             found.append(Note(NoteKind.MANY_TRIANGLES, text))
-        if self.plan.method.peels:
-            text = f"rays are followed through {self.most_layers} surfaces; beyond, pixels are marked"
-            found.append(Note(NoteKind.LAYER_LIMIT, text))
         if any(body.density is not None for body in self.scene.objects):
             found.append(Note(NoteKind.STEPS, "media of varying density stay as they are: no panel changes them"))
         if sum(body.covers for body in self.scene.objects) > 1:
@@ -90,7 +90,15 @@ class PagePlan:
     @property
     def most_layers(self) -> int:
         """Crossings that depth peeling is to find."""
-        return min(self.plan.method.layer_limit or MOST_LAYERS, MOST_LAYERS)
+        return self.plan.method.layer_limit or MOST_LAYERS
+
+    def panel_distance(self, body: Object) -> float:
+        """Distance in metres at which the panel shows the color of a body's medium at first; a round one by default."""
+        if self.distance is not None:
+            return self.distance
+        metres = body.mean_thickness
+        power = 10.0 ** np.floor(np.log10(metres)) if metres > 0 else 1.0
+        return float(power * min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(step * power - metres)))
 
     def planned(self, scene: Scene) -> RenderPlan:
         """Plan of a variant of the scene."""
@@ -136,7 +144,14 @@ def _planned(
         found = "its passes write to buffers, which WebGL2 has none of"
         raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for ordered intervals")
     machine = Capabilities(shader_storage=False, texture_units=units)
-    chosen = plan(scene, method, machine, interfaces=interfaces, scattering=scattering, shadows=shadows)
+    make = partial(plan, scene, capabilities=machine, interfaces=interfaces, scattering=scattering, shadows=shadows)
+    chosen = make(method)
+    if isinstance(peeling := chosen.method, DepthPeeling) and peeling.max_layers > MOST_LAYERS:
+        # What the planner says why it took it stays.
+        reasons = {step.name: step.reason for step in chosen.passes}
+        chosen = make(replace(peeling, max_layers=MOST_LAYERS))
+        passes = tuple(replace(step, reason=reasons.get(step.name, step.reason)) for step in chosen.passes)
+        chosen = replace(chosen, passes=passes)
     for step in chosen.passes:
         if (what := _NOT_SHOWN.get(step.name)) is not None:
             asked = f"a page of this scene with {method or chosen.method}"

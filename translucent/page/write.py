@@ -8,6 +8,7 @@ import io
 import os
 from pathlib import Path
 
+from translucent.arrays import Pixels
 from translucent.assets import web_path
 from translucent.errors import InputError
 from translucent.files.paths import require_output, write_text_atomically
@@ -51,6 +52,9 @@ html, body {{ margin: 0; height: 100%; background: #131416; }}
 
 #: Samples of a pixel that pages add up at rest, as `translucent render` does; those of posters; and the most.
 SAMPLES, POSTER_SAMPLES, MOST_SAMPLES = 16, 4, 256
+
+#: Pixels along a side that a page may frame: its poster has as many.
+MOST_SIDE = 8192
 
 
 def write_page(
@@ -103,9 +107,10 @@ def write_page(
     """
     file = Path(path)
     check_output(file)
+    size = check_page_size(size)
     planned = plan_page(scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows)
     picture = None if poster is None else check_poster(poster, "poster")
-    save_page(planned, file, name or title_of(scene), check_size(size), samples, exposure, tone, picture)
+    save_page(planned, file, name or title_of(scene), size, samples, exposure, tone, picture)
     return planned
 
 
@@ -114,6 +119,17 @@ def check_output(path: Path) -> None:
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"page {str(path)!r}", "not an .html file", "name it for example viewer.html")
     require_output(path, f"page {str(path)!r}")
+
+
+def check_page_size(size: tuple[int, int]) -> tuple[int, int]:
+    """`size` as two ints; raises `InputError` if a page cannot frame so many pixels."""
+    width, height = check_size(size)
+    if max(width, height) > MOST_SIDE:
+        asked = f"a page that frames {width}x{height} pixels"
+        raise InputError(
+            asked, f"more than {MOST_SIDE} along a side", "give for example 1280x800: pages fit any window"
+        )
+    return width, height
 
 
 def save_page(
@@ -127,10 +143,6 @@ def save_page(
     poster: bytes | None,
 ) -> int:
     """Write a page; see `write_page`. Returns how many bytes it has."""
-    check_exposure(exposure)
-    tone_curve(tone)
-    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
-        raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16")
     text = page_html(planned, name, size, samples, exposure, tone, poster)
     write_text_atomically(path, text)
     return len(text.encode("utf-8"))
@@ -146,6 +158,11 @@ def page_html(
     poster: bytes | None = None,
 ) -> str:
     """Text of a page; see `write_page`."""
+    check_page_size(size)
+    check_exposure(exposure)
+    tone_curve(tone)
+    if not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        raise InputError(f"samples {samples!r}", f"not a whole number in 1 to {MOST_SAMPLES}", "give for example 16")
     script = web_path("page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     data = payload(planned, name, size, samples, exposure, tone)
     picture = "" if poster is None else f'<img alt="" src="{_data_url(poster)}">'
@@ -172,8 +189,6 @@ def poster_of(planned: PagePlan, size: tuple[int, int], exposure: float, tone: s
     RenderError
         If nothing can render here.
     """
-    from PIL import Image
-
     from translucent.renderer import Renderer
 
     with Renderer() as renderer:
@@ -186,8 +201,15 @@ def poster_of(planned: PagePlan, size: tuple[int, int], exposure: float, tone: s
             scattering=planned.scattering,
             shadows=planned.shadows,
         )
+    return jpeg(frame.to_srgb8(exposure, tone))
+
+
+def jpeg(pixels: Pixels) -> bytes:
+    """JPEG of pixels (h, w, 3)."""
+    from PIL import Image
+
     stream = io.BytesIO()
-    Image.fromarray(frame.to_srgb8(exposure, tone)).save(stream, "JPEG", quality=88)
+    Image.fromarray(pixels).save(stream, "JPEG", quality=88)
     return stream.getvalue()
 
 

@@ -14,6 +14,7 @@ from translucent.arrays import Array, Integers, Mask
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
+from translucent.planning.choices import RenderChoices
 from translucent.planning.methods import Method, RayMarched
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -101,6 +102,8 @@ def march(
         ),
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
+        scene=scene,
+        choices=RenderChoices(),
     )
 
 

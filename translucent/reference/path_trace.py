@@ -15,6 +15,7 @@ import numpy as np
 from translucent.arrays import Array, Integers
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
+from translucent.planning.choices import RenderChoices
 from translucent.planning.methods import SignedDepth
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
@@ -116,6 +117,8 @@ def path_trace(
         ),
         seconds={"total": time.perf_counter() - began},
         provenance={"backend": "reference", "numpy": np.__version__},
+        scene=scene,
+        choices=RenderChoices(),
     )
     return frame, error.reshape(height, width, 3)
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.frames.frame import Frame
+from translucent.planning.choices import RenderChoices
 from translucent.planning.effects import STRAIGHT
 from translucent.planning.methods import Method
 from translucent.planning.notes import NoteKind
@@ -139,6 +140,8 @@ def render(
         plan=chosen,
         seconds={"intersect": crossed - start, "shade": end - crossed, "total": end - start},
         provenance=provenance,
+        scene=scene,
+        choices=RenderChoices(),
     )
 
 
