@@ -162,7 +162,7 @@ export class ExactThicknessPass {
     const range = view.range(media);
     const saved = this.save();
     try {
-      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one)), [this.nothing, 0, 0, 0]);
+      if (this.ends) this.draw(this.ends, this.placed(opaque, view, range, (one) => this.ending(one, subpixel)), [this.nothing, 0, 0, 0]);
       const expected = [0, 0];
       const sound = bodies.every((one) => isClosed(one.mesh.geometry));
       let open = 0;
@@ -177,8 +177,9 @@ export class ExactThicknessPass {
         uniforms.opaque_axial_depth.value = this.ends?.texture ?? null;
         setExtinction(one, diagonal);
         const blocked = this.ends !== null;
-        const key = `sum ${spectral} ${blocked} ${one.instanced !== null}`;
-        return one.use(key, () => summing(uniforms, spectral, blocked, one.instanced !== null));
+        const whole = weight === 1 && uniforms.axial_start.value === -NOTHING;
+        const switches = { spectral, opaque: blocked, instanced: one.instanced !== null, whole, subpixel };
+        return one.use(`sum ${Object.values(switches)}`, () => summing(uniforms, switches));
       });
       this.draw(this.sums!, meshes, [0, 0, 0, 0]);
       if (this.last) this.leave(bodies);
@@ -282,11 +283,11 @@ export class ExactThicknessPass {
     });
   }
 
-  private ending(one: StandIn): Mesh {
+  private ending(one: StandIn, subpixel: number): Mesh {
     const { material } = one.mesh;
     const side = (Array.isArray(material) ? material[0] : material).side;
     return one.use(`end ${side} ${one.instanced !== null}`, () => {
-      const made = nearest(one.uniforms, one.instanced !== null);
+      const made = nearest(one.uniforms, one.instanced !== null, subpixel);
       made.side = side;
       return made;
     });

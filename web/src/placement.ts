@@ -119,7 +119,6 @@ function setAnchor(uniforms: BodyUniforms, view: View, clip: [number, number], a
   uniforms.anchor_rest.value.set(right - Math.fround(right), up - Math.fround(up));
   uniforms.anchor_slope.value.set(orthographic ? 0 : x, orthographic ? 0 : y);
   uniforms.across_start.value.set(cut && !orthographic ? clip[0] : 0, cut && !orthographic ? clip[1] : 0);
-  uniforms.subpixel.value = view.subpixel;
   uniforms.half_size.value.set(width / 2, height / 2);
 }
 

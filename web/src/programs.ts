@@ -38,7 +38,10 @@ uniform vec2 half_size;
 uniform vec2 anchor_slope;
 uniform vec2 anchor_rest;
 uniform vec2 across_start;
+uniform vec2 anchor_pixel;
+uniform float snapping_share;
 out vec2 across;
+flat out vec3 of_body;
 #ifdef USE_INSTANCING
 flat out float mirrored;
 #endif
@@ -57,6 +60,7 @@ void main() {
   offset = transformed - center;
   place_vertex();
   vec2 apart = (clip_from_offset * vec4(offset, 0.0)).xy + across_start - anchor_slope * axial_shown;
+  of_body = vec3(anchor_pixel, snapping_share);
   across = half_size * apart + anchor_rest * gl_Position.w;
 }
 `;
@@ -74,18 +78,19 @@ flat in float mirrored;
 #endif
 `;
 
-// Where the interpolated point is in the picture, and from that where the ray of the pixel meets its face.
+// Place of the interpolated point in the picture, and from that where the ray of the pixel meets its face. Software
+// rasterizers check the bounds of each uniform that a fragment reads: what is the same for a body comes with its vertices.
 const RECENTERED = `
 in float axial_shown;
 in vec2 across;
-uniform vec2 anchor_pixel;
-uniform float subpixel;
+flat in vec3 of_body;
 float axial;
 ${generated.recentered}
 `;
 
-const FIND_AXIAL = `
-  vec2 on_ray = recentered(axial_shown, (gl_FragCoord.xy - anchor_pixel) - across * gl_FragCoord.w, subpixel);
+const findAxial = (subpixel: number): string => `
+  vec2 missing = (gl_FragCoord.xy - of_body.xy) - across * gl_FragCoord.w;
+  vec2 on_ray = recentered(axial_shown, missing, ${constant(subpixel)});
   axial = on_ray.x;
 `;
 
@@ -105,7 +110,6 @@ export interface BodyUniforms {
   /** Pixel from which places in the picture count, and what its float32 leaves out. */
   anchor_pixel: IUniform<Vector2>;
   anchor_rest: IUniform<Vector2>;
-  subpixel: IUniform<number>;
   anchor_slope: IUniform<Vector2>;
   across_start: IUniform<Vector2>;
   center: IUniform<Vector3>;
@@ -130,7 +134,6 @@ export function bodyUniforms(): BodyUniforms {
     half_size: { value: new Vector2() },
     anchor_pixel: { value: new Vector2() },
     anchor_rest: { value: new Vector2() },
-    subpixel: { value: 0 },
     anchor_slope: { value: new Vector2() },
     across_start: { value: new Vector2() },
     center: { value: new Vector3() },
@@ -148,19 +151,31 @@ export function bodyUniforms(): BodyUniforms {
   };
 }
 
-function recentering(fragment: string): string {
+const constant = (value: number): string => value.toExponential();
+
+function recentering(fragment: string, subpixel: number): string {
   return fragment
     .replace("gl_FrontFacing", "FRONT_FACING")
     .replace("in float axial;\n", "")
-    .replace("snapping(axial, snapping_share)", "on_ray.y * snapping_share")
-    .replace("void main() {", `void main() {${FIND_AXIAL}`);
+    .replace("uniform float snapping_share;\n", "")
+    .replace("snapping(axial, snapping_share)", "on_ray.y * of_body.z")
+    .replace("void main() {", `void main() {${findAxial(subpixel)}`);
+}
+
+/** Uniforms of a closed body that has no rays beginning in it, as constants. */
+function ofWholeBody(fragment: string): string {
+  const kept = { count_weight: 1, count_offset: 0, axial_start: -generated.NOTHING };
+  return Object.entries(kept).reduce(
+    (text, [name, value]) => text.replace(`uniform float ${name};`, `const float ${name} = ${constant(value)};`),
+    fragment,
+  );
 }
 
 function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
   return new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: VERTEX,
-    fragmentShader: SIDE + RECENTERED + recentering(fragment),
+    fragmentShader: SIDE + RECENTERED + fragment,
     defines: instanced ? { WITH_INSTANCES: 1 } : {},
     uniforms,
     side: DoubleSide,
@@ -175,16 +190,30 @@ function drawn(fragment: string, equation: BlendingEquation, uniforms: BodyUnifo
   });
 }
 
+/** Switches of the pass that adds up. */
+export interface Summing {
+  /** Optical depth beside the path. */
+  spectral: boolean;
+  /** Opaque objects end rays. */
+  opaque: boolean;
+  instanced: boolean;
+  /** Closed, and no ray begins in it: what follows from that is not read from uniforms. */
+  whole: boolean;
+  /** Step of the grid onto which the rasterizer moves vertices, in pixels. */
+  subpixel: number;
+}
+
 /** Adds up signed paths and counts. */
-export function summing(uniforms: BodyUniforms, spectral: boolean, opaque: boolean, instanced: boolean): ShaderMaterial {
+export function summing(uniforms: BodyUniforms, { spectral, opaque, instanced, whole, subpixel }: Summing): ShaderMaterial {
   const path = opaque ? generated.signedDepthBeforeOpaque : generated.signedDepth;
   const paths = opaque ? generated.spectralDepthBeforeOpaque : generated.spectralDepth;
-  return drawn(spectral ? paths : path, AddEquation, uniforms, instanced);
+  const fragment = recentering(spectral ? paths : path, subpixel);
+  return drawn(whole ? ofWholeBody(fragment) : fragment, AddEquation, uniforms, instanced);
 }
 
 /** Keeps the nearest opaque surface, as a share of the depth of the media; without a depth buffer, which would round it. */
-export function nearest(uniforms: BodyUniforms, instanced: boolean): ShaderMaterial {
-  return drawn(generated.opaqueDepth, MinEquation, uniforms, instanced);
+export function nearest(uniforms: BodyUniforms, instanced: boolean, subpixel: number): ShaderMaterial {
+  return drawn(recentering(generated.opaqueDepth, subpixel), MinEquation, uniforms, instanced);
 }
 
 // The last surface of bodies on each ray: its normal, outwards, and metres along the camera's axis.
