@@ -22,8 +22,9 @@ help: ## list these commands
 venv: ## make .venv for development, and find an OpenGL
 	$(BOOTSTRAP) --group dev
 
-demo: ## render a few pictures into out/
+demo: ## render a few pictures into out/, and build what runs in browsers where npm is
 	$(BOOTSTRAP)
+	@$(BIN)/python tools/build_web.py --if-npm
 	@$(BIN)/python tools/demo.py
 
 # One thread of the BLAS in each: more would wait for one another. Bytecode is kept whatever the shell says: tests start

@@ -31,6 +31,9 @@ WEB = ROOT / "web"
 GENERATED = WEB / "src" / "generated"
 STAMP = WEB / "node_modules" / ".package-lock.sha256"
 
+#: What misses it.
+MISSED = "`translucent page` and `tl.view` have no viewer, and tests in a browser skip"
+
 #: What web/src imports from generated/shaders.ts: a shader with its switches decided.
 SHADERS: dict[str, tuple[str, dict[str, int]]] = {
     "bodyVertex": ("geometry/body.vert", {"WITH_NORMAL": 0, "WITH_POSITION": 0}),
@@ -136,13 +139,13 @@ def main() -> None:
         generate()
         if shutil.which("npm") is None:
             if arguments.if_npm:
-                return print("web/dist is not built: npm is not here, so that tests in a browser skip")
+                return print(f"web/dist is not built: npm is not here, so that {MISSED}")
             raise InputError("make web", "npm is not here", "install Node.js 20 or newer")
         try:
             install()
         except InputError as error:
             if arguments.if_npm:
-                return print(f"web/dist is not built, so that tests in a browser may skip: {error}")
+                return print(f"web/dist is not built, so that {MISSED}: {error}")
             raise
         _run("node", "build.mjs")
         write_example()

@@ -130,6 +130,28 @@ def test_bad_input_is_told_and_leaves_nothing(
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_colors_are_told_at_the_distance_of_the_panel(run: Run, cube: Path, tmp_path: Path) -> None:
+    plain = ("-o", str(tmp_path / "cube.html"), "--poster", "none", "--stage", "none")
+    told = run(str(cube), *plain, "--color", "#7b1e3a", "--distance", "7mm").out
+    assert "white light is #7b1e3a after 0.007 m" in told
+    header, _ = contents(tmp_path / "cube.html")
+    assert header["scene"]["media"][0]["distance"] == 0.007
+
+
+@pytest.mark.parametrize("method", [None, tl.DepthPeeling(), tl.DepthPeeling(8)])
+def test_peeled_pages_tell_one_number_of_surfaces(method: tl.DepthPeeling | None) -> None:
+    bodies = [ball(medium=tl.Medium((1, 2, 3), emission=(n, 1, 1)), priority=n) for n in (1, 2)]
+    made = trimesh.creation.torus(0.02, 0.008, major_sections=8, minor_sections=6)
+    bodies += [ball(medium=bodies[0].medium)]
+    bodies = [dataclasses.replace(body, mesh=tl.Mesh(made.vertices, made.faces)) for body in bodies]
+    planned = plan_page(scene_of(*bodies), method)
+    most = 16 if method is None else min(method.max_layers, 16)
+    (told,) = [str(note) for note in planned.notes if note.kind is NoteKind.LAYER_LIMIT]
+    assert str(most) in told
+    assert planned.most_layers == most
+    assert ("asked for" in planned.plan.passes[0].reason) == (method is not None)
+
+
 def test_a_poster_is_a_picture(run: Run, cube: Path, tmp_path: Path) -> None:
     out = tmp_path / "cube.html"
     assert run(str(cube), "-o", str(out), "--poster", str(cube)).code == 2

@@ -80,6 +80,12 @@ def test_rays_from_inside_begin_at_the_eye(three_page: WebPage) -> None:
     assert np.all(found.count == 1)
 
 
+def test_orthographic_rays_begin_at_the_near_plane(three_page: WebPage) -> None:
+    found = measure(three_page, [described(BALL)], tl.Camera(seen_from(0.4, fov_y=60.0).pose, None, 1.0), (32, 32))
+    assert found.valid.all()
+    assert found.thickness[16, 16] == pytest.approx(1.4 - 0.01, abs=SAGITTA)
+
+
 def test_opaque_objects_end_rays(three_page: WebPage) -> None:
     """The right half of a wall through the middle of the ball."""
     wall = Box((0.0, -2.0, -0.01), (2.0, 2.0, 0.0)).tessellate()

@@ -6,8 +6,9 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import click
 import numpy as np
 
 from translucent.errors import InputError
@@ -24,6 +25,26 @@ if TYPE_CHECKING:
 
 #: Default field of view in degrees, and up vector, of a camera that options define.
 DEFAULT_FOV, DEFAULT_UP = 30.0, "0,1,0"
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def camera_options(command: F) -> F:
+    """Options that choose a camera, as `CameraOptions` holds them."""
+    for option in (
+        click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}."),
+        click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}."),
+        click.option("--target", metavar="X,Y,Z", help="What the camera looks at. Default: the model's center."),
+        click.option(
+            "--eye", metavar="X,Y,Z", help="Position of the camera in metres. Default: the whole model in view."
+        ),
+        click.option(
+            "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 class CameraOptions(NamedTuple):
@@ -85,11 +106,8 @@ def read_scene(
         raise InputError(
             f"--camera {options.camera}", f"{', '.join(options.defining)} given, too", "give one or the other"
         )
-    if is_scene_file(model):
-        loaded = {"allow_outside": allow_outside, "draft_extensions": draft_extensions}
-        scene, chosen = _file_scene(model, unit, medium, options, size, environment, stage, loaded, look)
-    else:
-        scene, chosen = _mesh_scene(model, unit, medium, options, size, environment, stage, allow_outside, look)
+    asked = _Asked(model, unit, medium, options, size, environment, stage, look, allow_outside)
+    scene, chosen = _file_scene(asked, draft_extensions) if is_scene_file(model) else _mesh_scene(asked)
     named = {id(item) for one in look.media for item in objects_named(scene, one.name)}
     scene = with_roughness(scene, roughness, [item for item in scene.objects if id(item) not in named])
     for one in look.media:
@@ -115,55 +133,59 @@ def _turned(stage: str | None) -> tuple[str | None, float]:
     return (name if comma else stage), turn
 
 
-def _mesh_scene(
-    model: str,
-    unit: str,
-    medium: Medium | None,
-    options: CameraOptions,
-    size: tuple[int, int],
-    environment: Environment | None,
-    stage: str | None,
-    allow_outside: bool,
-    look: FileLook,
-) -> tuple[Scene, Stage | None]:
+class _Asked(NamedTuple):
+    """Arguments of `read_scene` that both kinds of files take."""
+
+    model: str
+    unit: str
+    medium: Medium | None
+    options: CameraOptions
+    size: tuple[int, int]
+    environment: Environment | None
+    stage: str | None
+    look: FileLook
+    allow_outside: bool
+
+
+def _mesh_scene(asked: _Asked) -> tuple[Scene, Stage | None]:
     from translucent.scene.showcase import default_medium, showcase
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
 
-    if options.camera is not None:
-        raise InputError(f"--camera {options.camera}", f"{model} is no glTF file and has no cameras", "use --eye")
+    model, look, environment = asked.model, asked.look, asked.environment
+    if (camera := asked.options.camera) is not None:
+        raise InputError(f"--camera {camera}", f"{model} is no glTF file and has no cameras", "use --eye")
     for option, value in (("--variant", look.variant), ("--time", look.time)):
         if value is not None:
             raise InputError(f"{option} {value}", f"{model} is no glTF file", "leave it out")
-    chosen = stage_named(stage or (DEFAULT_STAGE if environment is None else NO_STAGE))
-    mesh = read_mesh(model, unit, allow_outside)
-    filling = medium or default_medium(mesh, chosen)
-    scene = showcase(mesh, filling, size, environment=environment, stage=NO_STAGE)
+    chosen = stage_named(asked.stage or (DEFAULT_STAGE if environment is None else NO_STAGE))
+    mesh = read_mesh(model, asked.unit, asked.allow_outside)
+    filling = asked.medium or default_medium(mesh, chosen)
+    scene = showcase(mesh, filling, asked.size, environment=environment, stage=NO_STAGE)
     return _with_media(scene, look), chosen
 
 
-def _file_scene(
-    model: str,
-    unit: str,
-    medium: Medium | None,
-    options: CameraOptions,
-    size: tuple[int, int],
-    environment: Environment | None,
-    stage: str | None,
-    loaded: dict[str, bool],
-    look: FileLook,
-) -> tuple[Scene, Stage | None]:
+def _file_scene(asked: _Asked, draft_extensions: bool) -> tuple[Scene, Stage | None]:
     from translucent.gltf.load import load_scene
     from translucent.scene.showcase import filled
     from translucent.scene.stages import DEFAULT_STAGE, NO_STAGE, stage_named
     from translucent.scene.staging import has_ground
 
-    camera = None if options.defining else options.camera or 0
-    scene = load_scene(model, unit, camera, size, variant=look.variant, time=look.time, **loaded)
-    if medium is not None:
-        scene = filled(scene, medium)
+    look, environment = asked.look, asked.environment
+    scene = load_scene(
+        asked.model,
+        asked.unit,
+        None if asked.options.defining else asked.options.camera or 0,
+        asked.size,
+        variant=look.variant,
+        time=look.time,
+        allow_outside=asked.allow_outside,
+        draft_extensions=draft_extensions,
+    )
+    if asked.medium is not None:
+        scene = filled(scene, asked.medium)
     scene = _with_media(scene, look)
     bare = not (scene.has_camera or scene.lights or has_ground(scene)) and environment is None
-    chosen = stage_named(stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
+    chosen = stage_named(asked.stage or (DEFAULT_STAGE if bare and scene.bodies else NO_STAGE))
     return scene if environment is None else dataclasses.replace(scene, environment=environment), chosen
 
 

@@ -36,9 +36,8 @@ from translucent.commands.method_options import (
     with_environment_shadows,
 )
 from translucent.commands.model import (
-    DEFAULT_FOV,
-    DEFAULT_UP,
     CameraOptions,
+    camera_options,
     medium_lines,
     read_scene,
     require_translucent,
@@ -60,11 +59,7 @@ RENDERED, NO_POSTER = "rendered", "none"
 @click.option(
     "--size", default="1280x800", show_default=True, metavar="WxH", help="Of the poster, and of what the view frames."
 )
-@click.option("--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0, to begin with.")
-@click.option("--eye", metavar="X,Y,Z", help="Position of the camera in metres to begin with. Default: all in view.")
-@click.option("--target", metavar="X,Y,Z", help="What the camera looks at, and turns about. Default: the center.")
-@click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
-@click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
+@camera_options
 @stage_option
 @look_options
 @method_option

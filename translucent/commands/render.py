@@ -41,10 +41,9 @@ from translucent.commands.method_options import (
     with_environment_shadows,
 )
 from translucent.commands.model import (
-    DEFAULT_FOV,
-    DEFAULT_UP,
     CameraOptions,
     FileLook,
+    camera_options,
     is_own,
     medium_lines,
     read_scene,
@@ -84,13 +83,7 @@ from translucent.errors import InputError
 @outside_option
 @draft_option
 @click.option("--size", default="1280x720", show_default=True, metavar="WxH", help="Size of the picture in pixels.")
-@click.option(
-    "--camera", type=int, metavar="N", help="Camera of a glTF file, counted from 0. Default: 0, if it has any."
-)
-@click.option("--eye", metavar="X,Y,Z", help="Position of the camera in metres. Default: the whole model in view.")
-@click.option("--target", metavar="X,Y,Z", help="What the camera looks at. Default: the model's center.")
-@click.option("--up", metavar="X,Y,Z", help=f"What is up in the picture. Default: {DEFAULT_UP}.")
-@click.option("--fov", type=float, metavar="DEG", help=f"Vertical angle of view. Default: {DEFAULT_FOV:g}.")
+@camera_options
 @stage_option
 @look_options
 @method_option
