@@ -14,7 +14,7 @@ HEADER = "| scene | variant | time / floor | RMS error | p99.9 error | invalid |
 
 
 def table(report: dict[str, Any], method: str) -> str:
-    """What a method costs and loses on each scene of the report; of its variants there, the most exact one."""
+    """Cost and error of a method on each scene of the report; of its variants there, the most exact one."""
     lines = []
     for case in report["cases"]:
         quantity = case["quantity"]

@@ -1,4 +1,4 @@
-"""What the published report has measured of shadows and caustics, as tables for the page on methods."""
+"""Tables of what the published report has measured of shadows and caustics, for the page on methods."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools
 
 
 def is_seen(page: Any, name: str) -> bool:
-    """Whether nothing lies over the middle of an element, such as the poster."""
+    """Tell whether nothing lies over the middle of an element, such as the poster."""
     return bool(
         page.locator(name).evaluate(
             "(found) => { const box = found.getBoundingClientRect();"

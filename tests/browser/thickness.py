@@ -26,7 +26,7 @@ EDGE = 0.1
 
 @dataclass(frozen=True)
 class Measured:
-    """What the pass gave, top row first."""
+    """Pixels that the pass gave, top row first."""
 
     thickness: Array
     count: Array
@@ -184,7 +184,7 @@ def measure(
     opaque: Sequence[dict[str, Any]] = (),
     **options: Any,
 ) -> Measured:
-    """What the pass gives for meshes before a camera, in a page that is prepared."""
+    """Measure meshes before a camera, in a page that is prepared."""
     told = described_camera(camera, size)
     asked = {"meshes": list(meshes), "opaque": list(opaque), "camera": told, "size": size, "options": options}
     return Measured.of(page.run(MEASURE, asked))

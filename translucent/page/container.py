@@ -59,7 +59,7 @@ class Container:
         return len(self.sections) - 1
 
     def packed(self, header: dict[str, Any]) -> bytes:
-        """All of it, compressed."""
+        """Header and sections, compressed."""
         text = json.dumps({**header, "sections": self.sections}, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 8)
         whole = MAGIC + len(text).to_bytes(8, "little") + text + b"".join(self._bytes)

@@ -21,7 +21,7 @@ def name_of(mesh: Mesh) -> str:
 
 
 def mesh_told(mesh: Mesh, into: Container, *, with_normals: bool, with_looks: bool) -> dict[str, Any]:
-    """What a page's header says of a mesh, whose arrays go into the container."""
+    """Entry of a mesh in a page's header; its arrays go into the container."""
     low, high = mesh.bounds
     faces = mesh.faces.astype(np.uint32)
     told: dict[str, Any] = {

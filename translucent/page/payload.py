@@ -138,7 +138,7 @@ class _Sections:
         return self._numbers[content]
 
     def texture(self, told: Mapping[str, Any], light: bool) -> dict[str, Any]:
-        """What the header says of a texture; light is rounded."""
+        """Entry of a texture in the header; light is rounded."""
         content = told["content"]
         if content is None or content in self._kept:
             return {**told, "content": None}

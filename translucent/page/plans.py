@@ -70,12 +70,12 @@ class PagePlan:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What the page does not show, or not exactly."""
+        """Notes on what the page does not show, or not exactly."""
         return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled)
 
     @property
     def own_notes(self) -> tuple[Note, ...]:
-        """Those that are not of the plan."""
+        """Notes that are not of the plan."""
         found = []
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
             text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"

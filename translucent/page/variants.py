@@ -15,7 +15,7 @@ USUAL_IOR, USUAL_ROUGHNESS = 1.5, 0.5
 
 
 def editable(body: Object) -> str:
-    """Why a page cannot change the medium of a body; nothing if it can."""
+    """Reason for which a page cannot change the medium of a body; empty if it can."""
     medium = body.medium
     if medium is None or body.covers:
         return "opaque"
@@ -49,7 +49,7 @@ def _with_ior(medium: Medium, ior: float) -> Medium:
 
 
 def current(scene: Scene) -> tuple[bool, bool]:
-    """Whether any medium that a page can change bends light, and whether any of their surfaces is rough."""
+    """Switches as they are: any medium that a page can change bends light; any of their surfaces is rough."""
     free = [body for body in scene.objects if body.medium is not None and not editable(body)]
     bends = any(body.medium is not None and body.medium.ior != 1.0 for body in free)
     return bends, any(body.surface is not None and body.surface.roughness > 0 for body in free)

@@ -40,11 +40,11 @@ export interface ExactThicknessOptions {
   precision?: Precision;
   /** Optical depth per channel beside the metres: where media differ ("auto"), always, or never. */
   opticalDepth?: "auto" | boolean;
-  /** Where rays leave bodies, for materials that bend them: where one has an ior above 1 ("auto"), always, or never. */
+  /** Search for where rays leave bodies, for materials that bend them: where one has an ior above 1 ("auto"), always, or never. */
   exits?: "auto" | boolean;
 }
 
-/** What `read` gives; row 0 is the top one. */
+/** Pixels that `read` gives; row 0 is the top one. */
 export interface ThicknessPixels {
   width: number;
   height: number;
@@ -58,7 +58,7 @@ export interface ThicknessPixels {
   covered: Uint8Array;
 }
 
-// What is left of a sum in 16 bits: 11 bits of each number, over a handful of faces.
+// Rounding of a sum in 16 bits: 11 bits of each number, over a handful of faces.
 const ROUNDING_16 = 4e-3;
 const LARGEST_16 = 65504;
 
@@ -125,7 +125,7 @@ export class ExactThicknessPass {
     return this.result?.textures[1] ?? null;
   }
 
-  /** Where opaque surfaces end rays: metres along the camera's axis are `near + length * r`; null where there are none. */
+  /** Depth at which opaque surfaces end rays: metres along the camera's axis are `near + length * r`; null where there are none. */
   get opaqueDepth(): Texture | null {
     return this.ends?.texture ?? null;
   }
@@ -323,7 +323,7 @@ export class ExactThicknessPass {
     this.layout = layout;
   }
 
-  /** Where rays leave the bodies. */
+  /** Draw where rays leave the bodies. */
   private leave(bodies: StandIn[]): void {
     const { buffers } = this.renderer.state;
     const reversed = buffers.depth.getReversed();

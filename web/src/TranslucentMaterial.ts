@@ -53,7 +53,7 @@ vec3 exactPoint(vec2 place, float axial) {
   return vec3(across, -axial);
 }
 
-// What is behind: an opaque object where the picture shows one, else the environment, else the picture all the same.
+// Background: an opaque object where the picture shows one, else the environment, else the picture all the same.
 vec3 exactBehind(vec3 p, vec3 direction, float roughness, float ior) {
   vec2 place = exactPlace(p);
   vec4 seen = getTransmissionSample(place, roughness, ior);

@@ -1,4 +1,4 @@
-/** Where bodies are before a camera: in float64, rounded to float32 only relative to each body's center. */
+/** Places of bodies before a camera: in float64, rounded to float32 only relative to each body's center. */
 import { Box3, Matrix4, Vector2, Vector3, Vector4 } from "three";
 import type { Camera } from "three";
 import { sumOfInstances } from "./bodies.js";
@@ -109,7 +109,7 @@ export function place(one: StandIn, view: View, range: DepthRange): void {
   uniforms.axial_depth_start.value = ((cut ? 0 : -e[14]) - range.near) / range.length;
 }
 
-/** Where in the picture places count from: the center of the body, or of the picture if that has no place. */
+/** Set the point of the picture that places count from: the center of the body, or of the picture if that has no place. */
 function setAnchor(uniforms: BodyUniforms, view: View, clip: [number, number], ahead: number, cut: boolean): void {
   const { orthographic, width, height } = view;
   const weight = orthographic || cut ? 1 : ahead;
@@ -122,7 +122,7 @@ function setAnchor(uniforms: BodyUniforms, view: View, clip: [number, number], a
   uniforms.half_size.value.set(width / 2, height / 2);
 }
 
-/** Whether rays may start within the bounds of a body: distances then count from there. */
+/** Tell whether rays may start within the bounds of a body: distances then count from there. */
 export function isCut(one: StandIn, view: View): boolean {
   const { worldBox } = one;
   if (view.orthographic) return view.range(worldBox).near <= view.start;

@@ -1,4 +1,4 @@
-/** What a geometry is: closed or not, and how often it winds around a point. In float64, on the CPU. */
+/** Topology of a geometry: closed or not, and how often it winds around a point. In float64, on the CPU. */
 import { Vector3 } from "three";
 import type { BufferGeometry, Mesh } from "three";
 
@@ -14,7 +14,7 @@ export function corners(geometry: BufferGeometry): { count: number; at: (i: numb
 const known = new WeakMap<BufferGeometry, { key: string; closed: boolean }>();
 
 /**
- * Whether every edge has two faces that are wound alike; vertices at one place are one vertex. Kept with the geometry until
+ * Tell whether every edge has two faces that are wound alike; vertices at one place are one vertex. Kept with the geometry until
  * its positions, its index or its range change.
  */
 export function isClosed(geometry: BufferGeometry): boolean {

@@ -295,7 +295,7 @@ _TRIANGLE_ROW = "uniform int hierarchy_triangle_row;"
 
 
 def _declares(text: str, sampler: str) -> bool:
-    """Whether a shader declares a sampler."""
+    """Tell whether a shader declares a sampler."""
     return re.search(rf"^uniform u?sampler2D {sampler};", text, re.MULTILINE) is not None
 
 

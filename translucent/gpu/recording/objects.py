@@ -21,7 +21,7 @@ _numbers = count()
 
 
 class Recorder(Protocol):
-    """What objects know of the context that they belong to."""
+    """Context, as the objects that belong to it know it."""
 
     bound_blocks: dict[int, tuple[RecordedBuffer, int, int]]
     bound_textures: dict[int, RecordedTexture]
@@ -213,7 +213,7 @@ class RecordedFramebuffer:
         self._gl.note_clear(self, (red, green, blue, alpha), depth)
 
     def read(self, viewport: Any = None, components: int = 4, **_: Any) -> bytes:
-        """What passes that look at their result would see: as many crossings as the recording is to allow."""
+        """Stand in for the result that passes look at: as many crossings as the recording is to allow."""
         width, height = (viewport or self._whole)[2:]
         return np.full(width * height * components, self._gl.most_layers, np.float32).tobytes()
 

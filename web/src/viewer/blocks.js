@@ -1,4 +1,4 @@
-// What uniform blocks hold for a camera, in float64 as translucent/gpu/{placement,body_uniforms,uniforms}.py work it out.
+// Contents of the uniform blocks for a camera, in float64 as translucent/gpu/{placement,body_uniforms,uniforms}.py work it out.
 // Fields that depend neither on the camera nor on the material are those that the page came with.
 
 const NOTHING = 1e30;

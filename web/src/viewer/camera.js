@@ -122,7 +122,7 @@ export class View {
     };
   }
 
-  /** How much higher the view must be in a picture this narrow, so that all bodies that were seen at first are. */
+  /** Factor by which the view is higher in a picture this narrow, so that all bodies that were seen at first are. */
   widened(size) {
     const { eye, right, forward, fov_y, height } = this.start;
     const half = fov_y == null ? height / 2 : Math.tan((fov_y * Math.PI) / 360);

@@ -296,7 +296,7 @@ export class Viewer {
     return () => this.listeners.delete(listener);
   }
 
-  /** What is under a place of the canvas, in shares of its width and height from the top left corner. */
+  /** Read what is under a place of the canvas, in shares of its width and height from the top left corner. */
   probe(x, y) {
     if (!this.still || this.lost || x < 0 || y < 0 || x >= 1 || y >= 1) return null;
     const key = this.materials.variant;

@@ -8,7 +8,7 @@ const BLEND = 1, DEPTH_TEST = 2, CULL_FACE = 4;
 const BODY_STRIDE = 512;
 const HIERARCHY_WIDTH = 4096;
 
-/** What this WebGL2 can do, and what is used in place of what it cannot. */
+/** Abilities of this WebGL2, and what is used in place of those that it lacks. */
 export function capabilitiesOf(gl, half = false) {
   const color = gl.getExtension("EXT_color_buffer_float");
   const blend = gl.getExtension("EXT_float_blend");

@@ -1,4 +1,4 @@
-// What is seen of a frame: its radiance through a tone curve, or thickness in false colors.
+// Picture of a frame: its radiance through a tone curve, or thickness in false colors.
 
 import { linked } from "./player.js";
 
