@@ -20,7 +20,10 @@ def editable(body: Object) -> str:
     if medium is None or body.covers:
         return "opaque"
     if np.any(np.asarray(medium.scattering) > 0):
-        return "This medium scatters light: what spreads in it was worked out for the page, and stays."
+        return (
+            "This medium scatters light. How that spreads was solved when the page was written, for this medium alone: "
+            "it stays, while view, exposure and other media change. For another one, write the page again."
+        )
     if medium.emits:
         return "This medium glows: it stays as it is."
     if body.density is not None:

@@ -81,6 +81,7 @@ const BODY = `
     <div class="scale"><canvas width="256" height="1"></canvas><div class="marks"></div></div>
     <div class="group material">
       <label for="medium" class="several">Medium</label><select id="medium" class="several"></select>
+      <p class="fixed" style="margin:0;grid-column:1/-1;color:#9ea2a9;display:none"></p>
       <label for="preset">Preset</label><select id="preset"></select>
       <label for="color">Color</label>
       <div class="row"><input type="color" id="color" aria-label="Color of white light behind so much of it"><span>at</span>
@@ -93,7 +94,6 @@ const BODY = `
       <label for="exposure">Exposure</label>
       <div class="row"><input type="range" id="exposure" min="-4" max="4" step="0.1"><input type="number" id="exposure-number" min="-10" max="10" step="0.1" aria-label="Exposure in stops"></div>
     </div>
-    <p class="fixed" style="margin:0;color:#9ea2a9;display:none"></p>
     <div class="buttons"><button data-do="view">Reset view</button><button data-do="material">Reset material</button></div>
     <details class="notes"><summary></summary><ul></ul></details>
     <details class="keys"><summary>Keys and gestures</summary><dl>
