@@ -210,12 +210,17 @@ def test_touch_on_a_phone(chromium: Any, web_dist: Path, tmp_path: Path) -> None
         page.close()
 
 
-def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
-    web_page.page.add_init_script(
-        "const own = HTMLCanvasElement.prototype.getContext;"
-        "HTMLCanvasElement.prototype.getContext = function (kind, ...more) {"
-        " return kind === 'webgl2' ? null : own.call(this, kind, ...more); };"
+def answer_null(page: WebPage, of: str, method: str, where: str) -> None:
+    """Let a method of the browser give null for some names, before any script runs."""
+    page.page.add_init_script(
+        f"const own = {of}.prototype.{method};"
+        f"{of}.prototype.{method} = function (name, ...more) {{"
+        f" return {where} ? null : own.call(this, name, ...more); }};"
     )
+
+
+def test_without_webgl2(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
+    answer_null(web_page, "HTMLCanvasElement", "getContext", "name === 'webgl2'")
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     web_page.run("async () => (await translucent).failed")
     assert "no WebGL2" in web_page.page.locator(".told").inner_text()
@@ -236,11 +241,7 @@ def is_seen(page: Any, name: str) -> bool:
 
 
 def test_without_targets_of_floats(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
-    web_page.page.add_init_script(
-        "const own = WebGL2RenderingContext.prototype.getExtension;"
-        "WebGL2RenderingContext.prototype.getExtension = function (name) {"
-        " return name.startsWith('EXT_color_buffer') ? null : own.call(this, name); };"
-    )
+    answer_null(web_page, "WebGL2RenderingContext", "getExtension", "name.startsWith('EXT_color_buffer')")
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     web_page.run("async () => (await translucent).failed")
     assert "pictures of floats" in web_page.page.locator(".told").inner_text()
@@ -248,11 +249,7 @@ def test_without_targets_of_floats(web_page: WebPage, web_dist: Path, tmp_path: 
 
 def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
     """Where there is no blending of 32-bit floats, thickness is added up in 16 bits, and the page says so."""
-    web_page.page.add_init_script(
-        "const own = WebGL2RenderingContext.prototype.getExtension;"
-        "WebGL2RenderingContext.prototype.getExtension = function (name) {"
-        " return name === 'EXT_float_blend' ? null : own.call(this, name); };"
-    )
+    answer_null(web_page, "WebGL2RenderingContext", "getExtension", "name === 'EXT_float_blend'")
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     web_page.page.wait_for_function("async () => (window.viewer = await translucent).still")
     assert "16 bits" in web_page.page.locator(".notes").inner_text()
