@@ -1,6 +1,6 @@
 // Light that interfaces of bodies reflect, and give back from paint and from many scattering events. Needs <constants>,
 // <View>, <Lights>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
-// scattered once is found elsewhere.
+// scattered once is found elsewhere. DIMMED: media may be on the way of lights; needs transport/light_passed.glsl.
 
 #include "lib/interface.glsl"
 #include "lib/lights.glsl"
@@ -63,7 +63,24 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     return towards;
 }
 
-// Microfacets that mirror the lights, where nothing opaque blocks them.
+#if DIMMED
+vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m);
+#endif
+
+// Share of a light that reaches an interface: what nothing opaque blocks, and nothing dims.
+vec3 share_reaching(int light, vec3 point, vec3 normal, vec3 towards) {
+    float unblocked = light_unblocked(light, point, normal);
+#if DIMMED
+    if (unblocked > 0.0) {
+        vec4 position = light_position[light];
+        vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+        return unblocked * light_passed(point, normal, towards, position.w == 0.0 ? NOTHING : distance(position.xyz, from_eye));
+    }
+#endif
+    return vec3(unblocked);
+}
+
+// Microfacets that mirror the lights, as far as these reach them.
 vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
@@ -75,18 +92,20 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
         vec3 half_way = normalize(towards - ray);
         float mirrored = fresnel_dielectric(max(dot(half_way, towards), 0.0), ior)
             * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
-        sum += mirrored * cos_light * light_unblocked(light, point, normal) * irradiance;
+        mirrored *= cos_light;
+        if (mirrored > FAINTEST_HIGHLIGHT) { sum += mirrored * share_reaching(light, point, normal, towards) * irradiance; }
     }
     return sum;
 }
 
-// On interfaces, where opaque objects block lights. unoccluded: share of the environment's light.
+// On interfaces, as far as lights reach them. unoccluded: share of the environment's light.
 vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
     vec3 sum = unoccluded * environment_irradiance(normal);
     for (int light = 0; light < light_count; ++light) {
         vec3 irradiance;
-        float facing = dot(normal, towards_light(light, point, irradiance));
-        if (facing > 0.0) { sum += facing * irradiance * light_unblocked(light, point, normal); }
+        vec3 towards = towards_light(light, point, irradiance);
+        float facing = dot(normal, towards);
+        if (facing > 0.0) { sum += facing * irradiance * share_reaching(light, point, normal, towards); }
     }
     return sum;
 }

@@ -22,6 +22,7 @@
 #include "transport/hierarchy.glsl"
 #include "transport/record.glsl"
 #include "transport/place.glsl"
+#include "transport/light_passed.glsl"
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
