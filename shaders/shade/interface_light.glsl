@@ -98,19 +98,27 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
     return sum;
 }
 
-// On interfaces, as far as lights reach them. unoccluded: share of the environment's light.
-vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
-    vec3 sum = unoccluded * environment_irradiance(normal);
+// On both sides of an interface, as far as lights reach them. unoccluded: share of the environment's light.
+struct TwoSides {
+    vec3 front;
+    vec3 back;
+};
+
+TwoSides irradiance_on(vec3 point, vec3 normal, float unoccluded) {
+    TwoSides sum = TwoSides(unoccluded * environment_irradiance(normal), unoccluded * environment_irradiance(-normal));
     for (int light = 0; light < light_count; ++light) {
         vec3 irradiance;
         vec3 towards = towards_light(light, point, irradiance);
         float facing = dot(normal, towards);
-        if (facing > 0.0) { sum += facing * irradiance * share_reaching(light, point, normal, towards); }
+        if (facing == 0.0 || irradiance == vec3(0.0)) { continue; }
+        irradiance *= abs(facing) * share_reaching(light, point, facing > 0.0 ? normal : -normal, towards);
+        sum.front += facing > 0.0 ? irradiance : vec3(0.0);
+        sum.back += facing > 0.0 ? vec3(0.0) : irradiance;
     }
     return sum;
 }
 
-// The same on an opaque surface, as far as it reaches it.
+// Irradiance on an opaque surface, as far as light reaches it.
 vec3 reaching_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
     for (int light = 0; light < light_count; ++light) {
@@ -119,11 +127,6 @@ vec3 reaching_irradiance(vec3 point, vec3 normal) {
         if (facing > 0.0) { sum += facing * irradiance * light_reaching(light, point, normal); }
     }
     return sum;
-}
-
-// Light of lights alone; irradiance_on has the environment's, too.
-vec3 lights_on(vec3 point, vec3 normal) {
-    return irradiance_on(point, normal, 0.0);
 }
 
 // Diffuse light out of the body: as a layer gives it back, and lets it through from behind. What passes without an event
@@ -145,11 +148,11 @@ vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3
     // Light of lights that is scattered once is in the emitted radiance.
     back = max(back - (1.0 - mirror) * (bare_back - multiple_reflectance(absorbed, turned)), vec3(0.0));
 #endif
-    sum += lights_on(point, normal) * back + lights_on(point, -normal) * through;
-    return sum / PI;
+    TwoSides lights = irradiance_on(point, normal, 0.0);
+    return (sum + lights.front * back + lights.back * through) / PI;
 }
 
 vec3 paint(Finish finish, vec3 point, vec3 normal) {
-    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal, finish.unoccluded);
-    return (front + finish.painted_through * irradiance_on(point, -normal, finish.unoccluded)) / PI;
+    TwoSides light = irradiance_on(point, normal, finish.unoccluded);
+    return (finish.color * (1.0 - finish.painted_share) * light.front + finish.painted_through * light.back) / PI;
 }

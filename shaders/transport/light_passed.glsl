@@ -11,31 +11,29 @@ vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) {
     float ahead = dot(point, towards);
     float far = sqrt(max(ahead * ahead + bodies_radius * bodies_radius - dot(point, point), 0.0)) - ahead;
     float end = far - 2.0 * path_within(towards, normal);
-    float light_at = max(far - distance_m, 0.0);
-    vec3 origin = point + far * towards;
-    float gone = 0.0, skipped = 0.0;
+    vec3 start = point + far * towards;
+    float counted_to = max(far - distance_m, 0.0);  // first where the light is
+    float beyond = 0.0;                             // where the next surface may be
     uvec4 record = uvec4(0u);
     vec3 share = vec3(1.0);
     for (int surface = 0; surface < MOST_STEPS; ++surface) {
         int before = dominant_body(record);
-        Hit hit = nearest_hit(origin, -towards, 0.0, end - gone, uvec4(0u));
+        Hit hit = nearest_hit(start, -towards, beyond, end, uvec4(0u));
         bool arrives = hit.object < 0;
-        float reached = arrives ? end : gone + hit.path;
-        float counted = reached - max(gone - skipped, light_at);
-        if (record.x != 0u && counted > 0.0) { share *= transmittance(filling_of(record, before).extinction * counted); }
+        float reached = arrives ? end : hit.path;
+        bool lit = reached > counted_to;
+        if (lit && record.x != 0u) { share *= transmittance(filling_of(record, before).extinction * (reached - counted_to)); }
         if (arrives || share == vec3(0.0)) { break; }
         bool sound = true;
-        Place place = place_at(origin, -towards, record, hit, before, 1, sound);
-        if (reached > light_at) {
+        Place place = place_at(start, -towards, record, hit, before, 1, sound);
+        if (lit) {
             share *= place.coat;
             TracedBody body = traced_body(place.object);
             vec3 glow = vec3(0.0);
             if (int(body.kind) == KIND_SHEET) { pass_film(body, dot(place.face_normal, towards), glow, share); }
         }
-        float offset = SURFACE_OFFSET * surface_reach;
-        skipped = offset / max(dot(place.face_normal, towards), 1e-2);
-        origin -= place.path * towards + offset * place.face_normal;
-        gone += place.path + skipped;
+        counted_to = max(place.path, counted_to);
+        beyond = place.path + path_within(towards, place.face_normal);
         record = place.record;
     }
     return share;

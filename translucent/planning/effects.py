@@ -111,7 +111,8 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
         )
         return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
-    if not notes and scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
+    shown = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
+    if not notes and scene.lights and not shown:
         text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
         return [Note(NoteKind.UNUSED_LIGHTS, text)]
     return notes

@@ -149,6 +149,7 @@ class TracedInterfacesPass:
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
             DIMMED=job.features.dims_interfaces,
+            PAINTED=any(surface.transmission < 1 or surface.transmission_texture is not None for surface in surfaces),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
