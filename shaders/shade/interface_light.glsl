@@ -1,6 +1,6 @@
 // Light that interfaces of bodies reflect, and give back from paint and from many scattering events. Needs <constants>,
 // <View>, <Lights>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
-// scattered once is found elsewhere. DIMMED: media may be on the way of lights; needs transport/light_passed.glsl.
+// scattered once is found elsewhere. Who includes it has light_passed, as in transport/light_passed.glsl.
 
 #include "lib/interface.glsl"
 #include "lib/lights.glsl"
@@ -63,21 +63,15 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     return towards;
 }
 
-#if DIMMED
 vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m);
-#endif
 
 // Share of a light that reaches an interface: what nothing opaque blocks, and nothing dims.
 vec3 share_reaching(int light, vec3 point, vec3 normal, vec3 towards) {
     float unblocked = light_unblocked(light, point, normal);
-#if DIMMED
-    if (unblocked > 0.0) {
-        vec4 position = light_position[light];
-        vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-        return unblocked * light_passed(point, normal, towards, position.w == 0.0 ? NOTHING : distance(position.xyz, from_eye));
-    }
-#endif
-    return vec3(unblocked);
+    if (unblocked == 0.0) { return vec3(0.0); }
+    vec4 position = light_position[light];
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    return unblocked * light_passed(point, normal, towards, position.w == 0.0 ? NOTHING : distance(position.xyz, from_eye));
 }
 
 // Microfacets that mirror the lights, as far as these reach them.

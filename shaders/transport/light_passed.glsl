@@ -38,4 +38,6 @@ vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) {
     }
     return share;
 }
+#else
+vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) { return vec3(1.0); }
 #endif

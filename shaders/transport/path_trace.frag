@@ -78,10 +78,7 @@ vec3 unblocked_irradiance(vec3 point, vec3 normal) {
         float facing = dot(normal, lamp.towards);
         float unblocked = facing > 0.0 ? light_unblocked(light, point, normal) : 0.0;
         if (unblocked == 0.0) { continue; }
-#if DIMMED
-        lamp.irradiance *= light_passed(point, normal, lamp.towards, lamp.distance_m);
-#endif
-        sum += facing * unblocked * lamp.irradiance;
+        sum += facing * unblocked * lamp.irradiance * light_passed(point, normal, lamp.towards, lamp.distance_m);
     }
 #endif
     return sum;

@@ -67,7 +67,6 @@ class SurfacesPass:
             ONE_INTERFACE=job.features.one_interface,
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
-            DIMMED=False,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,
