@@ -1,6 +1,6 @@
 // Light that interfaces of bodies reflect, and give back from paint and from many scattering events. Needs <constants>,
 // <View>, <Lights>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
-// scattered once is found elsewhere.
+// scattered once is found elsewhere. Who includes it has light_passed, as in transport/light_passed.glsl.
 
 #include "lib/interface.glsl"
 #include "lib/lights.glsl"
@@ -63,7 +63,18 @@ vec3 towards_light(int light, vec3 point, out vec3 irradiance) {
     return towards;
 }
 
-// Microfacets that mirror the lights, where nothing opaque blocks them.
+vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m);
+
+// Share of a light that reaches an interface: what nothing opaque blocks, and nothing dims.
+vec3 share_reaching(int light, vec3 point, vec3 normal, vec3 towards) {
+    float unblocked = light_unblocked(light, point, normal);
+    if (unblocked == 0.0) { return vec3(0.0); }
+    vec4 position = light_position[light];
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    return unblocked * light_passed(point, normal, towards, position.w == 0.0 ? NOTHING : distance(position.xyz, from_eye));
+}
+
+// Microfacets that mirror the lights, as far as these reach them.
 vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
@@ -75,23 +86,33 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
         vec3 half_way = normalize(towards - ray);
         float mirrored = fresnel_dielectric(max(dot(half_way, towards), 0.0), ior)
             * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
-        sum += mirrored * cos_light * light_unblocked(light, point, normal) * irradiance;
+        mirrored *= cos_light;
+        if (mirrored > FAINTEST_HIGHLIGHT) { sum += mirrored * share_reaching(light, point, normal, towards) * irradiance; }
     }
     return sum;
 }
 
-// On interfaces, where opaque objects block lights. unoccluded: share of the environment's light.
-vec3 irradiance_on(vec3 point, vec3 normal, float unoccluded) {
-    vec3 sum = unoccluded * environment_irradiance(normal);
+// On both sides of an interface, as far as lights reach them. unoccluded: share of the environment's light.
+struct TwoSides {
+    vec3 front;
+    vec3 back;
+};
+
+TwoSides irradiance_on(vec3 point, vec3 normal, float unoccluded) {
+    TwoSides sum = TwoSides(unoccluded * environment_irradiance(normal), unoccluded * environment_irradiance(-normal));
     for (int light = 0; light < light_count; ++light) {
         vec3 irradiance;
-        float facing = dot(normal, towards_light(light, point, irradiance));
-        if (facing > 0.0) { sum += facing * irradiance * light_unblocked(light, point, normal); }
+        vec3 towards = towards_light(light, point, irradiance);
+        float facing = dot(normal, towards);
+        if (facing == 0.0 || irradiance == vec3(0.0)) { continue; }
+        irradiance *= abs(facing) * share_reaching(light, point, facing > 0.0 ? normal : -normal, towards);
+        sum.front += facing > 0.0 ? irradiance : vec3(0.0);
+        sum.back += facing > 0.0 ? vec3(0.0) : irradiance;
     }
     return sum;
 }
 
-// The same on an opaque surface, as far as it reaches it.
+// Irradiance on an opaque surface, as far as light reaches it.
 vec3 reaching_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal) * environment_reaching(point, normal);
     for (int light = 0; light < light_count; ++light) {
@@ -100,11 +121,6 @@ vec3 reaching_irradiance(vec3 point, vec3 normal) {
         if (facing > 0.0) { sum += facing * irradiance * light_reaching(light, point, normal); }
     }
     return sum;
-}
-
-// Light of lights alone; irradiance_on has the environment's, too.
-vec3 lights_on(vec3 point, vec3 normal) {
-    return irradiance_on(point, normal, 0.0);
 }
 
 // Diffuse light out of the body: as a layer gives it back, and lets it through from behind. What passes without an event
@@ -126,11 +142,11 @@ vec3 scattered_out(Finish finish, vec3 point, vec3 normal, float thickness, vec3
     // Light of lights that is scattered once is in the emitted radiance.
     back = max(back - (1.0 - mirror) * (bare_back - multiple_reflectance(absorbed, turned)), vec3(0.0));
 #endif
-    sum += lights_on(point, normal) * back + lights_on(point, -normal) * through;
-    return sum / PI;
+    TwoSides lights = irradiance_on(point, normal, 0.0);
+    return (sum + lights.front * back + lights.back * through) / PI;
 }
 
 vec3 paint(Finish finish, vec3 point, vec3 normal) {
-    vec3 front = finish.color * (1.0 - finish.painted_share) * irradiance_on(point, normal, finish.unoccluded);
-    return (front + finish.painted_through * irradiance_on(point, -normal, finish.unoccluded)) / PI;
+    TwoSides light = irradiance_on(point, normal, finish.unoccluded);
+    return (finish.color * (1.0 - finish.painted_share) * light.front + finish.painted_through * light.back) / PI;
 }

@@ -102,8 +102,8 @@ vec3 light_reaching(int light, vec3 point, vec3 normal) {
     return light_through(light_view(light, point), point, normal, true);
 }
 
-// Share of a light that opaque objects let pass to an interface. What media keep of it is not known: the maps have the
-// paths to the first opaque surface, and not to where an interface is.
+// Share of a light that opaque objects let pass to an interface. What media keep of it transport/light_passed.glsl finds:
+// the maps have the paths to the first opaque surface, and not to where an interface is.
 float light_unblocked(int light, vec3 point, vec3 normal) {
     if (int(shadow_lights[light].y) == 0) { return 1.0; }
     ShadowView view = light_view(light, point);

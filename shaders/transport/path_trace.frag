@@ -25,6 +25,7 @@ uniform sampler2D reflectance_table;
 #include "transport/place.glsl"
 #include "transport/microfacets.glsl"
 #include "transport/lamps.glsl"
+#include "transport/light_passed.glsl"
 
 uniform ivec2 tile_origin;   // of the texels in the picture, from its top left corner
 uniform uint last_path;      // how many paths of each pixel are to end
@@ -68,14 +69,16 @@ vec3 environment_seen(Path path, vec2 pixel) {
 #endif
 }
 
-// Irradiance on paint, where opaque objects block lights.
+// Irradiance on paint, as far as lights reach it.
 vec3 unblocked_irradiance(vec3 point, vec3 normal) {
     vec3 sum = environment_irradiance(normal);
 #if LAMPS
     for (int light = 0; light < light_count; ++light) {
         Lamp lamp = lamp_at(light, point);
         float facing = dot(normal, lamp.towards);
-        if (facing > 0.0) { sum += facing * lamp.irradiance * light_unblocked(light, point, normal); }
+        float unblocked = facing > 0.0 ? light_unblocked(light, point, normal) : 0.0;
+        if (unblocked == 0.0) { continue; }
+        sum += facing * unblocked * lamp.irradiance * light_passed(point, normal, lamp.towards, lamp.distance_m);
     }
 #endif
     return sum;

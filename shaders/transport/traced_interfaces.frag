@@ -22,6 +22,7 @@
 #include "transport/hierarchy.glsl"
 #include "transport/record.glsl"
 #include "transport/place.glsl"
+#include "transport/light_passed.glsl"
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
@@ -295,6 +296,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         }
 #endif
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
+#if PAINTED
         if (transmission < 1.0 && enters) {
             Finish finish = seen.finish;
             if (!as_first) {
@@ -303,6 +305,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
             }
             sum.light += ray.share * share_on * (1.0 - transmission) * paint(finish, point, smooth_normal);
         }
+#endif
         if (enters) { share_on *= transmission * tint; }
         float ior_inside = max(ior, 1.0 / ior);
         float occlusion = first ? seen.finish.unoccluded : 1.0;

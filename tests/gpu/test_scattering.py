@@ -333,6 +333,8 @@ def test_lights_look_again_only_when_what_they_see_changes(monkeypatch: pytest.M
     milk, soot = tl.Medium(scattering=2.0), tl.Medium(scattering=2.0, absorption=3.0)
     low, high = tl.PointLight((0, -2, 0), (9, 9, 9)), tl.PointLight((0, 2, 0), (9, 9, 9))
     rock = tl.Object(Box((-0.1, 0.6, -0.1), (0.1, 0.8, 0.1)).tessellate())
+    clear = tl.Surface(color_texture=tl.Texture(np.zeros((1, 1, 4))), alpha_cutoff=0.5)
+    plain = tl.Object(tl.Mesh(rock.mesh.vertices, rock.mesh.faces, uv=np.zeros((len(rock.mesh.vertices), 2))))
     front, side = tl.Camera.look_at((0, 0, 4), (0, 0, 0)), tl.Camera.look_at((4, 0, 1), (0, 0, 0))
     grids = [tl.DensityGrid(np.full((2, 2, 2), value)) for value in (1.0, 2.0)]
     frames = [
@@ -343,6 +345,8 @@ def test_lights_look_again_only_when_what_they_see_changes(monkeypatch: pytest.M
         ([tl.Object(mesh, milk, moved)], front, [low], 1),
         ([tl.Object(mesh, soot, moved)], front, [low], 1),
         ([tl.Object(mesh, soot, moved), rock], front, [high], 1),
+        ([tl.Object(mesh, soot, moved), plain], front, [high], 1),
+        ([tl.Object(mesh, soot, moved), replace(plain, surface=clear)], front, [high], 1),
         ([tl.Object(mesh, soot, density=grids[0])], front, [high], 1),
         ([tl.Object(mesh, soot, density=grids[1])], front, [high], 1),
         ([tl.Object(mesh, soot, density=grids[1])], front, [tl.DirectionalLight((0, -1, 0), (1, 1, 1))], 1),

@@ -101,16 +101,24 @@ def test_each_way_of_finding_interfaces_tells_what_it_leaves_out() -> None:
         assert {note.kind for note in plan(asked, interfaces=interfaces).unmodelled} == kinds
 
 
-def test_lights_through_bodies_onto_bodies_are_told_with_opengl_alone() -> None:
-    glass = body(tl.Medium(ior=1.5), x=3)
+def test_lights_through_bodies_onto_bodies_are_told_where_no_rays_are_traced() -> None:
+    glass, front = body(tl.Medium(ior=1.5), x=3), tl.FrontInterface()
     one, clear = scene(body(DIAMOND), lights=LIT), scene(glass, glass, lights=LIT)
     dimmed = scene(body(DIAMOND), body(WINE, x=3), lights=LIT)
-    assert [plan(asked).says(NoteKind.SHADOWS) for asked in (one, clear, dimmed)] == [False, False, True]
+    found = [plan(asked, interfaces=front).says(NoteKind.SHADOWS) for asked in (one, clear, dimmed)]
+    assert found == [False, False, True]
+    assert not plan(dimmed).says(NoteKind.SHADOWS)
+    assert ["straight on to the lights" in plan(asked).passes[-1].reason for asked in (one, dimmed)] == [False, True]
     assert not plan(dimmed, None, TRACED).says(NoteKind.SHADOWS)
-    assert not plan(scene(body(DIAMOND), body(WINE, x=3))).says(NoteKind.SHADOWS)
+    assert not plan(scene(body(DIAMOND), body(WINE, x=3)), interfaces=front).says(NoteKind.SHADOWS)
     painted = scene(body(DIAMOND, surface=tl.Surface(transmission=0.5)), environment_shadows=8)
     assert plan(painted).says(NoteKind.SHADOWS)
     assert not plan(painted, None, TRACED).says(NoteKind.SHADOWS)
+
+
+def test_lights_that_shine_on_highlights_or_paint_are_of_use() -> None:
+    assert plan(scene(body(WINE), lights=LIT)).says(NoteKind.UNUSED_LIGHTS)
+    assert not plan(scene(body(DIAMOND), lights=LIT)).says(NoteKind.UNUSED_LIGHTS)
 
 
 def test_ambient_light_takes_the_place_of_light_that_is_only_removed() -> None:

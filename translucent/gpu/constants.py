@@ -108,4 +108,5 @@ CONSTANTS: dict[str, str] = {
     "REFLECTANCE_TABLE_SIZE": f"{TABLE_SIZE:.1f}",
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
+    "FAINTEST_HIGHLIGHT": "1e-6",  # of a light's irradiance, in 1/sr, for which nobody looks what is in its way
 }

@@ -11,6 +11,7 @@ from translucent.arrays import Array
 from translucent.planning.assembly import FALLBACK_SHEET
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.planning.shadow_maps import dims_interfaces
 from translucent.planning.slots import Slot, medium_slots
 from translucent.scene.scene import Scene
 
@@ -98,6 +99,11 @@ class FrameFeatures:
     def traced(self) -> bool:
         """Whether rays are traced from the first interface on."""
         return self.plan.has(PassName.TRACED)
+
+    @property
+    def dims_interfaces(self) -> bool:
+        """Whether rays find what bodies keep of the lights on interfaces, their highlights and paint."""
+        return (self.traced or self.path_traced) and dims_interfaces(self.scene)
 
     @property
     def path_traced(self) -> bool:

@@ -1,7 +1,12 @@
-"""Cameras that look from the lights of a scene at its media."""
+"""Cameras that look from the lights of a scene, and keys by which views from lights are kept while these see the same.
+
+Lists of crossings (`LightViewsPass`) and maps of shadows (`ShadowMapsPass`) have views of their own: lists fit the
+media, where their texels count, and maps all that throws shadows, large as it may be.
+"""
 
 from __future__ import annotations
 
+import weakref
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -109,3 +114,32 @@ def _cone_camera(light: SpotLight, reach: float) -> Camera | None:
 def _any_up(direction: Array) -> Array:
     """Coordinate axis that is far from a direction."""
     return np.asarray(np.eye(3)[int(np.abs(direction).argmin())])
+
+
+def light_key(light: Light) -> tuple[object, ...]:
+    """Key of where a light is, and where it shines."""
+    if isinstance(light, DirectionalLight):
+        return DirectionalLight, np.asarray(light.direction).tobytes()
+    # The view of a spot is no wider than its cone.
+    return type(light), np.asarray(light.position).tobytes(), light.cone.tobytes()
+
+
+def objects_key(scene: Scene) -> tuple[object, ...]:
+    """Key of where the objects of a scene are, equal for scenes in which lights meet the same; keeps nothing alive.
+
+    It does not tell media apart.
+    """
+    objects = tuple(
+        (
+            weakref.ref(item.mesh),
+            item.matrix.tobytes(),
+            item.priority,
+            item.sheet_thickness,
+            item.covers,
+            item.medium is None,
+            item.medium is None and item.surface,  # it may have holes
+            None if item.density is None else weakref.ref(item.density),
+        )
+        for item in scene.objects
+    )
+    return objects, scene.overlap

@@ -24,6 +24,7 @@ from translucent.planning.methods.thin_layer import sheet_pass
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan
+from translucent.planning.shadow_maps import dims_interfaces
 from translucent.planning.slots import MAX_SLOTS, medium_slots
 from translucent.scene.scene import Scene, object_names
 
@@ -63,7 +64,7 @@ def assembled(scene: Scene, method: Method, why: str, interfaces: Interfaces, ca
     unmodelled = (
         *unmodelled_effects(scene, scattering=lit, interfaces=interfaces),
         *_touching(scene, method, interfaces),
-        *(_through_bodies(scene) if found else ()),
+        *(_through_bodies(scene, interfaces) if found else ()),
     )
     used = interfaces if found else None
     return RenderPlan(method, passes, spectral, _limits(scene, method), unmodelled, interfaces=used)
@@ -116,11 +117,10 @@ def _touching(scene: Scene, method: Method, interfaces: Interfaces) -> tuple[Not
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
 
 
-def _through_bodies(scene: Scene) -> tuple[Note, ...]:
+def _through_bodies(scene: Scene, interfaces: Interfaces) -> tuple[Note, ...]:
     """Notes on shadows on interfaces that are not rendered: maps have what is on the way to opaque objects alone."""
     notes = []
-    dense = (body for body in scene.bodies if not body.covers and body.medium and (body.medium.extinction > 0).any())
-    if scene.lights and any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in dense):
+    if not interfaces.traced and dims_interfaces(scene):
         notes.append("lights reach their highlights and paint through bodies")
     painted = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
     if scene.environment_shadows and any(painted):

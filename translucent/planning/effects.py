@@ -111,7 +111,8 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
             "in-scattered light: this method leaves out what lights send into media that scatter; FragmentLists has it"
         )
         return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
-    if not notes and scene.lights and not scene.opaque and not any(body.covers for body in scene.bodies):
+    shown = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
+    if not notes and scene.lights and not shown:
         text = "lights: they shine on nothing, since no medium scatters and nothing is opaque"
         return [Note(NoteKind.UNUSED_LIGHTS, text)]
     return notes
@@ -128,8 +129,8 @@ def _given_back_effects(scene: Scene) -> list[Note]:
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if isinstance(body.medium, DiffusedMedium)]:
         text = (
-            f"{object_names(bodies)}: light that crosses other bodies on its way to them is not dimmed there, and what "
-            "is smaller than a cell has no light of its own"
+            f"{object_names(bodies)}: light of the environment that crosses other bodies on its way to them is not "
+            "dimmed there, and what is smaller than a cell has no light of its own"
         )
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes

@@ -72,6 +72,12 @@ def shadows_left_out(units: int) -> tuple[Note, ...]:
     return (Note(NoteKind.SHADOWS, text),)
 
 
+def dims_interfaces(scene: Scene) -> bool:
+    """Whether a body may be between a light and an interface, of another one or its own."""
+    dense = (body for body in scene.bodies if not body.covers and body.medium and (body.medium.extinction > 0).any())
+    return bool(scene.lights) and any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in dense)
+
+
 def shadow_passes(scene: Scene, *, over_backdrop: bool = False) -> tuple[PassSpec, ...]:
     """The pass that renders maps of shadows; none without something opaque, such as a backdrop, and light on it."""
     opaque = indices(scene, lambda item: item.medium is None)

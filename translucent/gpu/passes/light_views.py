@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
-
 import moderngl
 import numpy as np
 
@@ -11,7 +9,7 @@ from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS, STORAGE_BINDINGS
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
-from translucent.gpu.light_cameras import light_cameras
+from translucent.gpu.light_cameras import light_cameras, light_key, objects_key
 from translucent.gpu.light_view import LightView, first_texels, light_lookup
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.variants import Variants, walk_switches
@@ -19,7 +17,6 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import LightLookup
 from translucent.planning.passes import PassSpec
-from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light
 
 #: Bytes of a node, and of the record at each.
@@ -169,24 +166,6 @@ class LightViewsPass:
 def _seen(job: FrameJob) -> object:
     """Key of the views, equal for frames in which lights see the same; keeps nothing alive."""
     scene = job.scene
-    objects = tuple(
-        (
-            weakref.ref(body.mesh),
-            body.matrix.tobytes(),
-            body.medium,
-            body.priority,
-            body.sheet_thickness,
-            None if body.density is None else weakref.ref(body.density),
-        )
-        for body in scene.objects
-    )
+    media = tuple(item.medium for item in scene.objects)
     # What lists hold depends on whether media vary.
-    return objects, tuple(light_key(light) for light in scene.lights), scene.overlap, job.features.varies
-
-
-def light_key(light: Light) -> tuple[object, ...]:
-    """Key of where a light is, and where it shines."""
-    if isinstance(light, DirectionalLight):
-        return DirectionalLight, np.asarray(light.direction).tobytes()
-    # The view of a spot is no wider than its cone.
-    return type(light), np.asarray(light.position).tobytes(), light.cone.tobytes()
+    return objects_key(scene), media, tuple(light_key(light) for light in scene.lights), job.features.varies

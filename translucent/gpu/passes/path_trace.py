@@ -15,7 +15,7 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches
-from translucent.gpu.passes.traced_interfaces import all_closed, record_at_eye
+from translucent.gpu.passes.traced_interfaces import all_closed, bodies_radius, record_at_eye
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
@@ -240,6 +240,7 @@ class PathTracer:
             "start_record": record_at_eye(job),
             "object_nodes": hierarchies.object_nodes,
             "objects_frame": frame,
+            "bodies_radius": bodies_radius(job.scene),
         }
         return bodies, hierarchies, values
 
@@ -259,6 +260,7 @@ class PathTracer:
             DISPERSION=False,
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
+            DIMMED=job.features.dims_interfaces,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
         )

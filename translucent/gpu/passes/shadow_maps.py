@@ -17,10 +17,9 @@ from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
 from translucent.gpu.ledger import before_making
-from translucent.gpu.light_cameras import outermost
+from translucent.gpu.light_cameras import light_key, objects_key, outermost
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass
-from translucent.gpu.passes.light_views import light_key
 from translucent.gpu.passes.opaque import OpaquePass
 from translucent.gpu.passes.signed_depth import SignedDepthPass
 from translucent.gpu.passes.thin_layer import ThinLayerPass
@@ -314,24 +313,12 @@ def _sky_lights(scene: Scene) -> list[Light]:
 def _seen(job: FrameJob) -> Seen:
     """What lights see in a frame; keeps nothing alive."""
     scene = job.scene
-    objects = tuple(
-        (
-            weakref.ref(item.mesh),
-            item.matrix.tobytes(),
-            item.priority,
-            item.sheet_thickness,
-            item.covers,
-            item.medium is None and item.surface,
-            None if item.density is None else weakref.ref(item.density),
-            item.medium is None and holds_eye(item, scene),
-        )
-        for item in scene.objects
-    )
+    inside = tuple(item.medium is None and holds_eye(item, scene) for item in scene.objects)
     media = tuple(
         None if item.medium is None else np.asarray(item.medium.extinction).tobytes() for item in scene.objects
     )
     lights = tuple(light_key(light) for light in scene.lights)
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
     sheets = job.plan.method if job.plan.method.makes_sheets else None
-    places = objects, lights, sky, scene.overlap, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows
-    return Seen((places, tuple(medium is None for medium in media)), media)
+    places = objects_key(scene), inside, lights, sky, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows
+    return Seen(places, media)

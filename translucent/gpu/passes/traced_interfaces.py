@@ -101,6 +101,7 @@ class TracedInterfacesPass:
             "blurred_share": blurred_share(job.samples),
             "object_nodes": hierarchies.object_nodes,
             "objects_frame": frame,
+            "bodies_radius": bodies_radius(job.scene),
         }
         _set(program, values)
         self._variants.draw_covered(job, program, framebuffer, top_first=True)
@@ -147,6 +148,8 @@ class TracedInterfacesPass:
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
+            DIMMED=job.features.dims_interfaces,
+            PAINTED=any(surface.transmission < 1 or surface.transmission_texture is not None for surface in surfaces),
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
@@ -209,6 +212,12 @@ def blurred_share(samples: int) -> float:
 def all_closed(scene: Scene) -> bool:
     """Whether rays can leave each solid only through its surface."""
     return all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
+
+
+def bodies_radius(scene: Scene) -> float:
+    """Metres from the center of the media within which all bodies are."""
+    boxes = scene.boxes[scene.filled]
+    return 0.5 * float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
 
 
 def record_at_eye(job: FrameJob) -> tuple[int, int, int, int]:

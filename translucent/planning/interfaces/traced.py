@@ -12,6 +12,7 @@ from translucent.planning.methods.base import check_count
 from translucent.planning.mirrors import mirror_of
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
+from translucent.planning.shadow_maps import dims_interfaces
 from translucent.scene.scene import Scene, object_names
 
 #: Largest number of interfaces that a ray may meet: each takes a walk through the meshes.
@@ -79,6 +80,8 @@ class TracedInterfaces(Interfaces):
             traced += f", {self._times} as the weaker of reflected and refracted light"
         if (mirror := mirror_of(scene)) is not None:
             traced += f"; {mirror.ground.mesh.name!r} mirrors what stands on it, once"
+        if dims_interfaces(scene):
+            traced += "; rays straight on to the lights tell what bodies keep of highlights, and of the light on paint"
         return (
             PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
             PassSpec(PassName.TRACED, traced, cost=TRACE_COST),
