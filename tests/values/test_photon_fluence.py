@@ -11,11 +11,14 @@ import pytest
 import translucent as tl
 from tests.ball_light import ball_parts, fresnel
 from translucent.arrays import Array
+from translucent.diffusion import cache
 from translucent.diffusion.entering import flux_of
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.photon_fluence import FineCells, bent_light
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning import caustics
+from translucent.planning.plan import plan
+from translucent.planning.scattering.choice import shown
 
 SEGMENTS = 64
 BALL = Sphere().tessellate(SEGMENTS)
@@ -129,3 +132,30 @@ def test_what_goes_straight_is_no_light_of_photons() -> None:
     above = fluence(scene(sheet, haze_above), replace(CELLS, low=np.array([-2.0, 1.0, -2.0])))
     assert above.mean() == pytest.approx(0.08 / 1.04, rel=0.1)  # by chance; both of its faces mirror
     assert fluence(scene(matched, HAZE)).max() == 0.0
+
+
+def test_photons_are_followed_again_where_something_moves_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(caustics, "LEAST_IN_MEDIA", 256)
+    followed = []
+    original = cache.bent_light
+    monkeypatch.setattr(cache, "bent_light", lambda *given: followed.append(given) or original(*given))
+    fields, asked, coarse = cache.FieldCache(), tl.Caustics(1), tl.Diffusion(8)
+    fog = replace(HAZE, medium=tl.Medium(scattering=0.5))
+    one, moved = scene(GLASS, fog), np.diag([0.9, 0.9, 0.9, 1.0])
+    aside = tl.Camera.look_at((1, 0, 12), (0, 0, 0))
+    for changed, photons, times in (
+        (one, None, 0),
+        (one, asked, 1),
+        (replace(one, camera=aside), asked, 0),
+        (one, tl.Caustics(2), 0),  # as many in media
+        (one, tl.Caustics(1, seed=1), 1),
+        (scene(replace(GLASS, transform=moved), fog), asked, 1),
+        (scene(replace(GLASS, medium=tl.Medium(ior=1.4)), fog), asked, 1),
+        (scene(replace(GLASS, surface=tl.Surface(roughness=0.1)), fog), asked, 1),
+        (scene(GLASS, fog, light=tl.DirectionalLight((0, -1, 0.1), 1.0)), asked, 1),
+        (scene(replace(GLASS, medium=tl.Medium(1.0)), fog), asked, 0),  # which bends nothing
+    ):
+        followed.clear()
+        found = plan(changed).given_back
+        fields.of(shown(changed, found), coarse, photons)
+        assert len(followed) == times
