@@ -41,6 +41,13 @@ def ball_light(
         Of all parts of all rays: those that are mirrored, those that pass at once, those that are mirrored inside once,
         and so on. A distance is inf where one does not land.
     """
+    return ball_parts(below, ior, lamp=lamp, absorption=absorption, rays=rays)[:2]
+
+
+def ball_parts(
+    below: float, ior: float, *, lamp: float | None = None, absorption: float = 0.0, rays: int = 200_000
+) -> tuple[Array, Array, Array]:
+    """As `ball_light`; and the cosine of each part's angle to the axis, downwards."""
     share = (np.arange(rays) + 0.5) / rays
     if lamp is None:
         off, width = np.sqrt(share), np.full(rays, np.pi / rays)
@@ -55,7 +62,8 @@ def ball_light(
     cosine = np.clip(-(start * way).sum(axis=0), 1e-12, 1.0)
     mirrored = fresnel(cosine, ior)
     beyond = np.sqrt(1.0 - (1.0 - cosine**2) / ior**2)
-    parts = [(width * mirrored, _landing(start, way + 2.0 * cosine * start, below))]
+    back = way + 2.0 * cosine * start
+    parts = [(width * mirrored, _landing(start, back, below), -back[1])]
     inside = (way + (cosine - ior * beyond) * start) / ior
     flux, chord = width * (1.0 - mirrored), 2.0 * beyond
     for _ in range(_ORDERS):
@@ -64,10 +72,11 @@ def ball_light(
             flux = flux * np.exp(-absorption * chord)
         out = ior * inside + (cosine - ior * beyond) * start
         with np.errstate(under="ignore"):
-            parts.append((flux * (1.0 - mirrored), _landing(start, out, below)))
+            parts.append((flux * (1.0 - mirrored), _landing(start, out, below), -out[1]))
             flux = flux * mirrored
         inside = inside - 2.0 * beyond * start
-    return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+    flux, distance, cosine = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return flux, distance, cosine
 
 
 def _landing(start: Array, way: Array, below: float) -> Array:

@@ -192,8 +192,8 @@ class Renderer:
             How to show light that media scatter more than once: as it diffuses in the body, as a flat layer gives it
             back, or not at all; None lets the planner pick for each body.
         caustics : Caustics, optional
-            Photons that carry the light of lamps through interfaces, and by their mirrors, onto opaque objects. None,
-            the default: no caustics.
+            Photons that carry the light of lamps through interfaces, and by their mirrors, onto opaque objects and
+            into media. None, the default: no caustics.
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional

@@ -50,7 +50,8 @@ vec3 part_depth(uint link, LightRay ray, float from, float to) {
             vec3 start = position_in_box(slot, point_at(ray, from));
             share *= mean_density(slot, start, position_in_box(slot, point_at(ray, to)));
         }
-        extinction += share * slot_extinction[slot].rgb;
+        bool stops = (stopping_slots >> slot & 1) != 0;
+        extinction += share * (stops ? vec3(stopping_extinction) : slot_extinction[slot].rgb);
     }
     return extinction * ((to - from) * ray.metres);
 #else

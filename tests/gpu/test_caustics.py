@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import moderngl
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +14,9 @@ from tests.ball_light import ball_light, flux_within, fresnel
 from translucent.formulas.interface import slab_reflectance, slab_transmittance
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.passes import caustics as caustics_pass
+from translucent.gpu.passes import light_views
 from translucent.gpu.passes.caustics import CausticsPass
+from translucent.planning import caustics as planned_caustics
 from translucent.planning.passes import PassName
 from translucent.reference import photon_irradiance, trace_photons
 
@@ -343,3 +347,29 @@ def test_a_frame_without_caustics_has_no_pass_of_them(renderer: tl.Renderer) -> 
     backdrop = tl.Backdrop(np.zeros((8, 8, 3)), np.full((8, 8), np.inf))
     with pytest.raises(tl.InputError, match="caustics before a backdrop; what is drawn elsewhere has no mesh"):
         renderer.render(scene(ball()), (8, 8), backdrop=backdrop, caustics=tl.Caustics(100))
+
+
+def test_fog_has_what_hardly_bends_once(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Photons through a ball of nearly the index of air light fog as straight light does, which ends at the ball then.
+
+    Measured with 40 x 40 pixels and 100,000 photons: .0026, and -.0004 in the mean.
+    """
+    if not renderer.gpu.capabilities.shader_storage:
+        pytest.skip("this OpenGL has no shader storage buffers, without which nothing marches")
+    monkeypatch.setattr(planned_caustics, "LEAST_IN_MEDIA", 1 << 14)
+    monkeypatch.setattr(light_views, "_SIDES", (128,))
+    fog = tl.Object(Box((-2, -3, -2), (2, 2, 2)).tessellate(), tl.Medium(absorption=0.05, scattering=0.3))
+    body = tl.Object(BALL, tl.Medium(ior=1.0005))
+    one = scene(body, fog, light=tl.DirectionalLight((0.3, -1, 0), 3.0))
+    one = dataclasses.replace(one, camera=tl.Camera.look_at((0, -0.5, 12), (0, -0.5, 0), fov_y=28.0))
+    coarse = tl.Diffusion(8)
+    straight, with_photons = (
+        renderer.render(one, (24, 24), method, scattering=coarse, caustics=caustics)
+        for method, caustics in ((tl.RayMarched(64), None), (None, tl.Caustics(1)))
+    )
+    assert (with_photons.plan.method, with_photons.plan.opaque_to_shadows) == (tl.RayMarched(64), {0})
+    truth = straight.radiance.astype(np.float64)
+    error = with_photons.radiance - truth
+    print(np.sqrt(np.square(error).mean()) / truth.mean(), error.mean() / truth.mean())
+    assert np.sqrt(np.square(error).mean()) < 0.02 * truth.mean()
+    assert abs(error.mean()) < 5e-3 * truth.mean()  # half of that is what facets cut off the ball

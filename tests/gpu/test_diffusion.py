@@ -30,9 +30,9 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
     media: list[tl.Medium] = []
     original = DiffusingBody.field
 
-    def counted(body: DiffusingBody, scene: tl.Scene, number: int) -> DiffusionField:
+    def counted(body: DiffusingBody, *given: Any) -> DiffusionField:
         media.append(body._medium)
-        return original(body, scene, number)
+        return original(body, *given)
 
     monkeypatch.setattr(DiffusingBody, "field", counted)
     return media

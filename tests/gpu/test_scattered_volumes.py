@@ -169,7 +169,9 @@ def test_only_what_changes_the_light_is_solved_for_again(
 ) -> None:
     solved = []
     original = DiffusingVolume.field
-    monkeypatch.setattr(DiffusingVolume, "field", lambda self, scene: solved.append(scene) or original(self, scene))
+    monkeypatch.setattr(
+        DiffusingVolume, "field", lambda self, scene, *more: solved.append(scene) or original(self, scene, *more)
+    )
     scene = cloud([SUN], SKY)
     for changed, times in (
         (scene, 1),

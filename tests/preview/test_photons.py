@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport
+from translucent.planning import caustics
 from translucent.preview import photons
 from translucent.preview.actions import Change, Turn
 from translucent.preview.document import Document, Model
@@ -136,3 +138,33 @@ def test_a_model_on_a_stage_is_measured_without_it() -> None:
     made.close()
     assert len(seen.objects) == 1
     assert seen.environment_shadows == 0
+
+
+def test_photons_in_media_are_followed_by_a_thread(
+    stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before others; with nothing that these could land on, the picture is one without rounds."""
+    if not stage.renderer.gpu.capabilities.shader_storage:
+        pytest.skip("this OpenGL has no shader storage buffers, without which nothing marches")
+    monkeypatch.setattr(caustics, "LEAST_IN_MEDIA", 1 << 10)
+    monkeypatch.setattr(photons, "ROUND", 1 << 10)
+    fog = tl.Object(Box((-1.5, -3.0, -1.5), (1.5, -1.2, 1.5)).tessellate(), tl.Medium(scattering=0.5))
+    scene = replace(LIT, objects=[tl.Object(Sphere().tessellate(16), tl.Medium(ior=1.5)), fog])
+    found, lane = photons.Photons(), work.lanes["diffuse"]
+
+    def ready() -> bool:
+        return found.ready(scene, stage.renderer, stage.viewport, None, tl.Diffusion(8), lane, 0.1, 0.0)
+
+    with stage.current():
+        assert not ready()
+        assert found.told == "caustics: photons in media first"
+        assert found.show_media(stage.viewport) is None
+        wait(work, lambda: lane.task is None)
+        assert not ready()
+        assert found.told == "caustics: 1,024 photons in media"
+        shown = found.show_media(stage.viewport)
+        assert shown is not None
+        assert shown.given_back.volumes == (1,)
+        assert found.show_media(stage.viewport) is None
+        assert found.stop(stage.viewport)
+    assert found.told == ""

@@ -38,7 +38,49 @@ def test_photons_land_on_the_picture_of_what_is_opaque() -> None:
     assert notes[0] == "caustics of light of the environment"
     assert len(notes) == 2
     milk = plan(scene(body(tl.Medium(1.0, 50.0, ior=1.4)), body(None, 3.0)), caustics=FEW)
-    assert "caustics in media that scatter" in str(milk)
+    assert "caustics in media that scatter: 'box'" in str(milk)
+
+
+def test_photons_light_fog() -> None:
+    """In place of straight light, from the views of lights on; on what is opaque, too, if anything is."""
+    fog = body(tl.Medium(scattering=2.0), 1.0)
+    found = plan(scene(body(), fog), caustics=tl.Caustics(1_000_000))
+    assert (found.given_back.volumes, found.opaque_to_shadows) == ((1,), {0})
+    assert found.method == tl.RayMarched(64)
+    assert not found.has(PassName.CAUSTICS)
+    (views,) = (step for step in found.passes if step.name is PassName.LIGHT_VIEWS)
+    assert "asked for: 250,000 photons, followed on the processor" in views.reason
+    assert "carry what 'box' bends into 'box', about 12 s" in views.reason
+    assert "caustics in media that scatter" not in str(found)
+    assert "photons that media scatter" in str(found)
+    both = plan(scene(body(), fog, body(None, 3.0)), caustics=FEW)
+    assert both.has(PassName.CAUSTICS)
+    assert plan(scene(body(), fog), caustics=FEW).caustics.in_media == 65_536  # type: ignore[union-attr]
+
+
+def test_photons_light_bodies_that_scatter_behind_interfaces() -> None:
+    """From other bodies: what has bent light itself has had it by then."""
+    milk = body(tl.Medium(1.0, 50.0, ior=1.4), 1.0)
+    found = plan(scene(body(), milk), caustics=tl.Caustics(1_000_000))
+    assert (found.given_back.diffused, found.opaque_to_shadows) == ((1,), {0, 1})
+    (traced,) = (step for step in found.passes if step.name is PassName.TRACED)
+    assert "250,000 photons" in traced.reason
+    assert "caustics in media that scatter" not in str(found)
+    alone = plan(scene(milk, body(None, 3.0)), caustics=FEW)
+    assert "followed on the processor" not in str(alone)
+    assert "caustics in media that scatter: 'box'" in str(alone)
+
+
+def test_fog_that_photons_do_not_light_is_told() -> None:
+    fog, ground = body(tl.Medium(scattering=2.0), 1.0), body(None, 3.0)
+    once = plan(scene(body(), fog, ground), scattering=tl.SingleScattering(), caustics=FEW)
+    assert "caustics in media that scatter: 'box'" in str(once)
+    # Without steps that gather it, light leaves through the surface of fog, where photons come in.
+    old = plan(scene(body(), fog, ground), capabilities=Capabilities(shader_storage=False), caustics=FEW)
+    assert old.given_back.diffused == (1,)
+    assert "bends into 'box'" in str(old)
+    ahead = plan(scene(body(), body(tl.Medium(scattering=2.0, anisotropy=0.5), 1.0)), caustics=FEW)
+    assert "directions in which 'box' scatters caustics: alike in all" in str(ahead)
 
 
 def test_nobody_gets_caustics_unasked() -> None:
@@ -63,7 +105,7 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
             "caustics; the scene has no lights; add a tl.PointLight, tl.SpotLight or tl.DirectionalLight",
         ),
         (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
-        (scene(body()), {}, "caustics; no opaque object that light could land on; add a ground"),
+        (scene(body()), {}, "caustics; no opaque object that light could land on, and no other body in which"),
         (scene(), {"method": tl.PathTraced()}, "leave out one of the two"),
         (scene(), {"method": tl.ThinLayer()}, "it takes every face for a sheet, which bends nothing"),
         (scene(), {"capabilities": Capabilities(opengl=False)}, "this renderer works on the CPU; use tl.reference"),

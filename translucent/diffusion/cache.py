@@ -13,10 +13,13 @@ import numpy.typing as npt
 
 from translucent.diffusion.entering import opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
-from translucent.diffusion.volume import DiffusingVolume, VolumeField, VolumeGrid
+from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
+from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.given_back import DiffusedMedium, DiffusedVolume
 from translucent.media.medium import Medium
+from translucent.planning.caustic_plan import lit_by_photons, opaque_to_shadows
+from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.scene.scene import Object, Scene
 
@@ -59,25 +62,33 @@ class FieldCache:
         self._volumes: OrderedDict[Hashable, DiffusingVolume] = OrderedDict()
         self._scenes: OrderedDict[Hashable, Fields] = OrderedDict()
 
-    def of(self, scene: Scene, diffusion: Diffusion) -> Fields:
-        """Light of each such body by its number; the same object until something changes it."""
+    def of(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Fields:
+        """Light of each such body by its number; the same object until something changes it.
+
+        With `caustics`, photons carry what interfaces of other bodies bend into them.
+        """
         if not _marked(scene):
             return NO_FIELDS
+        key = diffusion_key(scene, diffusion, caustics)
+        if (known := self._scenes.get(key)) is not None:
+            return known  # nobody waits for other light that a thread looks for
 
         def make() -> Fields:
             places = tuple(_place(item) for item in scene.opaque)
             opaque = _kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             surfaces, volumes = {}, {}
+            bent = self._bent(scene, diffusion, caustics)
             for i, body in enumerate(scene.objects):
                 if isinstance(body.medium, DiffusedMedium):
                     medium = body.medium.original
-                    surfaces[i] = self._body(body, medium, places, opaque, diffusion).field(scene, i)
+                    own = self._body(body, medium, places, opaque, diffusion)
+                    surfaces[i] = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
                 elif isinstance(body.medium, DiffusedVolume):
-                    volumes[i] = self._volume(body, body.medium, diffusion).field(scene)
+                    volumes[i] = self._volume(body, body.medium, diffusion).field(scene, bent.volumes.get(i))
             return Fields(surfaces, volumes)
 
         with self._lock:
-            return _kept(self._scenes, diffusion_key(scene, diffusion), make, KEPT_SCENES)
+            return _kept(self._scenes, key, make, KEPT_SCENES)
 
     def has(self, key: Hashable) -> bool:
         """Whether the light of this `diffusion_key` is known."""
@@ -106,15 +117,44 @@ class FieldCache:
         return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
-        step = diffusion.cell_size(body)
-        place = _place(body), body.density, step
-        grid = _kept(self._grids, place, lambda: VolumeGrid(body, step), KEPT_BODIES)
-        key = (place, _coefficients(medium))
+        grid, key = self._grid(body, diffusion), (_density_place(body, diffusion), _coefficients(medium))
         return _kept(self._volumes, key, lambda: DiffusingVolume(grid, medium), KEPT_BODIES)
 
+    def _grid(self, body: Object, diffusion: Diffusion) -> VolumeGrid:
+        place = _density_place(body, diffusion)
+        return _kept(self._grids, place, lambda: VolumeGrid(body, diffusion.cell_size(body)), KEPT_BODIES)
 
-def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
+    def _bent(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None) -> _Bent:
+        """Light that photons carry into bodies."""
+        if caustics is None or not (lit := _lit(scene)):
+            return _Bent({}, {}, {})
+        fogs = [i for i in lit if isinstance(scene.objects[i].medium, DiffusedVolume)]
+        grids = {i: self._grid(scene.objects[i], diffusion).grid for i in fogs}
+        cells = {i: FineCells.of(own.cells.low, own.cells.step, own.number.shape) for i, own in grids.items()}
+        found = bent_light(scene, caustics, cells, [i for i in lit if i not in fogs])
+        bending = opaque_to_shadows(scene)
+        stops = {i: opaque_surfaces([scene.objects[k] for k in sorted(bending - {i})]) for i in lit}
+        return _Bent({i: PhotonLight(cells[i], found.fluence[i], stops[i]) for i in fogs}, found.entering, stops)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bent:
+    """Light of photons in bodies without an interface, in others, and what stops straight light to each."""
+
+    volumes: dict[int, PhotonLight]
+    entering: dict[int, EnteringPhotons]
+    stops: dict[int, EmbreeMesh | None]
+
+
+def _lit(scene: Scene) -> tuple[int, ...]:
+    """Numbers of the bodies into which photons carry light."""
+    return lit_by_photons(scene, sorted(_marked(scene)))
+
+
+def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Hashable:
     """Everything that the diffused light of a scene depends on; the camera is no part of it."""
+    followed = caustics is not None and _lit(scene)
+    bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
     bodies = tuple(
         (
             i,
@@ -142,7 +182,22 @@ def diffusion_key(scene: Scene, diffusion: Diffusion) -> Hashable:
         for i, item in enumerate(scene.objects if lights else ())
         if item.medium is not None
     )
-    return (diffusion, bodies, opaque, lighting, lights, dimming)
+    return (diffusion, bodies, opaque, lighting, lights, dimming, bending)
+
+
+def _bending(scene: Scene) -> Hashable:
+    """Everything that the ways of photons depend on beside the lights."""
+    objects = tuple(
+        (
+            _place(item),
+            item.priority,
+            item.sheet_thickness,
+            item.surface,
+            item.medium,
+        )
+        for item in scene.objects
+    )
+    return scene.overlap, objects
 
 
 def _bytes(value: npt.ArrayLike) -> bytes:
@@ -173,6 +228,10 @@ def _kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T
 
 def _place(item: Object) -> tuple[object, bytes]:
     return item.mesh, item.matrix.tobytes()
+
+
+def _density_place(body: Object, diffusion: Diffusion) -> Hashable:
+    return _place(body), body.density, diffusion.cell_size(body)
 
 
 def _roughness(item: Object) -> float:

@@ -19,6 +19,11 @@ MOST_FACES = 64
 _EMBREE: WeakKeyDictionary[Mesh, EmbreeMesh] = WeakKeyDictionary()
 
 
+def embree_mesh(mesh: Mesh) -> EmbreeMesh:
+    """The mesh ready for rays, kept as long as it is."""
+    return _EMBREE.get(mesh) or _EMBREE.setdefault(mesh, EmbreeMesh(mesh))
+
+
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
     """Other bodies that take of the light on its way to one: closed ones of one density, neither layers nor sheets."""
     return [
@@ -50,7 +55,7 @@ def light_passed(bodies: Sequence[Object], points: Array, directions: Array, dis
 def _path(body: Object, points: Array, directions: Array, distance: Array) -> Array:
     """(k,): metres inside a body on ways, from where faces are crossed: exits are ahead of every start inside."""
     mesh = body.mesh
-    embree = _EMBREE.get(mesh) or _EMBREE.setdefault(mesh, EmbreeMesh(mesh))
+    embree = embree_mesh(mesh)
     into = np.linalg.inv(body.matrix[:3, :3])
     origins, ways = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
     unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.dimming import light_passed
 from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
 from translucent.geometry.embree import EmbreeMesh
@@ -75,6 +76,16 @@ def opaque_surfaces(objects: Sequence[Object]) -> EmbreeMesh | None:
         return None
     vertices, faces, _ = joined(parts, "opaque objects")
     return EmbreeMesh(Mesh(vertices, faces))
+
+
+def flux_of(photons: EnteringPhotons, grid: BodyGrid) -> Array:
+    """(s, 3): flux at the samples of photons that have come in next to each."""
+    flux = np.zeros((len(grid.points), 3))
+    if len(photons.points):
+        sample = cKDTree(grid.points).query(photons.points)[1]
+        for channel in range(3):
+            flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.area
+    return flux
 
 
 def _nearest(mesh: EmbreeMesh, origins: Array, directions: Array) -> Array:
@@ -179,8 +190,12 @@ def from_light(
     ior: float,
     interface: DiffuseInterface,
     dimming: Sequence[Object] = (),
+    stops: EmbreeMesh | None = None,
 ) -> Array:
-    """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way, and other bodies let it."""
+    """(s, 3): flux of a light that enters at the samples, as far as nothing is in its way, and other bodies let it.
+
+    `stops` are surfaces of other bodies that none of it passes.
+    """
     if isinstance(light, PositionalLight):
         towards = np.asarray(light.position) - grid.points
         distance = np.linalg.norm(towards, axis=1)
@@ -193,6 +208,8 @@ def from_light(
     start = grid.points + BEFORE * grid.cells.step * grid.face_normals
     if lit.any():
         nearest = np.minimum(*casters.nearest(start[lit], direction[lit]))
+        if stops is not None:
+            nearest = np.minimum(nearest, _nearest(stops, start[lit], direction[lit]))
         lit[lit] = nearest >= distance[lit]
     polished = 1.0 - optics.fresnel_dielectric(np.maximum(cosine, 0.0), ior)
     # What a rough interface loses, of any light as of uniform light.

@@ -15,6 +15,7 @@ from translucent.diffusion.entering import (
     Casters,
     Sky,
     environment_parts,
+    flux_of,
     from_itself,
     from_light,
     nearest_parts,
@@ -22,6 +23,7 @@ from translucent.diffusion.entering import (
     transfer,
 )
 from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, SurfaceLight
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
 from translucent.formulas.diffusion import emergent_radiance
@@ -186,8 +188,14 @@ class DiffusingBody:
         self._system = BodySystem(lit.grid, medium, roughness)
 
     @np.errstate(under="ignore")
-    def field(self, scene: Scene, body: int) -> DiffusionField:
-        """Light that the body gives back in a scene, of which it has this number, for its environment and lights."""
+    def field(
+        self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: EmbreeMesh | None = None
+    ) -> DiffusionField:
+        """Light that the body gives back in a scene, of which it has this number, for its environment and lights.
+
+        `photons` carry what other bodies, whose surfaces are `stops`, bend of the light of lamps; none of it goes
+        straight through these.
+        """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
         entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
@@ -197,8 +205,10 @@ class DiffusingBody:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
                 entering = entering + from_light(
-                    grid, self._lit.casters, light, self._medium.ior, self._interface, dimming
+                    grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops
                 )
+        if photons is not None:
+            entering = entering + flux_of(photons, grid)
         found = self._system.solved(entering, self._entrance.itself, inside)
         return _field(grid, self._medium, self._roughness, found)
 

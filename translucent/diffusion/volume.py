@@ -17,10 +17,12 @@ from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts
 from translucent.diffusion.grid import BodyGrid, body_grid
+from translucent.diffusion.photon_fluence import FineCells
 from translucent.diffusion.sweeps import swept
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
 from translucent.formulas.lights import cone_attenuation
+from translucent.geometry.embree import EmbreeMesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight, SpotLight
 from translucent.scene.scene import Object, Scene
@@ -75,6 +77,25 @@ class VolumeField:
         return (self.mean_radiance,)
 
 
+@dataclass(frozen=True, eq=False)
+class PhotonLight:
+    """Light of lamps that bodies bend into a medium, in place of what goes straight through them.
+
+    Attributes
+    ----------
+    cells : FineCells
+        Which divide those of a `VolumeGrid`.
+    fluence : (x, y, z, 3) float64
+        See `BentLight`.
+    stops : EmbreeMesh, optional
+        These bodies.
+    """
+
+    cells: FineCells
+    fluence: Array
+    stops: EmbreeMesh | None
+
+
 class VolumeGrid:
     """Cells of a body and how dense each is; the same for all media and lights.
 
@@ -125,21 +146,30 @@ class DiffusingVolume:
         ]
 
     @np.errstate(under="ignore")
-    def field(self, scene: Scene) -> VolumeField:
-        """Light in the body in a scene, from its environment and lights and what the medium emits."""
+    def field(self, scene: Scene, photons: PhotonLight | None = None) -> VolumeField:
+        """Light in the body in a scene, from its environment and lights and what the medium emits.
+
+        With `photons`, which carry what bodies bend of the light of lamps, none of it goes straight through these.
+        """
         volume, medium = self._volume, self._medium
         sky = self._sky(scene)
-        unturned, ahead = _from_lights(volume.grid, self._density, scene, medium)
+        stops = None if photons is None else photons.stops
+        unturned, ahead = _from_lights(volume.grid, self._density, scene, medium, stops)
+        bent = 0.0 if photons is None else photons.cells.coarse(photons.fluence)
         emission = 4.0 * np.pi * self._density[..., None] * np.asarray(medium.emission)
-        scattered, steps = self._scattered(sky + unturned, emission)
+        scattered, steps = self._scattered(sky + unturned + bent, emission)
         # Light that is scattered back more than ahead gets less deep than reduced coefficients say: what they add twice
         # is taken away, and no more than there is.
         found = np.maximum(sky + scattered + (1.0 - medium.anisotropy) * ahead, 0.0)
         # Beyond the body each cell has what the nearest inside has, for what is interpolated at its surface.
         nearest = distance_transform_edt(~volume.inside, return_distances=False, return_indices=True)
-        mean = found[tuple(nearest)] / (4.0 * np.pi)
-        cells = volume.grid.cells
-        return VolumeField(np.ascontiguousarray(mean, np.float32), cells.low, cells.step, steps)
+        mean, cells = found[tuple(nearest)] / (4.0 * np.pi), volume.grid.cells
+        step = cells.step
+        if photons is not None:
+            # Rays find none of it at lights: all that is scattered the first time is here, too.
+            step = photons.cells.step
+            mean = _finer(mean, photons.cells.finer) + (1.0 - medium.anisotropy) / (4.0 * np.pi) * photons.fluence
+        return VolumeField(np.ascontiguousarray(mean, np.float32), cells.low, step, steps)
 
     def _sky(self, scene: Scene) -> Array:
         """(x, y, z, 3): fluence of the environment's light that nothing has scattered."""
@@ -180,6 +210,19 @@ class DiffusingVolume:
         return fluence, steps
 
 
+def _finer(values: Array, times: int) -> Array:
+    """Values (x, y, z, 3) of cells, interpolated at the centers of those that divide each of them."""
+    if times == 1:
+        return values
+    places = [np.clip((np.arange(size * times) + 0.5) / times - 0.5, 0.0, size - 1.0) for size in values.shape[:3]]
+    for axis, place in enumerate(places):
+        low = np.minimum(place.astype(np.int64), max(values.shape[axis] - 2, 0))
+        share = (place - low).reshape([-1 if i == axis else 1 for i in range(4)])
+        high = np.minimum(low + 1, values.shape[axis] - 1)
+        values = (1.0 - share) * values.take(low, axis) + share * values.take(high, axis)
+    return values
+
+
 def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: float) -> CellSystem:
     """Diffusion in one channel; where hardly anything is, no free path is longer than the body is thick."""
     grid, density = volume.grid, dense[volume.inside]
@@ -203,8 +246,13 @@ def _cell_means(body: Object, grid: BodyGrid) -> Array:
     return total / len(_PLACES) ** 3
 
 
-def _from_lights(grid: BodyGrid, density: Array, scene: Scene, medium: Medium) -> tuple[Array, Array]:
-    """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead."""
+def _from_lights(
+    grid: BodyGrid, density: Array, scene: Scene, medium: Medium, stops: EmbreeMesh | None = None
+) -> tuple[Array, Array]:
+    """(x, y, z, 3) twice: fluence of lights that nothing has turned aside, and of that what was scattered ahead.
+
+    `stops` are surfaces that none of it passes.
+    """
     unturned, ahead = np.zeros((2, *density.shape, 3))
     reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     cells, inside = grid.cells, grid.number >= 0
@@ -220,6 +268,8 @@ def _from_lights(grid: BodyGrid, density: Array, scene: Scene, medium: Medium) -
         else:
             place = points - np.asarray(light.direction) * cells.step * sum(density.shape)
             power = np.broadcast_to(np.asarray(light.irradiance), points.shape)
+        if stops is not None:
+            power = np.where(_in_the_way(stops, points, place)[:, None], 0.0, power)
         # From the edge of the cell on, the mean over it: of what lets nothing through, all that gets in.
         way = np.abs(place - points)
         own = density[inside] * cells.step * np.linalg.norm(way, axis=1) / np.maximum(way.max(axis=1), _STILL)
@@ -231,6 +281,14 @@ def _from_lights(grid: BodyGrid, density: Array, scene: Scene, medium: Medium) -
         unturned[inside] += turned
         ahead[inside] += turned - all_turned
     return unturned, ahead
+
+
+def _in_the_way(stops: EmbreeMesh, points: Array, places: Array) -> npt.NDArray[np.bool_]:
+    """(k,): whether surfaces are between points (k, 3) and places (k, 3)."""
+    way = places - points
+    distance = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
+    face, found = stops.first_hits((points - stops.center) / stops.radius, way / distance[:, None])
+    return np.asarray((face >= 0) & (found * stops.radius < distance))
 
 
 def _mean_shares(light: SpotLight, points: Array, step: float) -> Array:

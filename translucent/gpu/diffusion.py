@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.diffusion.cache import FieldCache, Fields
+from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.planning.slots import MAX_SLOTS, Slot
 from translucent.scene.scene import Scene
@@ -83,9 +84,9 @@ class DiffusionCache:
         self._fields = FieldCache()
         self._last: DiffusedLight | None = None
 
-    def of(self, scene: Scene, diffusion: Diffusion) -> DiffusedLight | None:
+    def of(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> DiffusedLight | None:
         """Diffused light of a scene whose media are marked, None where there is none."""
-        if not (fields := self._fields.of(scene, diffusion)):
+        if not (fields := self._fields.of(scene, diffusion, caustics)):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()
@@ -96,9 +97,9 @@ class DiffusionCache:
         """Whether the light of this `diffusion_key` is known."""
         return self._fields.has(key)
 
-    def solve(self, scene: Scene, diffusion: Diffusion) -> None:
+    def solve(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> None:
         """Find the light of a scene whose media are marked, to be drawn later. Needs no context: a thread may do it."""
-        self._fields.of(scene, diffusion)
+        self._fields.of(scene, diffusion, caustics)
 
     def release(self) -> None:
         """Free the texture."""

@@ -86,6 +86,12 @@ class FrameFeatures:
         return bool(self.plan.given_back.volumes)
 
     @property
+    def stopping_slots(self) -> int:
+        """A bit for each slot that stops the straight light of lamps into media, where photons carry it on."""
+        stops = self.plan.opaque_to_shadows if self.scatters_again else frozenset()
+        return sum(1 << i for i, slot in enumerate(self.slots) if stops.intersection(slot.objects))
+
+    @property
     def last_pass(self) -> str:
         """Name of the pass after which a sample's radiance is complete and can be summed."""
         return self.plan.passes[-1].name

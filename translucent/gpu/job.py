@@ -111,7 +111,7 @@ class FrameJob(SceneView):
         counts = face_counts(scene, int(gl.info["GL_SUBPIXEL_BITS"]))
         contents = _contents(self.features, placed, Balance.of(placed, plan.method, counts), targets.size)
         if self.features.varies:
-            light = resources.diffusion.of(scene, plan.given_back.diffusion)
+            light = resources.diffusion.of(scene, plan.given_back.diffusion, plan.caustics)
             contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
         super().__init__(gl, placed, BodyRoles.of(self.features, counts), contents, targets, resources)
         self._cleared: set[str] = set()
@@ -125,7 +125,7 @@ class FrameJob(SceneView):
     @cached_property
     def diffused_light(self) -> DiffusedLight | None:
         """Light that diffuses in bodies; None where it does not."""
-        return self.resources.diffusion.of(self.scene, self.plan.given_back.diffusion)
+        return self.resources.diffusion.of(self.scene, self.plan.given_back.diffusion, self.plan.caustics)
 
     @property
     def diffused_rows(self) -> dict[int, dict[str, npt.ArrayLike]]:
@@ -153,7 +153,8 @@ class FrameJob(SceneView):
     def light(self, lights: LightLookup) -> None:
         """Write the uniforms of the lights that media scatter; they are the same for all samples."""
         if not self._lit:
-            content = scatter_uniforms(self.placed, self.targets.size, lights, self.plan.method.light_points)
+            points = self.plan.method.light_points
+            content = scatter_uniforms(self.placed, self.targets.size, lights, points, self.features.stopping_slots)
             self.uniforms.add(SCATTER, content)
             self._lit = True
 

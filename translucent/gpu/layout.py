@@ -180,6 +180,8 @@ SCATTER = UniformBlock(
         ("gauss", "f4", (MAX_LIGHT_POINTS, 4)),  # points in 0..1 and their weights
         ("gauss_count", "i4", ()),
         ("scatter_light_count", "i4", ()),
+        ("stopping_slots", "i4", ()),  # a bit for each slot that stops straight light, since photons carry it on
+        ("stopping_extinction", "f4", ()),  # 1/m
     ),
 )
 

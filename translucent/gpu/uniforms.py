@@ -39,6 +39,9 @@ from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.surface import SMOOTH
 
+#: Optical depth, across the scene, of what stops the straight light of lamps.
+STOPPING = 1e5
+
 
 def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
     """Contents of the View block."""
@@ -101,7 +104,9 @@ class LightLookup:
     rows: Array
 
 
-def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLookup, points: int) -> bytes:
+def scatter_uniforms(
+    placed: PlacedScene, size: tuple[int, int], lights: LightLookup, points: int, stopping: int = 0
+) -> bytes:
     """Contents of the Scatter block.
 
     Parameters
@@ -112,6 +117,8 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
     lights : LightLookup
     points : int
         Gauss-Legendre points for each interval and light.
+    stopping : int
+        A bit for each slot that stops the straight light of lamps.
     """
     scene, camera, media = placed.scene, placed.scene.camera, placed.media
     half_width, half_height = camera.half_extent(size)
@@ -142,6 +149,8 @@ def scatter_uniforms(placed: PlacedScene, size: tuple[int, int], lights: LightLo
         gauss=gauss,
         gauss_count=points,
         scatter_light_count=len(seen),
+        stopping_slots=stopping,
+        stopping_extinction=STOPPING / scene.diagonal,
     )
 
 

@@ -1,4 +1,4 @@
-"""Caustics: photons from the lights, bent and mirrored by interfaces, where they land on opaque objects."""
+"""Caustics: photons from the lights, bent and mirrored by interfaces, where they land on opaque objects and media."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ from translucent.planning.methods.base import check_count
 #: Largest number of photons of a frame: a software rasterizer follows so many in some minutes.
 MAX_PHOTONS = 1 << 30
 
+#: Photons in media, least and most: each of them lights all cells on its way.
+LEAST_IN_MEDIA, MOST_IN_MEDIA = 1 << 16, 1 << 18
+
 
 @dataclass(frozen=True)
 class Caustics:
-    """Light of lamps and directional lights that interfaces bend and mirror onto opaque objects, by photons.
+    """Light of lamps and directional lights that interfaces bend and mirror onto opaque objects and media, by photons.
 
     Photons (Jensen 1996) leave the lights towards the bodies, and are refracted or reflected there by chance, as
     Fresnel says; media absorb on the way. Those that have been bent or mirrored land on the first opaque surface, and
@@ -22,6 +25,8 @@ class Caustics:
     its pixel covers there; where there are few, they are spread over some pixels. Surfaces reflect them diffusely. The
     energy is right whatever their number; the noise of a pixel falls with its square root. Of several samples of a
     pixel each follows its part of the photons.
+
+    Others of them (`in_media`) are followed into bodies in which light diffuses, and light fog all along their ways.
 
     The straight light of lamps ends at solids that bend light (`RenderPlan.opaque_to_shadows`).
 
@@ -50,6 +55,11 @@ class Caustics:
     def __post_init__(self) -> None:
         check_count("Caustics photons", self.photons, MAX_PHOTONS, example=1_000_000)
         check_count("Caustics seed", self.seed, (1 << 32) - 1, least=0, example=0)
+
+    @property
+    def in_media(self) -> int:
+        """Photons, of others than land on opaque objects, that light media: a quarter as many, within bounds."""
+        return min(max(self.photons // 4, LEAST_IN_MEDIA), MOST_IN_MEDIA)
 
     def __str__(self) -> str:
         return f"Caustics(photons={self.photons}, seed={self.seed})"

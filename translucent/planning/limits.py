@@ -8,6 +8,7 @@ from translucent.errors import InputError
 from translucent.media.density import DensityGrid
 from translucent.media.given_back import DiffusedVolume
 from translucent.planning.bodies import open_bodies, scatters, sheets_of
+from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method, RayMarched
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.notes import Note, NoteKind
@@ -84,12 +85,15 @@ def marching_method(scene: Scene, method: Method | None, capabilities: Capabilit
     return method
 
 
-def scattered_again_method(scene: Scene) -> RayMarched:
+def scattered_again_method(scene: Scene, caustics: Caustics | None = None) -> RayMarched:
     """Ray marching through fog of one density.
 
     A few Gauss-Legendre points, which are more accurate than four times as many steps; near a lamp inside, where light
-    falls off as 1 / r^2 from a peak, or for a spot, which shines between two angles, steps of equal angles instead.
+    falls off as 1 / r^2 from a peak, or for a spot, which shines between two angles, steps of equal angles instead; and
+    even steps through light of photons, which is as narrow as cells.
     """
+    if caustics is not None:
+        return RayMarched(steps=LEAST_STEPS)
     if any(isinstance(light, SpotLight) for light in scene.lights):
         return RayMarched(steps=LEAST_STEPS, quadrature="equiangular")
     lamps = [np.asarray(light.position) for light in scene.lights if isinstance(light, PositionalLight)]

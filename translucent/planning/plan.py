@@ -60,7 +60,7 @@ def plan(
     scattering : Diffusion, ScatteringLayer or SingleScattering, optional
         How to show light that media scatter more than once; None lets the planner pick.
     caustics : Caustics, optional
-        Photons from the lights through interfaces onto opaque objects; None for none.
+        Photons from the lights through interfaces onto opaque objects and into fog; None for none.
     shadows : ShadowMaps, optional
         How to find shadows on opaque objects; a renderer without OpenGL traces them. Default: `ShadowMaps()`.
 
@@ -73,7 +73,7 @@ def plan(
     check_scene(scene)
     check_caustics(caustics)
     check_shadows(shadows)
-    chosen = _plan(scene, method, capabilities, interfaces, scattering)
+    chosen = _plan(scene, method, capabilities, interfaces, scattering, caustics)
     if caustics is not None:
         chosen = with_caustics(chosen, scene, caustics, method, capabilities or Capabilities())
     if chosen.traced:
@@ -97,8 +97,9 @@ def _plan(
     capabilities: Capabilities | None,
     interfaces: Interfaces | None = None,
     scattering: Scattering | None = None,
+    caustics: Caustics | None = None,
 ) -> RenderPlan:
-    """The plan but for shadows."""
+    """The plan but for shadows and photons."""
     if method is not None and not isinstance(method, Method):
         raise InputError(f"method {method!r}", "not a thickness method", "give for example tl.SignedDepth()")
     check_interfaces(interfaces)
@@ -114,7 +115,7 @@ def _plan(
     volumes = opengl and capabilities.shader_storage and (method is None or method.marches)
     if back := given_back(scene, scattering, layers=opengl, matched=matched, volumes=volumes):
         once = SingleScattering()
-        found = _plan(shown(scene, back), method, capabilities, interfaces, once)
+        found = _plan(shown(scene, back), method, capabilities, interfaces, once, caustics)
         return with_given_back_told(found, scene, back)
     if scene.scatters_ambient:
         emitted = scene.with_ambient_emitted
@@ -132,7 +133,7 @@ def _plan(
         return _plan_traced(scene, method, interfaces, capabilities)
     sheets = method is not None and method.makes_sheets
     bending, instead = chosen_interfaces(scene, interfaces, sheets=sheets)
-    thickness, why = _choice(scene, method, capabilities, bending)
+    thickness, why = _choice(scene, method, capabilities, bending, caustics)
     if method is None and isinstance(scattering, SingleScattering) and isinstance(thickness, FragmentLists):
         thickness = dataclasses.replace(thickness, light_points=scattering.points)
     chosen = assembled(scene, thickness, why, bending, capabilities)
@@ -142,13 +143,17 @@ def _plan(
 
 
 def _choice(
-    scene: Scene, method: Method | None, capabilities: Capabilities, interfaces: Interfaces
+    scene: Scene,
+    method: Method | None,
+    capabilities: Capabilities,
+    interfaces: Interfaces,
+    caustics: Caustics | None = None,
 ) -> tuple[Method, str]:
     """The method of a renderer with OpenGL, and why it is that one; refuses what was asked for if it cannot do."""
     if scene.varies:
         return marching_method(scene, method, capabilities), "the density varies from place to place"
     if method is None and any(isinstance(body.medium, DiffusedVolume) for body in scene.bodies):
-        return scattered_again_method(scene), "light scattered again into the rays: steps look it up"
+        return scattered_again_method(scene, caustics), "light scattered again into the rays: steps look it up"
     if method is not None and method.ordered:
         return method, "asked for"
     if (why := why_order_matters(scene, method, interfaces)) is not None:

@@ -62,7 +62,7 @@ class RenderPlan:
     paths : PathTraced, optional
         The random paths that make the radiance, in place of interfaces and of what is given back; None where none do.
     caustics : Caustics, optional
-        The photons that land on opaque objects; None where none do.
+        The photons that land on opaque objects, and light media; None where none do.
     opaque_to_shadows : frozenset of int
         Numbers of the objects through which no straight light of lamps falls onto others, since photons carry what
         their interfaces bend.

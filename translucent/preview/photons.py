@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
+from translucent.diffusion.cache import diffusion_key
 from translucent.errors import InputError
 from translucent.gpu.photon_light import PhotonLight
 from translucent.gpu.viewport import Viewport
+from translucent.planning.caustic_plan import lit_by_photons
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method
+from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering import Scattering
+from translucent.planning.scattering.choice import shown
+from translucent.preview.tasks import Lane, Task
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
 
@@ -40,6 +46,8 @@ class Photons:
         A picture is to be drawn with the light as it is.
     side : int
         Of the viewport, on which it is: 1 until it has taken over.
+    in_media : bool
+        The light of photons in media is known.
     """
 
     def __init__(self) -> None:
@@ -49,9 +57,10 @@ class Photons:
         self.told = ""
         self.plan: RenderPlan | None = None
         self.light: PhotonLight | None = None
-        self.drawing, self.side, self._on_show = False, 1, False
+        self.drawing, self.side, self._on_show, self.in_media = False, 1, False, False
         self._in_texture = self._in_picture = 0  # photons
         self._scene: Scene | None = None
+        self._solving: Task | None = None
         self._noise, self._next = float("inf"), FIRST_ROUNDS
         self._following = self._drawing = self._begun = 0.0  # seconds spent, and when drawing began
 
@@ -62,20 +71,24 @@ class Photons:
         viewport: Viewport,
         method: Method | None,
         scattering: Scattering | None,
+        lane: Lane,
         seconds: float,
         drawing: float,
     ) -> bool:
         """Follow photons for about so many seconds, unless a picture is being drawn; whether any are to be followed.
 
-        Pictures are expected to take `drawing` seconds.
+        Pictures are expected to take `drawing` seconds. Those that light media are followed first, all at once, in a
+        `lane`.
         """
         try:
             if self._scene is not scene:
                 self.stop(viewport)
                 self._scene = scene
                 self.plan = renderer.plan(scene, method, scattering=scattering, caustics=Caustics(ROUND))
-            if self.plan is None or self.done:
+            if self.plan is None or self.done or not self._media_known(scene, renderer, lane):
                 return False
+            if not self.plan.has(PassName.CAUSTICS):
+                return False  # nothing opaque that more could land on
             if self.light is None:
                 self.light = PhotonLight(renderer.gpu, scene, viewport.size, self.plan)
                 self.told = "caustics: the first photons"
@@ -95,6 +108,35 @@ class Photons:
                 self.drawing, self.side, self._begun = True, 1, time.perf_counter()
             self._tell()
         return True
+
+    def _media_known(self, scene: Scene, renderer: Renderer, lane: Lane) -> bool:
+        """Whether the light of photons in media is known, if there is any; else it is searched for."""
+        assert self.plan is not None
+        back, caustics, cache = self.plan.given_back, self.plan.caustics, renderer.gpu.diffusion
+        if not lit_by_photons(scene, (*back.volumes, *back.diffused)):
+            return True
+        assert caustics is not None
+        marked = shown(scene, back).with_ambient_emitted
+        if cache.has(diffusion_key(marked, back.diffusion, caustics)):
+            self.in_media = True
+            if not self.plan.has(PassName.CAUSTICS):
+                self.told = f"caustics: {caustics.in_media:,} photons in media"
+            return True
+        if self._solving is not None and (self._solving.cancelled or self._solving.error is not None):
+            self.told = "no caustics: what photons light in media could not be solved for"
+        elif lane.task is None:
+            self.told = "caustics: photons in media first"
+            solve = partial(cache.solve, marked, back.diffusion, caustics)
+            self._solving = lane.start("photons in media", lambda _: solve(), lambda _: None)
+        return False
+
+    def show_media(self, viewport: Viewport) -> RenderPlan | None:
+        """Begin the picture anew with photons in media, where none land on anything; its plan, None if it has begun."""
+        if not self.in_media or self._on_show or self.plan is None or self.plan.has(PassName.CAUSTICS):
+            return None
+        viewport.restart()
+        self._on_show = True
+        return self.plan
 
     @property
     def done(self) -> bool:

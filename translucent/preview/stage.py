@@ -27,7 +27,7 @@ from translucent.preview.photons import Photons
 from translucent.preview.presenting import Presenting
 from translucent.preview.scenes import method_of, scattering_of
 from translucent.preview.staging import tone_of
-from translucent.preview.tasks import Task
+from translucent.preview.tasks import Lane, Task
 from translucent.preview.timing import Pace, Timing
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
@@ -180,7 +180,7 @@ class Stage:
         if display.converges and not drawn:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, BUDGET)
         if lit:
-            more, drawn = self._light_by_photons(scene, methods[0], display.antialias)
+            more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace.lanes["diffuse"])
             if self.photons.light is None and not more:  # there are no photons to follow
                 more = drawn = self._step(0, scene, display.antialias)
         self._presenting.present(workspace, scene, self.viewport, self._shown, changed=drawn)
@@ -254,11 +254,13 @@ class Stage:
     def _samples(self, stride: int, antialias: bool) -> int:
         return (SAMPLES if stride == 1 else SLOW_SAMPLES) if antialias else 0
 
-    def _light_by_photons(self, scene: Scene, method: Method | None, antialias: bool) -> tuple[bool, bool]:
+    def _light_by_photons(self, scene: Scene, method: Method | None, antialias: bool, lane: Lane) -> tuple[bool, bool]:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons = self.photons
         expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
-        if not photons.ready(scene, self.renderer, self.viewport, method, self._scattering, BUDGET, expected):
+        if not photons.ready(scene, self.renderer, self.viewport, method, self._scattering, lane, BUDGET, expected):
+            if (plan := photons.show_media(self.viewport)) is not None:
+                self.plans[0], self._strides[0] = plan, self._pace.factor(plan, STRIDES, BUDGET)
             return False, False
         if not photons.drawing or photons.plan is None or photons.light is None:
             return True, False
@@ -266,8 +268,7 @@ class Stage:
             self._strides[1] = self._pace.factor(photons.plan, STRIDES, BUDGET)
         stride, begun = self._strides[photons.side], time.perf_counter()
         samples = self._samples(stride, antialias)
-        light = photons.light.texture
-        self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=light)
+        self.viewport.step(photons.side, scene, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
         self._finish(0, photons.plan, stride, begun)
         if photons.take_over(self.viewport, stride, samples):
             self._strides[0], self.plans[0] = stride, photons.plan

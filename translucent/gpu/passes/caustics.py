@@ -16,10 +16,10 @@ from translucent.gpu.ledger import before_making
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, OpaquePass, shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed
 from translucent.gpu.passes.variants import Variants, look_switches
-from translucent.gpu.photon_aims import PhotonAim, photon_aims
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.uniforms import media_center
 from translucent.planning.passes import PassSpec
+from translucent.planning.photon_aims import PhotonAim, photon_aims
 
 _TRACED = {name: unit for unit, name in enumerate(("traced_bodies", "hierarchy_nodes", "hierarchy_triangles"))}
 _LANDED = ("landed_point", "landed_power", "landed_normal")
