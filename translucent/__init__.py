@@ -43,6 +43,8 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.frames.metrics import Errors as Errors
     from translucent.frames.metrics import compare as compare
     from translucent.frames.metrics import interior as interior
+    from translucent.frames.photographs import Photograph as Photograph
+    from translucent.frames.photographs import fit_photographs as fit_photographs
     from translucent.geometry.mesh import Mesh as Mesh
     from translucent.gltf.load import load_scene as load_scene
     from translucent.gltf.materials import read_materials as read_materials
@@ -66,6 +68,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.preset import Preset as Preset
     from translucent.media.presets import preset as preset
     from translucent.media.presets import presets as presets
+    from translucent.media.step_fit import StepFit as StepFit
     from translucent.mesh_files import load_mesh as load_mesh
     from translucent.notebook.view import view as view
     from translucent.page.write import write_page as write_page
@@ -120,6 +123,7 @@ _NAMES = {
     "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",
     "frames.frame": "Frame",
     "frames.metrics": "Errors compare interior",
+    "frames.photographs": "Photograph fit_photographs",
     "geometry.mesh": "Mesh",
     "gltf.load": "load_scene",
     "gltf.materials": "read_materials",
@@ -133,6 +137,7 @@ _NAMES = {
     "media.medium": "Medium",
     "media.preset": "Preset",
     "media.presets": "preset presets",
+    "media.step_fit": "StepFit",
     "mesh_files": "load_mesh",
     "notebook.view": "view",
     "page.write": "write_page",
