@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.bake.baked import BakeReport as BakeReport
     from translucent.bake.batch import BatchReport as BatchReport
     from translucent.bake.batch import bake_many as bake_many
+    from translucent.bake.lithophane import Lithophane as Lithophane
+    from translucent.bake.lithophane import lithophane as lithophane
     from translucent.bake.reading import load_thickness_map as load_thickness_map
     from translucent.bake.scatter.bake import bake_scatter as bake_scatter
     from translucent.bake.scatter.bake import bake_vertex_scatter as bake_vertex_scatter
@@ -113,6 +115,7 @@ _NAMES = {
     "bake.bake": "bake_thickness",
     "bake.baked": "BakeReport",
     "bake.batch": "BatchReport bake_many",
+    "bake.lithophane": "Lithophane lithophane",
     "bake.reading": "load_thickness_map",
     "bake.scatter.bake": "bake_scatter bake_vertex_scatter",
     "bake.scatter.result": "ScatterMap VertexScatter",

@@ -1,9 +1,9 @@
 """Fit of extinction to transmittances of known thickness, with error bars: generalized least squares per channel.
 
 -log(T) = k + sigma_t d, with the loss k at both faces: fitted, or that of a slab with a given index of refraction. The
-patches of a photograph share the error of its white. Where residuals scatter more than noise explains, thicknesses or the light
-are not what they are said to be: each step gets an error in all photographs alike, as large as makes chi2 the number of
-degrees of freedom (Paule and Mandel 1982, "Consensus Values and Weighting Factors").
+patches of a photograph share the error of its white. Where residuals scatter more than noise explains, thicknesses
+or the light are not what they are said to be: each step gets an error in all photographs alike, as large as makes chi2
+the number of degrees of freedom (Paule and Mandel 1982, "Consensus Values and Weighting Factors").
 """
 
 from __future__ import annotations
@@ -280,6 +280,6 @@ def _disagreeing(photographs: Sequence[Steps], samples: _Channel, fixed: bool, c
     ends = [photographs[usable[i]].name for i in (int(slopes.argmin()), int(slopes.argmax()))]
     percent = 100.0 * spread / max(abs(slope), 1e-300)
     return [
-        f"{CHANNELS[channel]} differs by {percent:.0f} % between {ends[0]} and {ends[1]}: is a camera's tone curve in them? "
-        "Develop raw files without one, or save linear .exr"
+        f"{CHANNELS[channel]} differs by {percent:.0f} % between {ends[0]} and {ends[1]}: "
+        "is a camera's tone curve in them? Develop raw files without one, or save linear .exr"
     ]
