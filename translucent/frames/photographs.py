@@ -34,6 +34,9 @@ STRIPS, INNER = 16, 0.6
 #: Standard deviations, from the median of the deviations, beyond which a pixel is dust or a scratch.
 _OUTLIER = 5.0
 
+#: Pixels along the side of the largest picture.
+MOST_PIXELS = 1 << 20
+
 
 @dataclass(frozen=True)
 class Photograph:
@@ -128,6 +131,8 @@ def parse_rectangle(text: str) -> Rectangle:
         x, y, width, height = (int(part) for part in text.split(","))
     except ValueError:
         raise InputError(f"rectangle {text!r}", "not four whole numbers", "write X,Y,W,H in pixels") from None
+    if min(x, y) < 0 or min(width, height) < 1 or max(x, y, width, height) > MOST_PIXELS:
+        raise InputError(f"rectangle {text!r}", "in no picture", "count X,Y,W,H from the top left, in pixels")
     return x, y, width, height
 
 
