@@ -56,6 +56,8 @@ KINDS = ("noise", "8 bits", "two exposures, ior known", "thicknesses 0.03 mm off
 def drawn(kind: str, rng: np.random.Generator, folder: Path) -> tuple[list[Photograph], float | None]:
     """Random photographs of one kind, and the index of refraction that is told."""
     exposures, ior, thicknesses = [0.8], None, STEPS
+    if kind == "8 bits":
+        exposures = [rng.uniform(0.4, 0.95)]
     if kind == "two exposures, ior known":
         exposures, ior = [0.2, 0.9], IOR
     if kind == "thicknesses 0.03 mm off":  # by a caliper, which the residuals alone tell; twice the same steps
@@ -64,8 +66,9 @@ def drawn(kind: str, rng: np.random.Generator, folder: Path) -> tuple[list[Photo
         thicknesses = STEPS * (1 + 0.02 * rng.normal(size=len(STEPS)))
     shots = []
     for exposure in exposures:
-        picture: object = photograph(rng, exposure, 0.05 if kind == "noise" else 0.03, thicknesses)
-        if kind == "8 bits":
+        noise = {"noise": 0.05, "8 bits": 0.001}.get(kind, 0.03)
+        picture: object = photograph(rng, exposure, noise, thicknesses)
+        if kind == "8 bits":  # which round all alike, as noise is less than a level
             Image.fromarray(encoded(np.asarray(picture))).save(folder / "steps.png")
             picture = folder / "steps.png"
         shots.append(Photograph(picture, WHITE, PATCHES))  # type: ignore[arg-type]
