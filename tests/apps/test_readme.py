@@ -40,7 +40,6 @@ def make_models() -> None:
     # White at 10,10,60,60, and from 90,10 steps of 100 pixels, behind which ever less light is left.
     steps = np.repeat(np.array([250, 200, 160, 110, 60], dtype=np.uint8), [90, 100, 100, 100, 110])
     Image.fromarray(np.broadcast_to(steps[None, :, None], (80, 500, 3)).copy()).save("steps.jpg")
-    Image.fromarray(np.broadcast_to(steps[None, :, None], (80, 500, 3)).copy()).save("longer.jpg")
 
 
 def little(snippet: str) -> str:
