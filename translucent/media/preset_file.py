@@ -62,7 +62,7 @@ def read_good_presets(text: str, file: str) -> tuple[dict[str, Preset], list[Inp
             found[name] = _Entry(file, name, entry).preset()
         except InputError as error:
             line = _line(text, name, str(error).partition("; ")[2])
-            wrong.append(InputError(f"{file}, line {line}", str(error).removeprefix(f"{file}, ")))
+            wrong.append(InputError(f"{file}, line {line}, {str(error).removeprefix(f'{file}, ')}"))
     return found, wrong
 
 

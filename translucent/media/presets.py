@@ -31,9 +31,9 @@ def grouped(found: Mapping[str, Preset]) -> dict[str, list[Preset]]:
 
 
 def matching(found: Mapping[str, Preset], words: str) -> dict[str, Preset]:
-    """Presets of which names, aliases, groups, kinds, notes and sources have all of these words, or parts of them."""
-    wanted = words.lower().replace("_", " ").split()
-    return {name: one for name, one in found.items() if all(word in _told(one) for word in wanted)}
+    """Presets of which names, aliases, groups, kinds, notes and sources have all of these words, or begin with them."""
+    wanted = re.findall(r"\w+", words.lower().replace("_", " "))
+    return {name: one for name, one in found.items() if all(any(w.startswith(x) for w in _words(one)) for x in wanted)}
 
 
 def preset(name: str) -> Preset:
@@ -72,9 +72,9 @@ def _names() -> dict[str, Preset]:
     return {name: one for one in _all().values() for name in (one.name, *one.aliases)}
 
 
-def _told(one: Preset) -> str:
+def _words(one: Preset) -> list[str]:
     parts = (one.name, *one.aliases, one.group, one.kind, one.note, one.source)
-    return " ".join(parts).lower().replace("_", " ")
+    return re.findall(r"\w+", " ".join(parts).lower().replace("_", " "))
 
 
 def _speaks_of(one: Preset, word: str) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from translucent.errors import InputError
+from translucent.errors import InputError, TranslucentError
 from translucent.gltf.load import SUFFIXES
 from translucent.gltf.write import write_medium
 from translucent.planning.caustics import Caustics
@@ -52,6 +52,19 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
         case _:
             found = f"{kind!r} is nothing to read or write"
             work.refuse(InputError(f"file {path!r}", found, f"use {', '.join(QUESTIONS)}"))
+
+
+def save_preset(desk: Desk, words: str) -> bool:
+    """Save the material as an own preset; returns whether it is."""
+    try:
+        path, left_out = desk.work.library.save(words, desk.material)
+    except TranslucentError as error:
+        desk.work.refuse(error)
+        return False
+    desk.work.tell("info", f"saved {path}")
+    if left_out:
+        desk.work.tell("warning", f"no preset keeps: {', '.join(left_out)}")
+    return True
 
 
 def _export(desk: Desk, kind: str, path: str) -> None:

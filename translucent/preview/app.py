@@ -193,6 +193,7 @@ class _Window:
         """Docking layout: panels on both sides, with a share of the width that they have in a narrow window."""
         from imgui_bundle import hello_imgui, imgui
 
+        from translucent.preview.panels.library import library_panel
         from translucent.preview.panels.look import files_panel, look_panel
         from translucent.preview.panels.material import material_panel
         from translucent.preview.panels.messages import messages_panel
@@ -209,6 +210,7 @@ class _Window:
         panels: list[tuple[str, str, Callable[[Any], None]]] = [
             ("Viewport", "MainDockSpace", viewport_panel),
             ("Material", "Left", material_panel),
+            ("Library", "Left", library_panel),
             ("Method", "Right", method_panel),
             ("Look", "Right", look_panel),
             ("Files", "Right", files_panel),

@@ -6,20 +6,23 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from imgui_bundle import hello_imgui, imgui
 
-from translucent.preview.actions import Change
+from translucent.errors import TranslucentError
+from translucent.preview.actions import Assign, Change, ChoosePreset, changed_material, preset_material
 from translucent.preview.dialogs import open_dialog
-from translucent.preview.document import RANGES
+from translucent.preview.document import RANGES, Material
 from translucent.preview.measuring import Crossing, Measured
-from translucent.preview.scenes import method_of
+from translucent.preview.scenes import material_of, method_of
 from translucent.preview.stage import Stage
 from translucent.preview.workspace import Workspace
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import fillable
 
 #: Seconds without movement after which a view counts as still.
 STILL = 0.25
@@ -46,6 +49,7 @@ class Desk:
     stage: Stage
     drag: int = 0
     more: bool = True
+    drawn: bool = False
     pressed_at: tuple[float, float] = (0.0, 0.0)
     dragging_split: bool = False
     texts: dict[str, str] = field(default_factory=dict)
@@ -57,25 +61,109 @@ class Desk:
     dialogs: list[tuple[str, Any]] = field(default_factory=list)
     export: dict[str, Any] = field(default_factory=lambda: {"transparent": False, "pictures": 36})
     baking: dict[str, Any] = field(default_factory=lambda: {"mode": "cone", "size": 512, "rays": 64})
+    dragged: str = ""
+    _textures: dict[str, Any] = field(default_factory=dict)
     _inset: tuple[Any, Any] | None = None
     _measured_for: object = None
     _asked: bool = False
     _still_since: float = 0.0
 
     def change(self, name: str, value: Any, *, step: bool = False) -> None:
-        """Give a field of the document a value; all changes while the mouse is down are one undo step."""
-        self.work.do(Change(name, value, None if step else self.drag))
+        """Give a field a value; all changes while the mouse is down are one undo step.
+
+        Fields of the material are those of the selected object.
+        """
+        section, _, key = name.partition(".")
+        drag = None if step else self.drag
+        if section != "material" or self.target is None:
+            return self.work.do(Change(name, value, drag))
+        return self._assign(self.target, lambda material: changed_material(material, key, value), drag)
 
     def get(self, name: str) -> Any:
-        """Value of a field of the document."""
+        """Value of a field of the document; of the material, that of the selected object."""
         section, _, key = name.partition(".")
-        return getattr(getattr(self.work.document, section), key)
+        return getattr(self.material if section == "material" else getattr(self.work.document, section), key)
+
+    @property
+    def target(self) -> int | None:
+        """Number of the selected object, if there are others beside it; None: panels are about the whole model."""
+        objects = self.objects
+        return self.selected if self.selected is not None and 1 < len(objects) > self.selected else None
+
+    @property
+    def objects(self) -> Sequence[Object]:
+        """Objects of the model."""
+        return () if self.work.loaded is None else self.work.loaded.scene.objects
+
+    @property
+    def target_text(self) -> str:
+        """What a material is assigned to."""
+        return "fills the model" if self.target is None else f"assigns to {self.objects[self.target].mesh.name}"
+
+    @property
+    def material(self) -> Material:
+        """Material of the selected object, or of the model."""
+        return self.material_of(self.target)
+
+    def material_of(self, number: int | None) -> Material:
+        """Material of an object: its own one, or that of the model."""
+        document, loaded = self.work.document, self.work.loaded
+        if number is None or loaded is None:
+            return document.material
+        if (own := document.own_material(number)) is not None:
+            return own
+        filled = any(one is loaded.scene.objects[number] for one in fillable(loaded.scene))
+        own_of_file = document.material.source == "file" or not filled
+        return material_of(loaded.scene, number) if own_of_file else document.material
+
+    def choose_preset(self, name: str, number: int | None = None) -> None:
+        """Fill an object with a preset: this one, the selected one, or the model."""
+        number = self.target if number is None else number
+        if number is None:
+            return self.work.do(ChoosePreset(name))
+        return self._assign(number, lambda material: preset_material(material, name))
+
+    def drop_preset(self, name: str, position: tuple[float, float]) -> None:
+        """Fill the object at a position of the viewport with a preset, as soon as it is known."""
+
+        def give(number: int | None) -> None:
+            if number is None:
+                self.work.tell("warning", f"{name} is not assigned: nothing is there; drop it on an object")
+            else:
+                self.choose_preset(name, number if len(self.objects) > 1 else None)
+
+        self.pick(position, give)
+
+    def pick(self, position: tuple[float, float], then: Callable[[int | None], None]) -> None:
+        """Find the first object at a position, in shares of the viewport, in the background; None: there is none."""
+        scene, size = self.work.scene(), self.stage.viewport.size
+        if scene is None:
+            return
+
+        def take(found: Crossing) -> None:
+            then(found.body if found.body is not None and found.body < len(self.objects) else None)
+
+        pixel = tuple(min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
+        self.work.cross(scene, size, pixel, take)  # type: ignore[arg-type]
+
+    def select(self, number: int | None) -> None:
+        """Select an object, or none."""
+        self.selected = number
+
+    def _assign(self, number: int, change: Callable[[Material], Material], drag: int | None = None) -> None:
+        try:
+            material = change(self.material_of(number))
+        except TranslucentError as error:
+            return self.work.refuse(error)
+        return self.work.do(Assign(number, material, drag))
 
     def draw(self, pixels: tuple[int, int]) -> bool:
         """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
         self.work.size = pixels
         self.work.update()
         more = self.stage.draw(self.work, pixels)
+        self.drawn = not more
+        self.work.shelf.begin_frame(idle=not more)
         scene = self.work.scene()
         wanted = (scene, self.work.document.display.method, self.work.document.display.compare)
         if wanted != self._measured_for:
@@ -92,8 +180,7 @@ class Desk:
             return
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)
-        if document.display.inset:
-            self.work.measure(scene, method, size, self._take)
+        self.work.measure(scene, method, size, self._take)
         if document.display.compare in ("reference", "error"):
             levels = (1,) if document.display.compare == "error" else None
             self.work.draw_truth(scene, method, size, levels)
@@ -119,6 +206,14 @@ class Desk:
             self.dialogs.append((kind, dialog))
         else:
             self.work.tell("error", "no file dialog here: drop files on the window, or name them when starting")
+
+    def texture(self, key: str, pixels: Any) -> Any:
+        """Texture of a small picture."""
+        if key not in self._textures:
+            height, width = pixels.shape[:2]
+            content = np.ascontiguousarray(pixels[..., :3]).tobytes()
+            self._textures[key] = self.stage.renderer.gpu.context.gl.texture((width, height), 3, content, alignment=1)
+        return self._textures[key]
 
     def inset_texture(self, pixels: Any) -> Any:
         """Texture of the reference's small picture."""

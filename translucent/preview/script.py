@@ -2,10 +2,11 @@
 
 Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
 (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
-``undo``, ``redo``, ``frame``. Of the window: ``probe`` (x, y: shares of the viewport), ``select`` (panel), ``wait``
-(seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file),
-``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``, ``release`` (button), ``wheel``
-(steps).
+``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: shares of the viewport),
+``save_preset`` (name). Of objects: ``pick`` (x, y: shares of the viewport), ``object`` (number; -1: none). Of the
+window: ``probe`` (x, y: shares of the viewport), ``select`` (panel), ``wait`` (seconds; without them, until nothing is
+under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point``
+(x, y: shares of the window), ``press``, ``release`` (button), ``wheel`` (steps).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from translucent.errors import InputError
-from translucent.preview.actions import Change, ChoosePreset, Pan, Turn, Zoom
+from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.document import Model
 from translucent.preview.session import read_toml
 
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 #: Seconds after which a script continues, whatever work is under way.
 PATIENCE = 120.0
+
+#: Seconds between frames of a script that waits for other processes, which need the time more.
+PAUSE = 0.03
 
 #: Frames between two actions, so that changes are drawn before the next one.
 FRAMES = 2
@@ -38,6 +42,11 @@ _WORDS: dict[str, dict[str, Any]] = {
     "turn": {"right": 0.0, "up": 0.0},
     "pan": {"right": 0.0, "down": 0.0},
     "zoom": {"factor": 1.0, "right": 0.0, "down": 0.0},
+    "library": {"search": ""},
+    "pick": {"x": 0.5, "y": 0.5},
+    "object": {"number": -1},
+    "drop": {"preset": str, "x": 0.5, "y": 0.5},
+    "save_preset": {"name": str},
     "undo": {},
     "redo": {},
     "frame": {},
@@ -110,9 +119,11 @@ class Script:
     def _rested(self, desk: Desk) -> bool:
         assert self._waiting is not None
         passed = time.monotonic() - self._waiting
+        if desk.drawn:
+            time.sleep(PAUSE)
         if self._until >= 0:
             return passed >= self._until
-        return passed > 0.5 and (not desk.more or passed > PATIENCE)
+        return passed > 0.5 and (not (desk.more or desk.work.shelf.busy) or passed > PATIENCE)
 
 
 def read_script(path: str | Path) -> Script:
@@ -159,9 +170,14 @@ def perform(desk: Desk, step: Step) -> None:
     """Do one action."""
     work, v = desk.work, step.values
     verbs: dict[str, Callable[[], object]] = {
-        "change": lambda: work.do(Change(v["field"], v["value"])),
+        "change": lambda: desk.change(v["field"], v["value"], step=True),
         "open": lambda: work.open(Model(v["model"], v["unit"])),
-        "preset": lambda: work.do(ChoosePreset(v["name"])),
+        "preset": lambda: desk.choose_preset(v["name"]),
+        "library": lambda: setattr(work.library, "search", v["search"]),
+        "pick": lambda: desk.pick((v["x"], v["y"]), desk.select),
+        "object": lambda: desk.select(None if v["number"] < 0 else v["number"]),
+        "drop": lambda: desk.drop_preset(v["preset"], (v["x"], v["y"])),
+        "save_preset": lambda: _save_preset(desk, v["name"]),
         "turn": lambda: work.do(Turn(v["right"], v["up"])),
         "pan": lambda: work.do(Pan(v["right"], v["down"])),
         "zoom": lambda: work.do(Zoom(v["factor"], v["right"], v["down"])),
@@ -188,6 +204,12 @@ def _use_file(desk: Desk, kind: str, path: str) -> None:
     use_file(desk, kind, path)
 
 
+def _save_preset(desk: Desk, name: str) -> None:
+    from translucent.preview.answers import save_preset
+
+    save_preset(desk, name)
+
+
 def hold_pointer(desk: Desk) -> None:
     """Keep the mouse where the script has put it, whatever the system reports."""
     if desk.pointer is not None:
@@ -206,5 +228,5 @@ def _select(panel: str) -> None:
 
     window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(panel)
     if window is None:
-        raise InputError(f"panel {panel!r}", "there is none", "use Material, Method, Look, Files or Messages")
+        raise InputError(f"panel {panel!r}", "there is none", "use Material, Library, Method, Look, Files or Messages")
     window.focus_window_at_next_frame = True

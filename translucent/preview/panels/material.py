@@ -14,9 +14,9 @@ from translucent.formulas.color import to_hex
 from translucent.materials import TITLES, text_block
 from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
-from translucent.media.presets import presets
+from translucent.media.presets import grouped, presets
 from translucent.preview import numbers
-from translucent.preview.actions import Change, ChoosePreset
+from translucent.preview.actions import Assign, Change
 from translucent.preview.desk import (
     FAINT,
     WARNING,
@@ -30,6 +30,7 @@ from translucent.preview.desk import (
     wrapped,
 )
 from translucent.preview.document import SHOWN_UNITS, Material
+from translucent.preview.panels.library import told
 from translucent.preview.scenes import medium_of
 from translucent.units import metres_per_unit
 
@@ -43,7 +44,7 @@ swatches = lru_cache(maxsize=4)(numbers.swatches)
 
 def material_panel(desk: Desk) -> None:
     """Draw the panel."""
-    material = desk.work.document.material
+    material = desk.material
     _source(desk, material)
     imgui.separator_text("Volume")
     if begin_rows("volume"):
@@ -80,13 +81,17 @@ THICKNESS_TIP = "thicknessFactor: written to files, and the sheet of thin layers
 
 def _source(desk: Desk, material: Material) -> None:
     if begin_rows("source"):
-        row("preset")
+        if len(desk.objects) > 1:
+            _object(desk)
+        row("preset", "A named medium; the Library has them as pictures.")
         if imgui.begin_combo("##preset", material.preset or "none"):
-            for name, found in presets().items():
-                if imgui.selectable(f"{name}  ({found.kind})", name == material.preset)[0]:
-                    desk.work.do(ChoosePreset(name))
-                if imgui.is_item_hovered():
-                    imgui.set_tooltip("\n".join(x for x in (found.source, found.note, found.regime) if x))
+            for group, members in grouped(presets()).items():
+                imgui.text_colored(FAINT, group)
+                for each in members:
+                    if imgui.selectable(f"{each.name}  ({each.kind})", each.name == material.preset)[0]:
+                        desk.choose_preset(each.name)
+                    if imgui.is_item_hovered():
+                        imgui.set_tooltip(told(each))
             imgui.end_combo()
         words = {
             "file": "the model's own",
@@ -96,11 +101,32 @@ def _source(desk: Desk, material: Material) -> None:
         }
         fact("medium from", words[material.source])
         imgui.end_table()
-    if material.source == "preset":
-        found = presets()[material.preset]
+    if material.source == "preset" and (found := desk.work.library.find(material.preset)) is not None:
         wrapped(f"{found.kind}: {found.source}", FAINT)
         if found.warning:
             wrapped(found.warning, WARNING)
+
+
+def _object(desk: Desk) -> None:
+    """Draw the choice of the object that the panel is about."""
+    row("object", "Click one in the picture, or choose it here. Changes are then of its own material.")
+    every = "all without their own"
+    if imgui.begin_combo("##object", every if desk.target is None else _object_name(desk, desk.target)):
+        if imgui.selectable(every, desk.target is None)[0]:
+            desk.select(None)
+        for number in range(len(desk.objects)):
+            if imgui.selectable(f"{_object_name(desk, number)}##{number}", number == desk.target)[0]:
+                desk.select(number)
+        imgui.end_combo()
+    if desk.target is not None and desk.work.document.own_material(desk.target) is not None:
+        row("")
+        if imgui.button("No material of its own"):
+            desk.work.do(Assign(desk.target, None))
+
+
+def _object_name(desk: Desk, number: int) -> str:
+    own = " *" if desk.work.document.own_material(number) is not None else ""
+    return f"{desk.objects[number].mesh.name or f'object {number}'}{own}"
 
 
 def _color(desk: Desk, material: Material) -> None:

@@ -72,9 +72,6 @@ def _plan(plan: RenderPlan, timing: Timing) -> None:
 
 def _errors(desk: Desk) -> None:
     measured, unit = desk.work.measured, desk.get("display.unit")
-    if not desk.get("display.inset"):
-        wrapped("Tick 'reference inset' to measure.", FAINT)
-        return
     if measured is None or measured.scene is not desk.work.scene():
         wrapped("measured as soon as the view is still", FAINT)
     if measured is None:

@@ -12,6 +12,7 @@ from translucent.preview import numbers
 from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.desk import Desk, Probed, em
 from translucent.preview.measuring import Crossing
+from translucent.preview.panels.library import PRESET
 from translucent.preview.scales import thickest, worst
 from translucent.units import metres_per_unit
 
@@ -37,6 +38,7 @@ def viewport_panel(desk: Desk) -> None:
         imgui.set_cursor_screen_pos(corner)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
+    _take_dragged(desk, corner, room)
     _mouse(desk, corner, room)
     _keys(desk)
     over = imgui.get_window_draw_list()
@@ -47,6 +49,16 @@ def viewport_panel(desk: Desk) -> None:
     _probe(desk, over, corner, room)
     _status(desk, over, corner, room)
     over.pop_clip_rect()
+
+
+def _take_dragged(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
+    """Take a preset that is dragged from the library."""
+    if not imgui.begin_drag_drop_target():
+        return
+    if imgui.accept_drag_drop_payload_py_id(PRESET) is not None:
+        place = imgui.get_io().mouse_pos
+        desk.drop_preset(desk.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
+    imgui.end_drag_drop_target()
 
 
 def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
@@ -77,8 +89,8 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
         at = io.mouse_pos.x - corner.x - 0.5 * room.x, io.mouse_pos.y - corner.y - 0.5 * room.y
         desk.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
     moved = math.hypot(io.mouse_pos.x - desk.pressed_at[0], io.mouse_pos.y - desk.pressed_at[1])
-    if imgui.is_item_deactivated() and moved < em(0.3) and desk.probed is not None and desk.probed.crossing is not None:
-        desk.selected = desk.probed.crossing.body
+    if imgui.is_item_deactivated() and moved < em(0.3):
+        desk.pick(((io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y), desk.select)
     desk.hovered = None
     if imgui.is_item_hovered() and not imgui.is_any_mouse_down():
         desk.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
