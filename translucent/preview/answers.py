@@ -9,6 +9,7 @@ from translucent.gltf.load import SUFFIXES
 from translucent.gltf.write import write_medium
 from translucent.planning.caustics import Caustics
 from translucent.preview.actions import Change
+from translucent.preview.browser import with_recent
 from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
@@ -33,6 +34,7 @@ def take_answers(desk: Desk) -> None:
 def use_file(desk: Desk, kind: str, path: str) -> None:
     """Read or write a file, according to its dialog."""
     work = desk.work
+    desk.folders = with_recent(desk.folders, path)
     match kind:
         case "open":
             work.open(Model(path, desk.get("model.unit")))
@@ -42,6 +44,7 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
             work.save_session(path)
         case "environment" | "background":
             work.do(Change(f"look.{kind}", path))
+            desk.environments.take(path)
         case "save glb":
             _save_medium(desk, path)
         case "map":

@@ -5,9 +5,11 @@ row.
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,11 +17,15 @@ from imgui_bundle import hello_imgui, imgui
 
 from translucent.errors import TranslucentError
 from translucent.preview.actions import Assign, Change, ChoosePreset, changed_material, preset_material
-from translucent.preview.dialogs import open_dialog
+from translucent.preview.browser import Browser
+from translucent.preview.dialogs import browser_for, open_dialog
 from translucent.preview.document import RANGES, Material
+from translucent.preview.environments import EnvironmentFolder
 from translucent.preview.measuring import Crossing, Measured
+from translucent.preview.picturing import model_key, model_picture
 from translucent.preview.scenes import material_of, method_of
 from translucent.preview.stage import Stage
+from translucent.preview.tips import TIPS
 from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import fillable
@@ -62,6 +68,11 @@ class Desk:
     export: dict[str, Any] = field(default_factory=lambda: {"transparent": False, "pictures": 36})
     baking: dict[str, Any] = field(default_factory=lambda: {"mode": "cone", "size": 512, "rays": 64})
     dragged: str = ""
+    browser: Browser | None = None
+    folders: list[str] = field(default_factory=list)
+    environments: EnvironmentFolder = field(default_factory=EnvironmentFolder)
+    keys_shown: bool = False
+    kept_of: str = ""
     _textures: dict[str, Any] = field(default_factory=dict)
     _inset: tuple[Any, Any] | None = None
     _measured_for: object = None
@@ -164,6 +175,8 @@ class Desk:
         more = self.stage.draw(self.work, pixels)
         self.drawn = not more
         self.work.shelf.begin_frame(idle=not more)
+        if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
+            self._keep_picture()
         scene = self.work.scene()
         wanted = (scene, self.work.document.display.method, self.work.document.display.compare)
         if wanted != self._measured_for:
@@ -199,13 +212,44 @@ class Desk:
         self.change("look.light_yaw", math.remainder(self.get("look.light_yaw") + right, 360.0))
         self.change("look.light_pitch", min(max(self.get("look.light_pitch") + up, -89.0), 89.0))
 
-    def ask_file(self, kind: str) -> None:
-        """Ask for a file to read or to write, in a dialog of the system."""
-        dialog = open_dialog(kind)
+    def ask_file(self, kind: str, *, system: bool = True) -> None:
+        """Ask for a file to read or to write: in a dialog of the system, or where it has none in the browser."""
+        dialog = open_dialog(kind) if system else None
         if dialog is not None:
             self.dialogs.append((kind, dialog))
         else:
-            self.work.tell("error", "no file dialog here: drop files on the window, or name them when starting")
+            folder = self.environments.path if kind in ("environment", "background") else ""
+            places = [place for place in (folder, *self.folders, *self.places()) if os.path.isdir(place)]
+            self.browser = browser_for(kind, Path(places[0]))
+
+    def places(self) -> list[str]:
+        """Folders to begin with: recent ones, that of the model, the working folder and the user's own."""
+        model = self.get("model.path")
+        own = str(Path(model).resolve().parent) if os.path.isfile(model) else ""
+        return [one for one in dict.fromkeys((*self.folders, own, os.getcwd(), str(Path.home()))) if os.path.isdir(one)]
+
+    def light_with(self, name: str) -> None:
+        """Light the model with an environment."""
+        self.change("look.environment", name, step=True)
+
+    def escape(self) -> None:
+        """Close what is on top: the file browser, the page of keys, or let go of the selected object."""
+        if self.browser is not None:
+            self.browser = None
+        elif self.keys_shown:
+            self.keys_shown = False
+        else:
+            self.select(None)
+
+    def _keep_picture(self) -> None:
+        """Keep a small picture of a model's first resting view, for the list of recent files."""
+        path = self.get("model.path")
+        if self.kept_of == path or not os.path.isfile(path) or not self.work.document.display.pictured:
+            return
+        self.kept_of = path
+        with self.stage.current():
+            seen = self.stage.viewport.pixels()
+        self.work.shelf.put(model_key(path), model_picture(seen))
 
     def texture(self, key: str, pixels: Any) -> Any:
         """Texture of a small picture."""
@@ -246,8 +290,7 @@ def row(label: str, tip: str = "") -> None:
     imgui.table_next_column()
     imgui.align_text_to_frame_padding()
     imgui.text(label)
-    if tip and imgui.is_item_hovered():
-        imgui.set_tooltip(tip)
+    tooltip(tip)
     imgui.table_next_column()
     imgui.set_next_item_width(-1.0)
 
@@ -256,9 +299,11 @@ def slider(
     desk: Desk, label: str, name: str, low: float, high: float, form: str = "%.3f", *, log: bool = False, tip: str = ""
 ) -> None:
     """Slider for a number of the document."""
-    row(label, tip)
+    row(label, tip or TIPS.get(name, ""))
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
     changed, value = imgui.slider_float(f"##{name}", float(desk.get(name)), low, high, form, flags)
+    if not imgui.is_item_active():
+        tooltip(tip or TIPS.get(name, ""))
     if imgui.is_item_activated():
         desk.drag += 1
     if changed and math.isfinite(value):
@@ -267,7 +312,7 @@ def slider(
 
 def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
     """Fields for three numbers of the document, at least 0, on a line of their own; not in a table."""
-    wide_row(label, tip)
+    wide_row(label, tip or TIPS.get(name, ""))
     value = list(desk.get(name))
     changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
     if imgui.is_item_activated():
@@ -278,7 +323,7 @@ def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", 
 
 def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
     """Choice of one of some words."""
-    row(label, tip)
+    row(label, tip or TIPS.get(name, ""))
     now = desk.get(name)
     if imgui.begin_combo(f"##{name}", str(now)):
         for word in words:
@@ -287,17 +332,25 @@ def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: st
         imgui.end_combo()
 
 
+def tooltip(text: str) -> None:
+    """Draw a wrapped tooltip while the mouse is over the last item."""
+    if text and imgui.is_item_hovered() and imgui.begin_tooltip():
+        imgui.push_text_wrap_pos(em(30.0))
+        imgui.text(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+
+
 def wide_row(label: str, tip: str = "") -> None:
     """Label of a field on the whole line below it, outside a table."""
     imgui.text(label)
-    if tip and imgui.is_item_hovered():
-        imgui.set_tooltip(tip)
+    tooltip(tip)
     imgui.set_next_item_width(-1.0)
 
 
 def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:
     """Checkbox."""
-    row(label, tip)
+    row(label, tip or TIPS.get(name, ""))
     changed, value = imgui.checkbox(f"##{name}", bool(desk.get(name)))
     if changed:
         desk.change(name, value, step=True)

@@ -12,6 +12,8 @@ from typing import Any
 import imgui_bundle
 from imgui_bundle import hello_imgui, portable_file_dialogs
 
+from translucent.preview.browser import Browser
+
 MODELS = ["Models", "*.glb *.gltf *.obj *.stl *.ply *.off", "All files", "*"]
 SESSIONS = ["Sessions", "*.toml", "All files", "*"]
 PANORAMAS = ["Pictures of all directions", "*.hdr *.exr *.png *.jpg", "All files", "*"]
@@ -39,6 +41,12 @@ def open_dialog(kind: str) -> Any | None:
     if proposed is None:
         return portable_file_dialogs.open_file(title, "", kinds)
     return portable_file_dialogs.save_file(title, proposed, kinds)
+
+
+def browser_for(kind: str, folder: Path) -> Browser:
+    """Browser of our own for a kind of dialog."""
+    title, proposed, kinds = QUESTIONS[kind]
+    return Browser(kind, title, tuple(kinds[1].split()), proposed is not None, folder, proposed or "")
 
 
 def answer(dialog: Any) -> str | None:

@@ -29,8 +29,8 @@ from translucent.version import VERSION
 
 Picture = npt.NDArray[np.uint8]
 
-#: Sides in pixels of pictures of media, and of environments.
-BALL, PANORAMA = (96, 96), (128, 64)
+#: Sides in pixels of pictures of media, environments and models.
+BALL, PANORAMA, MODEL = (96, 96), (128, 64), (120, 80)
 
 #: Radius of the ball in metres: a body of some centimetres, for which most media are known.
 RADIUS = 0.01
@@ -90,6 +90,13 @@ def draw_panorama(report: Report, name: str) -> Picture:
 def _encoded(light: Array) -> Picture:
     with np.errstate(under="ignore"):
         return np.rint(255.0 * np.clip(linear_to_srgb(tone_curve(STAGED_TONE)(light)), 0.0, 1.0)).astype(np.uint8)
+
+
+def model_picture(seen: Picture) -> Picture:
+    """Small picture of a view, from its middle."""
+    from PIL import Image, ImageOps
+
+    return np.asarray(ImageOps.fit(Image.fromarray(seen), MODEL, Image.Resampling.BOX))
 
 
 @lru_cache(maxsize=1)

@@ -3,10 +3,12 @@
 Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
 (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
 ``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: shares of the viewport),
-``save_preset`` (name). Of objects: ``pick`` (x, y: shares of the viewport), ``object`` (number; -1: none). Of the
-window: ``probe`` (x, y: shares of the viewport), ``select`` (panel), ``wait`` (seconds; without them, until nothing is
-under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point``
-(x, y: shares of the window), ``press``, ``release`` (button), ``wheel`` (steps).
+``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own browser, and
+``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of objects: ``pick`` (x,
+y: shares of the viewport), ``object`` (number; -1: none). Of the window: ``probe`` (x, y: shares of the viewport),
+``select`` (panel), ``wait`` (seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size,
+rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``,
+``release`` (button), ``wheel`` (steps).
 """
 
 from __future__ import annotations
@@ -35,6 +37,9 @@ PAUSE = 0.03
 #: Frames between two actions, so that changes are drawn before the next one.
 FRAMES = 2
 
+#: Names of panels.
+PANELS = ("Material", "Library", "Method", "Look", "Environments", "Files", "Messages")
+
 _WORDS: dict[str, dict[str, Any]] = {
     "change": {"field": str, "value": object},
     "open": {"model": str, "unit": "m"},
@@ -47,6 +52,11 @@ _WORDS: dict[str, dict[str, Any]] = {
     "object": {"number": -1},
     "drop": {"preset": str, "x": 0.5, "y": 0.5},
     "save_preset": {"name": str},
+    "ask": {"kind": str},
+    "answer": {"file": str},
+    "environments": {"folder": str},
+    "key": {"name": str},
+    "type": {"text": str},
     "undo": {},
     "redo": {},
     "frame": {},
@@ -178,6 +188,11 @@ def perform(desk: Desk, step: Step) -> None:
         "object": lambda: desk.select(None if v["number"] < 0 else v["number"]),
         "drop": lambda: desk.drop_preset(v["preset"], (v["x"], v["y"])),
         "save_preset": lambda: _save_preset(desk, v["name"]),
+        "ask": lambda: _ask(desk, v["kind"]),
+        "answer": lambda: _answer(desk, v["file"]),
+        "environments": lambda: desk.environments.take(v["folder"]),
+        "key": lambda: _press(v["name"]),
+        "type": lambda: _io().add_input_characters_utf8(v["text"]),
         "turn": lambda: work.do(Turn(v["right"], v["up"])),
         "pan": lambda: work.do(Pan(v["right"], v["down"])),
         "zoom": lambda: work.do(Zoom(v["factor"], v["right"], v["down"])),
@@ -204,6 +219,37 @@ def _use_file(desk: Desk, kind: str, path: str) -> None:
     use_file(desk, kind, path)
 
 
+def _ask(desk: Desk, kind: str) -> None:
+    from translucent.preview.dialogs import QUESTIONS
+
+    if kind not in QUESTIONS:
+        raise InputError(f"ask {kind!r}", "there is no such question", f"use one of {', '.join(QUESTIONS)}")
+    desk.ask_file(kind, system=False)
+
+
+def _answer(desk: Desk, path: str) -> None:
+    from translucent.preview.panels.browser import answer
+
+    if desk.browser is None:
+        raise InputError(f"answer {path!r}", "nothing is asked", "ask first")
+    desk.browser.text = path
+    answer(desk)
+
+
+def _press(name: str) -> None:
+    """Press and release a key, with modifiers before a plus sign, such as ``ctrl+z``."""
+    from imgui_bundle import imgui
+
+    words = name.lower().split("+")
+    modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift, "alt": imgui.Key.mod_alt}
+    keys = [modifiers.get(word) or getattr(imgui.Key, word, None) for word in words]
+    if None in keys:
+        raise InputError(f"key {name!r}", "there is none of that name", "write for example escape, f1 or ctrl+z")
+    for down in (True, False):  # one after the other, in as many frames
+        for key in keys:
+            _io().add_key_event(key, down)
+
+
 def _save_preset(desk: Desk, name: str) -> None:
     from translucent.preview.answers import save_preset
 
@@ -228,5 +274,7 @@ def _select(panel: str) -> None:
 
     window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(panel)
     if window is None:
-        raise InputError(f"panel {panel!r}", "there is none", "use Material, Library, Method, Look, Files or Messages")
+        raise InputError(
+            f"panel {panel!r}", "there is none", "use Material, Library, Method, Look, Environments, Files or Messages"
+        )
     window.focus_window_at_next_frame = True

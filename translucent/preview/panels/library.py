@@ -6,7 +6,7 @@ from imgui_bundle import ImVec2, imgui
 
 from translucent.media.preset import Preset
 from translucent.preview.answers import save_preset
-from translucent.preview.desk import FAINT, Desk, em, wrapped
+from translucent.preview.desk import FAINT, Desk, em, tooltip, wrapped
 from translucent.preview.picturing import ball_key, draw_ball
 
 #: Widths of a card and the space between two, in ems.
@@ -43,8 +43,7 @@ def library_panel(desk: Desk) -> None:
     desk.texts["preset"] = text
     imgui.same_line()
     pressed = imgui.button("Save preset")
-    if imgui.is_item_hovered():
-        imgui.set_tooltip(f"{SAVE_TIP}\n{library.folder}")
+    tooltip(f"{SAVE_TIP}\n{library.folder}")
     if (entered or pressed) and text.strip() and save_preset(desk, text):
         desk.texts["preset"] = ""
 
@@ -73,8 +72,8 @@ def _card(desk: Desk, one: Preset, size: ImVec2) -> None:
         imgui.set_drag_drop_payload_py_id(PRESET, 0)
         imgui.text(one.name.replace("_", " "))
         imgui.end_drag_drop_source()
-    elif hovered:
-        imgui.set_tooltip(told(one))
+    else:
+        tooltip(told(one))
     over = imgui.get_window_draw_list()
     high = ImVec2(low.x + size.x, low.y + size.x)
     picture = desk.work.shelf.picture(ball_key(one), draw_ball, one)

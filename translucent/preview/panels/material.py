@@ -26,12 +26,14 @@ from translucent.preview.desk import (
     fact,
     row,
     slider,
+    tooltip,
     triple,
     wrapped,
 )
 from translucent.preview.document import SHOWN_UNITS, Material
 from translucent.preview.panels.library import told
 from translucent.preview.scenes import medium_of
+from translucent.preview.tips import TIPS
 from translucent.units import metres_per_unit
 
 #: Colors of curves: red, green and blue that are told apart on a dark background.
@@ -52,16 +54,16 @@ def material_panel(desk: Desk) -> None:
         imgui.end_table()
     _distance(desk, material)
     if begin_rows("thickness"):
-        slider(desk, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True, tip=THICKNESS_TIP)
+        slider(desk, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True)
         imgui.end_table()
     _swatches(desk, material)
     _curves(desk, material)
     imgui.separator_text("Surface")
     if begin_rows("surface"):
-        slider(desk, "ior", "material.ior", 1.0, 2.5, "%.3f", tip="Index of refraction; 1: light goes straight on.")
+        slider(desk, "ior", "material.ior", 1.0, 2.5, "%.3f")
         slider(desk, "roughness", "material.roughness", 0.0, 1.0)
         slider(desk, "transmission", "material.transmission", 0.0, 1.0)
-        slider(desk, "dispersion", "material.dispersion", 0.0, 10.0, tip="20 / Abbe number.")
+        slider(desk, "dispersion", "material.dispersion", 0.0, 10.0)
         imgui.end_table()
     imgui.separator_text("Scattering and emission")
     triple(desk, "absorption, 1/m", "material.absorption", 0.5)
@@ -76,9 +78,6 @@ def material_panel(desk: Desk) -> None:
     _copies(desk, material)
 
 
-THICKNESS_TIP = "thicknessFactor: written to files, and the sheet of thin layers. The picture uses the mesh's own."
-
-
 def _source(desk: Desk, material: Material) -> None:
     if begin_rows("source"):
         if len(desk.objects) > 1:
@@ -90,8 +89,7 @@ def _source(desk: Desk, material: Material) -> None:
                 for each in members:
                     if imgui.selectable(f"{each.name}  ({each.kind})", each.name == material.preset)[0]:
                         desk.choose_preset(each.name)
-                    if imgui.is_item_hovered():
-                        imgui.set_tooltip(told(each))
+                    tooltip(told(each))
             imgui.end_combo()
         words = {
             "file": "the model's own",
@@ -130,7 +128,7 @@ def _object_name(desk: Desk, number: int) -> str:
 
 
 def _color(desk: Desk, material: Material) -> None:
-    row("attenuationColor", "Linear color that is left of white light after attenuationDistance.")
+    row("attenuationColor", TIPS["material.color"])
     shown = list(numbers.to_display(material.color))
     flags = imgui.ColorEditFlags_.display_hex | imgui.ColorEditFlags_.picker_hue_wheel
     changed, encoded = imgui.color_edit3("##color", shown, flags)
@@ -164,6 +162,7 @@ def _distance(desk: Desk, material: Material) -> None:
     unit = desk.get("display.unit")
     scale = metres_per_unit(unit)
     imgui.text("attenuationDistance")
+    tooltip(TIPS["material.distance"])
     imgui.set_next_item_width(-em(4.2))
     flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
     changed, value = imgui.slider_float(

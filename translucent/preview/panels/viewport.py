@@ -19,6 +19,9 @@ from translucent.units import metres_per_unit
 #: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
 DEGREES, WHEEL = 270.0, 1.15
 
+#: sRGB colors of the largest differences, as in ``present/compare.frag``.
+THINNER, THICKER = (0.13, 0.40, 0.80), (0.80, 0.15, 0.18)
+
 WHITE, BLACK, SHADE = 0xFFFFFFFF, 0xFF000000, 0xB0181818
 
 
@@ -40,7 +43,6 @@ def viewport_panel(desk: Desk) -> None:
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
     _take_dragged(desk, corner, room)
     _mouse(desk, corner, room)
-    _keys(desk)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
     _split(desk, over, corner, room)
@@ -96,26 +98,6 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
         desk.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
 
 
-def _keys(desk: Desk) -> None:
-    io = imgui.get_io()
-    if io.want_text_input:
-        return
-    if imgui.is_key_pressed(imgui.Key.f):
-        desk.frame()
-    if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
-        desk.change("display.converge", not desk.get("display.converge"), step=True)
-    if imgui.is_key_pressed(imgui.Key.p):
-        desk.change("display.caustics", not desk.get("display.caustics"), step=True)
-    if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
-        (desk.work.redo if io.key_shift else desk.work.undo)()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
-        desk.work.redo()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o):
-        desk.ask_file("open")
-    elif imgui.is_key_pressed(imgui.Key.o) and desk.work.document.orbit is not None:
-        desk.change("orbit.orthographic", not desk.get("orbit.orthographic"), step=True)
-
-
 def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     display = desk.work.document.display
     if display.compare == "off":
@@ -140,15 +122,34 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     _label(over, ImVec2(max(x - width - em(0.8), corner.x + em(0.3)), top), left)
     _label(over, ImVec2(min(x + em(0.8), corner.x + room.x - imgui.calc_text_size(name).x - em(0.5)), top), name)
     if display.compare == "error" and desk.stage.has_truth():
-        most = worst(desk.work) / metres_per_unit(display.unit)
-        lines = (
-            f"blue: {most:.2g} {display.unit} thinner",
-            f"red: {most:.2g} {display.unit} thicker",
-            "orange: not valid",
-        )
-        for i, line in enumerate(lines, 1):
-            rightmost = corner.x + room.x - imgui.calc_text_size(line).x - em(0.5)
-            _label(over, ImVec2(min(x + em(0.8), rightmost), top + em(1.6) * i), line)
+        _error_scale(desk, over, ImVec2(corner.x + room.x, corner.y + room.y))
+
+
+def _error_scale(desk: Desk, over: imgui.ImDrawList, end: ImVec2) -> None:
+    """Draw the scale of differences of thickness in the lower right corner."""
+    unit = desk.get("display.unit")
+    most = worst(desk.work) / metres_per_unit(unit)
+    width, height, line = em(14.0), em(0.8), imgui.get_text_line_height()
+    left, top = end.x - width - em(1.4), end.y - em(1.6) - height - line
+    over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
+    over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: not valid")
+    parts = 48
+    for i in range(parts):
+        red, green, blue = (int(255 * v) for v in error_color(2.0 * (i + 0.5) / parts - 1.0))
+        begin, stop = left + width * i / parts, left + width * (i + 1) / parts
+        color = 0xFF000000 | blue << 16 | green << 8 | red
+        over.add_rect_filled(ImVec2(begin, top), ImVec2(stop + 1.0, top + height), color)
+    for share, text in ((0.0, f"-{most:.2g}"), (0.5, "0"), (1.0, f"+{most:.2g}")):
+        wide = imgui.calc_text_size(text).x
+        over.add_text(ImVec2(left + share * (width - wide), top + height), WHITE, text)
+
+
+def error_color(share: float) -> tuple[float, float, float]:
+    """sRGB color of a difference of thickness, -1 to 1 of the largest, as ``present/compare.frag`` shows it."""
+    end = THINNER if share < 0.0 else THICKER
+    mixed = math.sqrt(min(abs(share), 1.0))
+    red, green, blue = (0.95 + mixed * (channel - 0.95) for channel in end)
+    return red, green, blue
 
 
 def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
