@@ -19,6 +19,7 @@ from translucent.preview.document import Document, Material, Orbit
 from translucent.preview.history import History
 from translucent.preview.library import Library
 from translucent.preview.loaded import Loaded
+from translucent.preview.recipes import Shot, command_line, python_code
 from translucent.preview.scenes import material_of, medium_of, scene_of
 from translucent.preview.session import from_table, load_session, save_session, to_table
 from translucent.preview.shelf import Shelf
@@ -212,3 +213,26 @@ def test_a_preset_on_the_selected_object_leaves_the_others(work: Workspace) -> N
     desk.choose_preset("no such")
     assert "not a known preset" in work.messages[-1].text
     wait(work, lambda: True)
+
+
+def test_a_recipe_says_the_materials_of_single_objects(work: Workspace) -> None:
+    loaded = dataclasses.replace(two_bodies(), model=work.document.model)
+    names = ("cup", "wine", "cup")
+    objects = [
+        dataclasses.replace(item, mesh=dataclasses.replace(item.mesh, name=name))
+        for item, name in zip(loaded.scene.objects, names, strict=True)
+    ]
+    loaded = dataclasses.replace(loaded, scene=dataclasses.replace(loaded.scene, objects=objects))
+    work._keep(loaded)
+    for number in (1, 2):
+        work.do(Assign(number, preset_material(Material(), "merlot")))
+    scene = work.scene()
+    assert scene is not None
+    shot = Shot(work.document, loaded, scene, (48, 32))
+    text, left_out = command_line(shot)
+    assert "--object wine --preset merlot" in text
+    assert left_out == ["the material of object 2"]
+    code = python_code(shot)
+    assert "[scene.objects[1]])" in code
+    assert "if item is scene.objects[2] else item" in code
+    compile(code, "recipe", "exec")

@@ -124,8 +124,15 @@ def _save_medium(desk: Desk, path: str) -> None:
     if Path(source).suffix.lower() not in SUFFIXES:
         do = "copy the medium as glTF, or export the model as .glb first"
         return desk.work.refuse(InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do))
-    medium = medium_of(material)
-    outside = desk.work.allow_outside
-    return desk.work.write(
-        path, lambda to: write_medium(source, to, medium, distance=material.distance, allow_outside=outside)
-    )
+    outside, document = desk.work.allow_outside, desk.work.document
+    named = [(desk.objects[one.object].mesh.name, one.material) for one in document.assigned]
+    whole = [] if named and material.source == "file" else [(None, material)]
+
+    def write(to: str) -> None:
+        begun = source
+        for name, one in (*whole, *named):
+            medium = medium_of(one)
+            write_medium(begun, to, medium, distance=one.distance, object_name=name, allow_outside=outside)
+            begun = to
+
+    return desk.work.write(path, write)

@@ -103,8 +103,9 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     if display.compare == "off":
         return
     x = corner.x + display.split * room.x
-    over.add_line(ImVec2(x, corner.y), ImVec2(x, corner.y + room.y), WHITE, em(0.1))
-    over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45), WHITE)
+    for color, wide in ((BLACK, 0.12), (WHITE, 0.0)):  # seen on every background
+        over.add_line(ImVec2(x, corner.y), ImVec2(x, corner.y + room.y), color, em(0.1 + wide))
+        over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45 + 0.5 * wide), color)
     plans = desk.stage.plans
     left = type(plans[0].method).__name__ if plans[0] is not None else display.method
     right = {"method": display.method_b, "reference": "float64 reference", "error": "thickness less the reference"}
@@ -119,8 +120,10 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
             name += f", 1/{truth.level} so far"
     top = corner.y + em(0.4)
     width = imgui.calc_text_size(left).x
-    _label(over, ImVec2(max(x - width - em(0.8), corner.x + em(0.3)), top), left)
-    _label(over, ImVec2(min(x + em(0.8), corner.x + room.x - imgui.calc_text_size(name).x - em(0.5)), top), name)
+    if x - corner.x > width + em(1.2):  # a side that is too narrow for its name has none
+        _label(over, ImVec2(x - width - em(0.8), top), left)
+    if corner.x + room.x - x > imgui.calc_text_size(name).x + em(1.2):
+        _label(over, ImVec2(x + em(0.8), top), name)
     if display.compare == "error" and desk.stage.has_truth():
         _error_scale(desk, over, ImVec2(corner.x + room.x, corner.y + room.y))
 
@@ -129,7 +132,7 @@ def _error_scale(desk: Desk, over: imgui.ImDrawList, end: ImVec2) -> None:
     """Draw the scale of differences of thickness in the lower right corner."""
     unit = desk.get("display.unit")
     most = worst(desk.work) / metres_per_unit(unit)
-    width, height, line = em(14.0), em(0.8), imgui.get_text_line_height()
+    width, height, line = em(18.0), em(0.8), imgui.get_text_line_height()
     left, top = end.x - width - em(1.4), end.y - em(1.6) - height - line
     over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
     over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: not valid")
