@@ -16,6 +16,7 @@ from translucent.preview import preferences
 from translucent.preview.browser import Browser, with_recent
 from translucent.preview.document import Display, Look, Material, Orbit
 from translucent.preview.environments import EnvironmentFolder, title
+from translucent.preview.orbiting import camera_of
 from translucent.preview.picturing import model_key, model_picture
 from translucent.preview.tips import TIPS
 from translucent.preview.workspace import Workspace
@@ -185,6 +186,18 @@ def test_every_knob_is_explained() -> None:
         assert "glTF" in TIPS[f"material.{name}"]
         if name != "color":
             assert "Typical" in TIPS[f"material.{name}"]
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_the_selected_object_is_marked_where_it_is_seen(orthographic: bool) -> None:
+    viewport = pytest.importorskip("translucent.preview.panels.viewport", reason="the extra 'ui' is not installed")
+    camera = camera_of(Orbit((0.0, 0.0, 0.0), 0.0, 0.0, 2.0, 90.0, orthographic))
+    box = np.array([[-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]])  # at a distance of 2, where the picture is 4 high
+    places = viewport.on_screen(camera, box, (400.0, 200.0))
+    np.testing.assert_allclose(places.min(axis=0), (175.0, 50.0), atol=1e-9)
+    np.testing.assert_allclose(places.max(axis=0), (225.0, 100.0), atol=1e-9)
+    if not orthographic:
+        assert viewport.on_screen(camera, box + [0.0, 0.0, 3.0], (400.0, 200.0)) is None
 
 
 def test_the_scale_of_errors_has_the_colors_of_the_picture() -> None:

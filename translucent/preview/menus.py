@@ -8,7 +8,7 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 
 from translucent.assets import mesh_names
 from translucent.errors import shortened
-from translucent.preview.desk import Desk, em
+from translucent.preview.desk import Desk, em, tooltip
 from translucent.preview.document import Model
 from translucent.preview.picturing import model_key
 from translucent.units import METRES_PER_UNIT
@@ -75,8 +75,7 @@ def _recent(desk: Desk, path: str, unit: str) -> None:
     imgui.same_line()
     if imgui.menu_item(f"{Path(path).name}\n{shortened(str(Path(path).parent), 60)}##{path}", "", False, True)[0]:
         desk.work.open(Model(path, unit))
-    if imgui.is_item_hovered():
-        imgui.set_tooltip(path)
+    tooltip(path)
 
 
 def status(desk: Desk) -> None:

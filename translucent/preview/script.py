@@ -259,8 +259,12 @@ def _save_preset(desk: Desk, name: str) -> None:
 def hold_pointer(desk: Desk) -> None:
     """Keep the mouse where the script has put it, whatever the system reports."""
     if desk.pointer is not None:
+        from translucent.preview.dialogs import move_pointer
+
         size = _io().display_size
-        _io().add_mouse_pos_event(desk.pointer[0] * size.x, desk.pointer[1] * size.y)
+        place = desk.pointer[0] * size.x, desk.pointer[1] * size.y
+        move_pointer(*place)
+        _io().add_mouse_pos_event(*place)
 
 
 def _io() -> Any:

@@ -7,13 +7,16 @@ import math
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from translucent.arrays import Array
 from translucent.frames.aovs import false_colors, marks
 from translucent.preview import numbers
 from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.desk import Desk, Probed, em
 from translucent.preview.measuring import Crossing
+from translucent.preview.orbiting import camera_of
 from translucent.preview.panels.library import PRESET
 from translucent.preview.scales import thickest, worst
+from translucent.scene.camera import Camera
 from translucent.units import metres_per_unit
 
 #: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
@@ -45,6 +48,7 @@ def viewport_panel(desk: Desk) -> None:
     _mouse(desk, corner, room)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
+    _selected(desk, over, corner, room)
     _split(desk, over, corner, room)
     _scale(desk, over, corner, room)
     _inset(desk, over, corner, room)
@@ -96,6 +100,38 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
     desk.hovered = None
     if imgui.is_item_hovered() and not imgui.is_any_mouse_down():
         desk.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
+
+
+def _selected(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """Draw the corners of the selected object's box, and its name."""
+    orbit = desk.work.document.orbit
+    if desk.target is None or orbit is None:
+        return
+    item, camera = desk.objects[desk.target], camera_of(orbit)
+    places = on_screen(camera, item.bounds, (room.x, room.y))
+    if places is None:
+        return
+    low, high = places.min(axis=0), places.max(axis=0)
+    side = em(0.9)
+    for x, right in ((low[0], 1.0), (high[0], -1.0)):
+        for y, down in ((low[1], 1.0), (high[1], -1.0)):
+            at = ImVec2(corner.x + x, corner.y + y)
+            for color, wide in ((BLACK, 0.25), (WHITE, 0.1)):
+                over.add_line(at, ImVec2(at.x + right * side, at.y), color, em(wide))
+                over.add_line(at, ImVec2(at.x, at.y + down * side), color, em(wide))
+    _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), item.mesh.name or f"object {desk.target}")
+
+
+def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array | None:
+    """Places (8, 2) of a box's corners in a picture, right and down in pixels; None if one is behind the camera."""
+    corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    local = (corners - camera.eye) @ np.stack([camera.right, camera.up, camera.forward], axis=1)
+    half = np.array(camera.half_extent((max(int(size[0]), 1), max(int(size[1]), 1))))
+    if camera.fov_y is not None:
+        if local[:, 2].min() <= 0.0:
+            return None
+        half = half * local[:, 2:]
+    return np.asarray((local[:, :2] / half * (1.0, -1.0) + 1.0) / 2.0 * size)
 
 
 def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
