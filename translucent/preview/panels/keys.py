@@ -59,7 +59,7 @@ def keys_page(desk: Desk) -> None:
 def handle_keys(desk: Desk) -> None:
     """Do what keys ask for; not while somebody types."""
     io = imgui.get_io()
-    if imgui.is_key_pressed(imgui.Key.escape, False) and not _lists_open(desk):
+    if imgui.is_key_pressed(imgui.Key.escape, False) and not _closes_itself(desk):
         desk.escape()
     if io.want_text_input or desk.browser is not None:
         return
@@ -83,7 +83,8 @@ def handle_keys(desk: Desk) -> None:
         desk.change("orbit.orthographic", not desk.get("orbit.orthographic"), step=True)
 
 
-def _lists_open(desk: Desk) -> bool:
-    """Whether a menu or a list is open, which closes itself."""
+def _closes_itself(desk: Desk) -> bool:
+    """Whether Escape is for a menu, a list or a field that is being typed in, which see to it themselves."""
     own = desk.browser is not None or desk.keys_shown
-    return not own and imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    typing = imgui.get_io().want_text_input
+    return not own and (typing or imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
