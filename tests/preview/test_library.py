@@ -19,6 +19,7 @@ from translucent.preview.document import Document, Material, Orbit
 from translucent.preview.history import History
 from translucent.preview.library import Library
 from translucent.preview.loaded import Loaded
+from translucent.preview.measuring import first_object
 from translucent.preview.recipes import Shot, command_line, python_code
 from translucent.preview.scenes import material_of, medium_of, scene_of
 from translucent.preview.session import from_table, load_session, save_session, to_table
@@ -175,6 +176,17 @@ def test_an_object_may_have_a_material_of_its_own(tmp_path: Path) -> None:
     assert load_session(tmp_path / "a.toml") == document
     assert apply(document, Assign(1, None)).assigned == ()
     assert apply(document, Open("other.glb")).assigned == ()
+
+
+def test_the_object_under_the_mouse_is_the_first_on_its_ray() -> None:
+    ball = tl.Mesh(np.eye(4, 3) - 0.25, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    nearer = np.eye(4)
+    nearer[2, 3] = 2.0
+    objects = [tl.Object(ball, tl.Medium(1.0)), tl.Object(ball, None, nearer)]
+    scene = tl.Scene(objects, tl.Camera.look_at((0, 0, 9), (0, 0, 0)))
+    assert first_object(scene, (161, 97), (80, 48)) == 1
+    assert first_object(scene, (161, 97), (0, 0)) is None
+    assert first_object(dataclasses.replace(scene, objects=objects[:1]), (161, 97), (80, 48)) == 0
 
 
 def test_a_drag_on_an_object_is_one_step() -> None:

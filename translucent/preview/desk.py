@@ -21,7 +21,7 @@ from translucent.preview.browser import Browser
 from translucent.preview.dialogs import browser_for, open_dialog
 from translucent.preview.document import RANGES, Material
 from translucent.preview.environments import EnvironmentFolder
-from translucent.preview.measuring import Crossing, Measured
+from translucent.preview.measuring import Crossing, Measured, first_object
 from translucent.preview.picturing import model_key, model_picture
 from translucent.preview.scenes import material_of, method_of
 from translucent.preview.stage import Stage
@@ -32,6 +32,9 @@ from translucent.scene.showcase import fillable
 
 #: Seconds without movement after which a view counts as still.
 STILL = 0.25
+
+#: Largest number of triangles among which a thread finds the one under the mouse; else a worker process does.
+PICKED_AT_ONCE = 200_000
 
 #: sRGB colors of warnings, errors and secondary lines.
 WARNING, ERROR, FAINT = (1.0, 0.75, 0.35, 1.0), (1.0, 0.45, 0.35, 1.0), (0.62, 0.64, 0.68, 1.0)
@@ -151,11 +154,14 @@ class Desk:
         if scene is None:
             return
 
-        def take(found: Crossing) -> None:
-            then(found.body if found.body is not None and found.body < len(self.objects) else None)
+        def take(found: int | None) -> None:
+            then(found if found is not None and found < len(self.objects) else None)
 
-        pixel = tuple(min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
-        self.work.cross(scene, size, pixel, take)  # type: ignore[arg-type]
+        x, y = (min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
+        if self.work.loaded is not None and self.work.loaded.triangles <= PICKED_AT_ONCE:
+            self.work.lanes["ray"].start("", lambda _: first_object(scene, size, (x, y)), take)
+        else:
+            self.work.cross(scene, size, (x, y), lambda found: take(found.body))
 
     def select(self, number: int | None) -> None:
         """Select an object, or none."""
