@@ -65,7 +65,8 @@ def preview(display: str, tmp_path: Path) -> Preview:
         (tmp_path / "script.toml").write_text(script or '[[action]]\ndo = "frame"\n')
         command = [sys.executable, "-m", "translucent", "preview", *arguments, "--size", "640x480", "--json"]
         command += ["--script", str(tmp_path / "script.toml"), "--screenshot", str(tmp_path / "window.png")]
-        environment = {**os.environ, "DISPLAY": display, "XDG_CONFIG_HOME": str(tmp_path)}
+        folders = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_CACHE_HOME"), str(tmp_path))
+        environment = {**os.environ, "DISPLAY": display, **folders}
         return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment, check=False)
 
     return run

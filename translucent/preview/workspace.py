@@ -18,20 +18,21 @@ from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, SetOrbit
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
-from translucent.preview.document import Display, Document, Model, Orbit
+from translucent.preview.document import Display, Document, Model
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
+from translucent.preview.library import Library
 from translucent.preview.lighting import Lighting, prepare
 from translucent.preview.loaded import Loaded
 from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
 from translucent.preview.scenes import load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
-from translucent.preview.staging import own_material, stage_name
+from translucent.preview.shelf import Shelf
+from translucent.preview.staging import first_orbit, own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
 from translucent.preview.worker import PARTING, Companion, in_a_process
 from translucent.scene.scene import Scene
-from translucent.scene.showcase import fillable, framing
-from translucent.scene.stages import NO_STAGE, stage_named
+from translucent.scene.showcase import fillable
 
 #: Largest number of messages that the window keeps.
 MAX_MESSAGES = 50
@@ -77,6 +78,10 @@ class Workspace:
         The reference of the whole picture, if the split shows it.
     bake : Bake, optional
         The last map.
+    shelf : Shelf
+        Small pictures of media, environments and models.
+    library : Library
+        Presets of the toolkit and of the user.
     compiler : Compiler
         Compiles shaders in the background, for a stage that waits for them.
     """
@@ -105,8 +110,11 @@ class Workspace:
             "ray": Lane("ray"),
             "light": Lane("light"),
             "write": Lane("write"),
+            "shelf": Lane("shelf"),
             "compile": self.compiler.lane,
         }
+        self.shelf = Shelf(self.lanes["shelf"], self._measuring.call)
+        self.library = Library(self.refuse)
         self._lighting = Lighting(self.lanes["light"])
         self._models: list[Loaded] = []
         self._refused: Model | None = None
@@ -200,7 +208,7 @@ class Workspace:
             return bake.seen_from(self.document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
-            same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))
+            same = all(getattr(known, name) == getattr(document, name) for name in ("material", "assigned", "orbit"))
             if same and model is loaded and _lit_alike(known, document):
                 return scene
         scene = scene_of(document, loaded)
@@ -224,7 +232,7 @@ class Workspace:
     def busy(self) -> list[Task]:
         """Tasks under way that the user may want to see or to cancel."""
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
-        return [task for task in tasks if task.name or task is not self.compiler.lane.task]
+        return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.shelf.lane.task)]
 
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
@@ -379,19 +387,7 @@ class Workspace:
             self.history = self.history.done(Adopt(own))
         if present.orbit is None:
             stage = stage_name(present.look, self.loaded)
-            self.history = self.history.done(SetOrbit(_first_orbit(self.loaded, self.size, stage)))
-
-
-def _first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
-    """First orbit of a model: that of the file's own camera, or a framed view, on a stage with room for shadows."""
-    from translucent.gltf.load import GltfScene
-
-    scene = loaded.scene
-    if stage != NO_STAGE and not getattr(scene, "has_camera", False):
-        return orbiting.orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
-    if isinstance(scene, GltfScene):
-        return orbiting.orbit_of(scene.camera, scene.bounds.mean(axis=0))
-    return orbiting.framed(None, scene.objects, size)
+            self.history = self.history.done(SetOrbit(first_orbit(self.loaded, self.size, stage)))
 
 
 def _lit_alike(first: Document, second: Document) -> bool:
