@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from translucent.bench.frontier import beats, mark_frontier
 from translucent.bench.hard.measure import CASES
 from translucent.bench.record import CaseRecord, HardCase, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
-from translucent.bench.timing import MOST, Sample, interleaved, ratio, timing
+from translucent.bench.timing import MOST, MOST_REPEATED, Sample, interleaved, ratio, timing
 
 from .test_record import PROVENANCE
 
@@ -242,3 +243,27 @@ def test_the_fastest_need_no_more_than_so_many_rounds() -> None:
     tiny = Sample(1e-9, 1e-9, 1e-9, 1e-9, 1e-9)
     found = interleaved(lambda: tiny, {"a": lambda: tiny}, 0.01, lambda *_: None)
     assert len(found["a"].wall) == len(found["a"].gpu) == MOST
+
+
+def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_longer(rng: np.random.Generator) -> None:
+    def steady(seconds: float) -> Callable[[], Sample]:
+        return lambda: Sample(seconds, seconds, None, seconds, seconds)
+
+    def unsteady() -> Sample:
+        drawn.append(0.01 * rng.lognormal(0, 0.5))
+        return steady(drawn[-1])()
+
+    drawn: list[float] = []
+    # A share of 0.1 s: five rounds of 0.01 s with a floor of as much.
+    found = interleaved(steady(0.01), {"sure": steady(0.01), "unsure": unsteady}, 0.23, lambda *_: None, patience=4.0)
+    assert len(found["sure"].wall) == 5
+    assert 15 <= len(found["unsure"].wall) <= 25
+    # Sixteen of them make a sample, whose mean has a quarter of their scatter; all of them count as spent.
+    drawn.clear()
+    tiny = interleaved(steady(2.5e-4), {"tiny": lambda: steady(0.025 * unsteady().wall)()}, 0.1, lambda *_: None)[
+        "tiny"
+    ]
+    assert tiny.times == tiny.floor_times == MOST_REPEATED
+    assert len(drawn) >= MOST_REPEATED * len(tiny.wall)
+    assert np.std(tiny.wall) < 0.5 * np.std(0.025 * np.array(drawn))
+    assert 0.085 <= tiny.spent < 0.11
