@@ -3,13 +3,15 @@
 ``python tools/measure_baking.py [MODEL...]`` measures points a second of the modes ``normal`` and ``inscribed``, beside
 ``trimesh.proximity.thickness`` with ``ray`` and ``max_sphere`` for the same points and normals; default: the bear and
 the knot of the toolkit. Both take one ray for a point, or one sphere; trimesh needs rtree for its spheres. ``--memory``
-bakes a map instead, of 4096 x 4096 texels, and tells the most memory that the process has held.
+bakes a map instead, of 4096 x 4096 texels, writes it and tells the most memory that the process has held; rays are
+traced in strips, so a ``--share`` of the rows takes as much memory as all of them, and less time.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import resource
+import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
@@ -89,14 +91,18 @@ def compare(mesh: tl.Mesh, mode: str, rounds: int) -> str:
     )
 
 
-def most_memory(mesh: tl.Mesh, rays: int) -> str:
-    """Bake a large map, and tell what it took."""
+def most_memory(mesh: tl.Mesh, rays: int, share: float) -> str:
+    """Bake a large map, of which the mesh fills a share of the rows, write it, and tell what it took."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    report = tl.bake_thickness(unwrap(mesh, 4096, None).mesh, 4096, rays=rays).report
+    with_uv = unwrap(mesh, 4096, None).mesh
+    assert with_uv.uv is not None
+    baked = tl.bake_thickness(dataclasses.replace(with_uv, uv=with_uv.uv * (1.0, share)), 4096, rays=rays)
+    with tempfile.TemporaryDirectory() as folder:
+        baked.save(Path(folder) / "thickness.exr")
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     return (
-        f"{mesh.name}: {report.rays / 1e6:.0f} million rays in {report.seconds:.0f} s, at most {most:.2f} GB "
-        f"({before:.2f} GB before)"
+        f"{mesh.name}: {baked.report.rays / 1e6:.0f} million rays in {baked.report.seconds:.0f} s, at most "
+        f"{most:.2f} GB ({before:.2f} GB before)"
     )
 
 
@@ -104,12 +110,13 @@ def most_memory(mesh: tl.Mesh, rays: int) -> str:
 @click.argument("models", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--memory", is_flag=True, help="Bake 4096 x 4096 texels of the first MODEL.")
 @click.option("--rays", default=64, show_default=True, help="With --memory: from each texel.")
+@click.option("--share", default=1.0, show_default=True, help="With --memory: of the rows that the mesh fills.")
 @click.option("--rounds", default=5, show_default=True, help="Of each; medians are printed.")
-def main(models: tuple[Path, ...], memory: bool, rays: int, rounds: int) -> None:
+def main(models: tuple[Path, ...], memory: bool, rays: int, rounds: int, share: float) -> None:
     """Time for a point beside trimesh, or memory of a large map."""
     meshes = [tl.load_mesh(path) for path in models or (mesh_path("bear"), mesh_path("knot"))]
     if memory:
-        click.echo(most_memory(meshes[0], rays))
+        click.echo(most_memory(meshes[0], rays, share))
         return
     for mesh in meshes:
         for mode in THEIRS:

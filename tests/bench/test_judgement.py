@@ -260,10 +260,10 @@ def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_lon
     assert 15 <= len(found["unsure"].wall) <= 25
     # Sixteen of them make a sample, whose mean has a quarter of their scatter; all of them count as spent.
     drawn.clear()
-    tiny = interleaved(steady(2.5e-4), {"tiny": lambda: steady(0.025 * unsteady().wall)()}, 0.1, lambda *_: None)[
+    tiny = interleaved(steady(2.5e-4), {"tiny": lambda: steady(0.005 * unsteady().wall)()}, 0.1, lambda *_: None)[
         "tiny"
     ]
     assert tiny.times == tiny.floor_times == MOST_REPEATED
     assert len(drawn) >= MOST_REPEATED * len(tiny.wall)
-    assert np.std(tiny.wall) < 0.5 * np.std(0.025 * np.array(drawn))
-    assert 0.085 <= tiny.spent < 0.11
+    assert np.std(tiny.wall) < 0.5 * np.std(0.005 * np.array(drawn))
+    assert 0.085 <= tiny.spent < 0.1

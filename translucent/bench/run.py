@@ -51,7 +51,7 @@ class Effort:
 
 
 FULL = Effort(12.0, 2.5, 1.0, patience=3.0)
-QUICK = Effort(0.8, 0.2, 0.45)
+QUICK = Effort(0.6, 0.15, 0.4)
 
 #: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]

@@ -3,7 +3,7 @@
 All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
 a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
 count either. Slow drawings leave the rounds early, once they have had their share of the time; those whose rounds
-differ much stay longer. What takes less than clocks and schedulers can tell apart is drawn several times for one sample.
+differ much stay longer. What takes less than clocks can tell apart is drawn several times for one sample.
 """
 
 from __future__ import annotations
