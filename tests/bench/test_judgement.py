@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -245,25 +246,21 @@ def test_the_fastest_need_no_more_than_so_many_rounds() -> None:
     assert len(found["a"].wall) == len(found["a"].gpu) == MOST
 
 
-def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_longer(rng: np.random.Generator) -> None:
+def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_longer() -> None:
     def steady(seconds: float) -> Callable[[], Sample]:
         return lambda: Sample(seconds, seconds, None, seconds, seconds)
 
-    def unsteady() -> Sample:
-        drawn.append(0.01 * rng.lognormal(0, 0.5))
-        return steady(drawn[-1])()
+    def unsteady(seconds: float) -> Callable[[], Sample]:
+        turns = itertools.cycle((0.6, 1.4))
+        return lambda: steady(next(turns) * seconds)()
 
-    drawn: list[float] = []
-    # A share of 0.1 s: five rounds of 0.01 s with a floor of as much.
-    found = interleaved(steady(0.01), {"sure": steady(0.01), "unsure": unsteady}, 0.23, lambda *_: None, patience=4.0)
+    # A share of 0.1 s: five rounds of 0.01 s with a floor of as much, and four times as many.
+    drawings = {"sure": steady(0.01), "unsure": unsteady(0.01)}
+    found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, patience=4.0)
     assert len(found["sure"].wall) == 5
-    assert 15 <= len(found["unsure"].wall) <= 25
-    # Sixteen of them make a sample, whose mean has a quarter of their scatter; all of them count as spent.
-    drawn.clear()
-    tiny = interleaved(steady(2.5e-4), {"tiny": lambda: steady(0.005 * unsteady().wall)()}, 0.1, lambda *_: None)[
-        "tiny"
-    ]
+    assert 19 <= len(found["unsure"].wall) <= 21
+    # Sixteen drawings make a sample, whose mean is steady; all of them count as spent.
+    tiny = interleaved(steady(2.5e-4), {"tiny": unsteady(1e-4)}, 0.1, lambda *_: None)["tiny"]
     assert tiny.times == tiny.floor_times == MOST_REPEATED
-    assert len(drawn) >= MOST_REPEATED * len(tiny.wall)
-    assert np.std(tiny.wall) < 0.5 * np.std(0.005 * np.array(drawn))
+    assert tiny.wall == pytest.approx([1e-4] * len(tiny.wall))
     assert 0.085 <= tiny.spent < 0.1
