@@ -99,3 +99,21 @@ def test_a_large_mesh_may_be_off_by_its_slack(monkeypatch: pytest.MonkeyPatch) -
     close = InscribedSpheres(surface).diameters(points, np.ones(200))
     assert (close >= exact).all()
     assert (close <= exact * (1 + 1.01 * inscribed.LARGE_SLACK)).all()
+
+
+def test_edges_against_many_points_of_each(rng: np.random.Generator) -> None:
+    start, along, inward = rng.standard_normal((3, 400, 3))
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    found = inscribed._on_edge(start, along, inward)
+    points = start[:, None] + np.linspace(0, 1, 5001)[:, None] * along[:, None]
+    depth, square = np.einsum("kgi,ki->kg", points, inward), (points**2).sum(axis=2)
+    seen = depth > cos(radians(70)) * np.sqrt(square)
+    expected = np.where(seen, 0.5 * square / np.where(seen, depth, 1.0), np.inf).min(axis=1)
+    none = np.isinf(expected)
+    assert 100 < none.sum() < 300
+    assert np.isinf(found[none]).mean() > 0.99  # a line may graze the cone between two points
+    found, expected = found[~none], expected[~none]
+    assert (found <= expected * (1 + 1e-12)).all()
+    # At the edge of the cone the quotient falls, and is off by a step; elsewhere by the square of one.
+    assert (expected <= found * 1.01).all()
+    assert np.quantile(expected / found, 0.6) < 1 + 1e-6
