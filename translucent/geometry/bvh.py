@@ -83,12 +83,12 @@ def build_hierarchy(low: Floats, high: Floats, leaf_size: int = LEAF_SIZE) -> Hi
         Largest number of boxes in a leaf.
     """
     with np.errstate(under="ignore"):  # areas of the smallest boxes count as 0
-        order = _curve_order(0.5 * low + 0.5 * high)
+        order = curve_order(0.5 * low + 0.5 * high)
         tree = _Tree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
         return _laid_out(tree, order, leaf_size)
 
 
-def _curve_order(centers: Floats) -> Integers:
+def curve_order(centers: Floats) -> Integers:
     """Order of points along a Morton curve through their bounds."""
     start = centers.min(axis=0)
     extent = np.maximum(centers.max(axis=0) - start, np.finfo(np.float32).tiny)
