@@ -165,6 +165,7 @@ class Renderer:
         scattering: Scattering | None = None,
         caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
+        adaptive: bool = True,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
@@ -179,6 +180,9 @@ class Renderer:
         samples : int
             Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
             belong to the ray through the pixel center, as all do with 1.
+        adaptive : bool
+            Trace rays from smooth interfaces for no more samples of a pixel than its picture needs: for all of them
+            where samples or neighbors differ, elsewhere for one or a few. False: for all of them everywhere.
         backdrop : Backdrop or TextureBackdrop, optional
             A picture of everything opaque, drawn elsewhere. The same for all samples of a pixel.
         transparent : bool
@@ -199,7 +203,7 @@ class Renderer:
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional
-            Takes the share of the samples, or of random paths, that is done, 0 to 1; with OpenGL.
+            Takes the share of the work that is done, 0 to 1; with OpenGL.
 
         Returns
         -------
@@ -236,9 +240,9 @@ class Renderer:
             if transparent:
                 frame = self._render_transparent(scene, size, chosen, samples, backdrop, progress)
             elif backdrop is not None:
-                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
+                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop, adaptive=adaptive)
             else:
-                frame = self._run(scene, size, chosen, samples, progress)
+                frame = self._run(scene, size, chosen, samples, progress, adaptive=adaptive)
         except BaseException as error:
             self._note_interruption(error)
             raise
@@ -253,10 +257,12 @@ class Renderer:
         chosen: RenderPlan,
         samples: int,
         progress: Callable[[float], None] | None,
+        *,
+        adaptive: bool,
     ) -> Frame:
         engine = self._engine
         if isinstance(engine, GpuRenderer):
-            return engine.render(scene, size, chosen, samples, report=progress)
+            return engine.render(scene, size, chosen, samples, report=progress, adaptive=adaptive)
         return engine.render(scene, size, chosen, samples)
 
     def _render_transparent(
@@ -272,7 +278,9 @@ class Renderer:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
         white = page_radiance(scene)
         before_black, before_white = (
-            self._run(before_page(scene, level), size, chosen, samples, progress) for level in (0.0, white)
+            # Their difference counts: both have the same samples.
+            self._run(before_page(scene, level), size, chosen, samples, progress, adaptive=False)
+            for level in (0.0, white)
         )
         passed = np.clip((before_white.radiance.astype(np.float64) - before_black.radiance) / white, 0.0, 1.0)
         alpha = 1.0 - passed.mean(axis=-1)

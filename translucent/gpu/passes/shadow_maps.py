@@ -125,6 +125,8 @@ class ShadowMapsPass:
         atlas, scene, count = job.resources.shadows, job.scene, job.scene.environment_shadows
         # Of several samples of a pixel, each looks into its share of the directions.
         first, step = job.sample % job.samples, job.samples
+        if job.bending and not job.sample:
+            first, step = 0, 1  # it may be the only one
         most = job.plan.shadows.directions
         if few := most is not None and most * step < count:
             step = -(-count // most)
