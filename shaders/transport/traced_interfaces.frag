@@ -93,7 +93,7 @@ vec3 kept_on_side(vec3 direction, vec3 side) {
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
 // random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
 vec2 microfacet_shares(int met, int turns) {
-    uvec2 at = uvec2(gl_FragCoord.xy);
+    uvec2 at = uvec2(gl_FragCoord.xy + beyond.xy);
     uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 2654435761u + uint(turns) * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     state = (state >> 22u) ^ state;
