@@ -181,8 +181,8 @@ class Renderer:
             Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
             belong to the ray through the pixel center, as all do with 1.
         adaptive : bool
-            Trace rays from smooth interfaces for no more samples of a pixel than its picture needs: for all of them
-            where samples or neighbors differ, elsewhere for one or a few. False: for all of them everywhere.
+            Trace rays from smooth interfaces for all samples of a pixel where they or neighbors differ, elsewhere for
+            one or a few; not for a transparent frame. False: for all everywhere.
         backdrop : Backdrop or TextureBackdrop, optional
             A picture of everything opaque, drawn elsewhere. The same for all samples of a pixel.
         transparent : bool
@@ -278,7 +278,6 @@ class Renderer:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
         white = page_radiance(scene)
         before_black, before_white = (
-            # Their difference counts: both have the same samples.
             self._run(before_page(scene, level), size, chosen, samples, progress, adaptive=False)
             for level in (0.0, white)
         )
@@ -381,11 +380,14 @@ def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int
     if not isinstance(backdrop, Backdrop | TextureBackdrop):
         raise InputError(f"backdrop {backdrop!r}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
     if backdrop.size != size:
-        raise InputError(
-            f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}",
-            f"the frame is {size[0]}x{size[1]}",
-            "draw both in the same size",
-        )
+        asked = f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}"
+        raise InputError(asked, f"the frame is {size[0]}x{size[1]}", "draw both in the same size")
+
+
+def invalid_text(plan: RenderPlan, invalid: int, covered: int) -> str:
+    """Warning of so many pixels that cannot be trusted."""
+    why = "; ".join(plan.limits) or "a surface that does not balance"
+    return f"{invalid} pixels are not valid ({covered} are covered): {why}"
 
 
 def _warn(frame: Frame) -> None:
@@ -393,8 +395,5 @@ def _warn(frame: Frame) -> None:
         if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
             warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
     if invalid := int(np.count_nonzero(~frame.valid)):
-        covered = int(np.count_nonzero(frame.coverage))
-        why = "; ".join(frame.plan.limits) or "a surface that does not balance"
-        warnings.warn(
-            f"{invalid} pixels are not valid ({covered} are covered): {why}", TranslucentWarning, stacklevel=3
-        )
+        text = invalid_text(frame.plan, invalid, int(np.count_nonzero(frame.coverage)))
+        warnings.warn(text, TranslucentWarning, stacklevel=3)

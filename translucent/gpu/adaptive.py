@@ -1,4 +1,4 @@
-"""Adaptive sampling: rays are traced from interfaces where samples of a pixel differ, and elsewhere once or a few times."""
+"""Adaptive sampling: rays are traced from interfaces where samples of a pixel differ, elsewhere once or a few times."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Run = Callable[[tuple[PassName, ...]], None]
 
 
 class AdaptiveSampling:
-    """Averages over samples in two rounds: all that is cheap for every sample, then rays from interfaces where it matters.
+    """Averages over samples in two rounds: what is cheap for every sample, then rays from interfaces where it matters.
 
     The first round finds for every sample which pixels show an interface, and sums up the light of those that do not:
     edges are as smooth as ever. The second traces rays; of each pixel, the mean of those traced stands for all of its

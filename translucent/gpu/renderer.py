@@ -120,8 +120,8 @@ class GpuRenderer:
     ) -> Frame:
         """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples.
 
-        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the work that is done, now
-        and then. `adaptive`: rays are traced from interfaces as often as it changes the picture.
+        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the work that is done,
+        now and then. `adaptive`: rays are traced from interfaces as often as it changes the picture.
         """
         with self._alone(), self.context.current():
             job = self.prepare(scene, size, plan, backdrop)

@@ -43,8 +43,8 @@ from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
-#: Shares of the directions of the environment where one sample of a pixel may have to do.
-_FEW_SHARES = 4
+#: Most shares of the directions of the environment where one sample of a pixel may have to do.
+_FEW_SHARES = 16
 
 #: Optical depth across a body whose light photons carry.
 _DENSE = 1e4
