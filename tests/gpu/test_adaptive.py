@@ -39,7 +39,7 @@ def test_the_picture_is_that_of_all_samples(renderer: tl.Renderer, scene: tl.Sce
     off = (few.radiance - every.radiance)[every.coverage]
     # The standard error that ends sampling is 1 % in the worst pixel of 3 x 3.
     assert np.sqrt(np.square(off, dtype=np.float64).mean()) < 0.005 * mean
-    assert abs(off.mean(dtype=np.float64)) < 0.001 * mean
+    assert abs(off.mean(dtype=np.float64)) < 0.002 * mean  # in pixels as coarse as these
     assert np.abs(off).max() < 0.1 * mean
     np.testing.assert_allclose(few.radiance[~every.coverage], every.radiance[~every.coverage], atol=1e-6)
 

@@ -44,10 +44,8 @@ def put_together(tiles: Iterator[tl.Tile]) -> dict[str, np.ndarray]:
 FLAT = tl.Camera.orthographic((0.5, 0.6, 5.0), (0, 0, 0), height=2.4)
 LAMP = tl.PointLight((2.0, 2.0, 2.0), 20.0)
 CASES: dict[str, tuple[tl.Scene, dict[str, Any]]] = {
-    "glass": (scene(), {}),
     "glass before squares": (scene(environment=SQUARES), {}),
     "orthographic": (scene(camera=FLAT, environment=SQUARES), {}),
-    "wine": (scene(MATCHED, environment=SQUARES), {"samples": 4}),
     "fog": (scene(FOG, lights=[LAMP]), {}),
     "random paths": (scene(), {"method": tl.PathTraced(2)}),
     "rough": (
