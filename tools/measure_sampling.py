@@ -1,6 +1,6 @@
-"""Adaptive sampling against all samples: ``python tools/measure_sampling.py FOLDER [SCENE[,PIXELS] ...]``.
+"""Adaptive sampling against all: ``python tools/measure_sampling.py FOLDER [SCENE[,PIXELS] ...]``.
 
-FOLDER holds `scenes.py` and images of full light transport, as the tests of pictures take them. Of each scene a line: samples
+FOLDER holds `scenes.py` and images of full light transport, as the tests of pictures take them. Of each scene: samples
 for which rays were traced, processor seconds, by how much the picture differs from that of all samples over covered
 pixels (RMS and mean, as shares of its mean), and, in the size of the image, the error against it, adaptive and all.
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -48,10 +47,6 @@ CASES: dict[str, tuple[tl.Scene, dict[str, Any]]] = {
     "orthographic": (scene(camera=FLAT, environment=SQUARES), {}),
     "fog": (scene(FOG, lights=[LAMP]), {}),
     "random paths": (scene(), {"method": tl.PathTraced(2)}),
-    "rough": (
-        dataclasses.replace(scene(), objects=[tl.Object(BALL, GLASS, surface=tl.Surface(roughness=0.4))]),
-        {"samples": 4},
-    ),
 }
 
 
