@@ -99,7 +99,7 @@ class AdaptiveSampling:
         for unit, texture in enumerate(textures):
             texture.use(unit)
         program = self._unsettled.program()
-        finer = (16.0 / samples) ** 0.5
+        finer = min(16.0 / samples, 1.0) ** 0.5
         values = {"samples": samples, "contrast": CONTRAST * finer, "error": ERROR * finer, "first": taken == 1}
         for name, value in values.items():
             set_uniform(program, name, value)
