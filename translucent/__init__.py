@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.frames.metrics import Errors as Errors
     from translucent.frames.metrics import compare as compare
     from translucent.frames.metrics import interior as interior
+    from translucent.frames.tiled import Tile as Tile
     from translucent.geometry.mesh import Mesh as Mesh
     from translucent.gltf.load import load_scene as load_scene
     from translucent.gltf.materials import read_materials as read_materials
@@ -101,6 +102,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.staging import staged as staged
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
+    from translucent.tiles import render_tiles as render_tiles
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
@@ -120,6 +122,7 @@ _NAMES = {
     "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",
     "frames.frame": "Frame",
     "frames.metrics": "Errors compare interior",
+    "frames.tiled": "Tile",
     "geometry.mesh": "Mesh",
     "gltf.load": "load_scene",
     "gltf.materials": "read_materials",
@@ -153,6 +156,7 @@ _NAMES = {
     "scene.staging": "staged",
     "scene.surface": "Surface",
     "scene.texture": "Texture",
+    "tiles": "render_tiles",
 }
 _MODULE_OF = {name: f"translucent.{module}" for module, names in _NAMES.items() for name in names.split()}
 

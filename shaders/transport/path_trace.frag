@@ -64,7 +64,7 @@ vec3 environment_seen(Path path, vec2 pixel) {
     return mirrored_environment(path.direction);
 #else
     if ((path.flags & FLAG_REFLECTED) != 0u) { return mirrored_environment(path.direction); }
-    if ((path.flags & FLAG_BENT) == 0u) { return seen_environment(pixel / frame_size.y, path.direction); }
+    if ((path.flags & FLAG_BENT) == 0u) { return seen_environment(in_heights(pixel), path.direction); }
     return environment_beyond(path.origin, path.direction, 0.0);
 #endif
 }
@@ -396,7 +396,7 @@ void main() {
     float ended_in = texelFetch(path_spread, here, 0).w;
     if (known.count >= last_path && ended_in + 1.5 < pass_number) { discard; }  // both states have it
     Path path = stored_path(here);
-    Draws draws = Draws(uint(texel.y) * uint(frame_size.x) + uint(texel.x), known.count, drawn);
+    Draws draws = Draws(uint(texel.y + int(beyond.y)) * uint(frame_size.x + beyond.z) + uint(texel.x + int(beyond.x)), known.count, drawn);
     int most = (path.flags & FLAG_CAREFUL) != 0u ? 1 : events;
     int event = 0;
     bool done = known.count >= last_path;

@@ -1,7 +1,8 @@
 // Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
 // stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
 // up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
-// interface is that which the rasterizer has found. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
+// interface is that which the rasterizer has found. ADAPTIVE: of several samples of a pixel, those that are worth it; with
+// the square of their luminance in place of the transmittance. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
 #include <View>
@@ -10,6 +11,7 @@
 #include <Surfaces>
 #include <SurfaceRow>
 #include <TracedBody>
+#include "lib/color.glsl"
 #include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
@@ -92,7 +94,7 @@ vec3 kept_on_side(vec3 direction, vec3 side) {
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
 // random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
 vec2 microfacet_shares(int met, int turns) {
-    uvec2 at = uvec2(gl_FragCoord.xy);
+    uvec2 at = uvec2(gl_FragCoord.xy + beyond.xy);
     uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 2654435761u + uint(turns) * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     state = (state >> 22u) ^ state;
@@ -144,7 +146,12 @@ vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
                 return blurred.rgb + (1.0 - blurred.a) * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
             }
 #endif
-            return texelFetch(opaque_radiance, texel, 0).rgb;
+            vec4 found = texelFetch(opaque_radiance, texel, 0);
+#if ADAPTIVE
+            return found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
+#else
+            return found.rgb;
+#endif
         }
     }
 #endif
@@ -449,5 +456,9 @@ void main() {
 #endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
     out_transmittance.a = 1.0 - min(sum.lost, 1.0);
+#if ADAPTIVE
+    float level = min(luminance(out_radiance.rgb), 1e15);
+    out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
+#endif
 }
 #endif
