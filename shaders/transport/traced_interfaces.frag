@@ -126,11 +126,26 @@ struct Sum {
 
 // Radiance of an opaque object along a ray, lit as where it is seen directly, but without its textures.
 vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
-    if (body.plain == 1.0) { return body.color * reaching_irradiance(point, normal) / PI; }
-    OpaqueFinish finish = OpaqueFinish(body.color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
+    vec3 color = paint_color(body, point);
+    if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
+    OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
         body.emissive, normal, 0.0, 1.0, 1.0, false);
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
+
+#if OPAQUE
+uniform int ground_object;   // number of the object that is the ground, or -1
+uniform vec4 ground_plane;   // unit normal upwards, and metres along it from the center of the media
+
+// How much the axial depth of a surface may differ between the centers of neighboring pixels.
+float depth_within_pixel(vec3 point, vec3 normal) {
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    float spread = surface_right.w == 1.0 ? dot(from_eye, ray_forward.xyz) : 1.0;
+    vec3 view = surface_right.w == 1.0 ? normalize(from_eye) : ray_forward.xyz;
+    float facing = abs(dot(view, normal));
+    return 2.0 * length(surface_up.xyz) * spread / frame_size.y * sqrt(1.0 - min(facing * facing, 1.0)) / max(facing, 1e-3);
+}
+#endif
 
 // The same where the picture shows it: with its textures, and blurred behind rough interfaces.
 vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
@@ -139,7 +154,7 @@ vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
     if (in_picture(shown.xy)) {
         ivec2 texel = stored(texel_of(shown.xy));
         float there = texelFetch(opaque_axial_depth, texel, 0).r;
-        if (abs(there - shown.z) * surface_ahead.y < 1e-2 * surface_reach) {
+        if (abs(there - shown.z) * surface_ahead.y < 1e-2 * surface_reach + depth_within_pixel(point, normal)) {
 #if MICROFACETS
             if (ray.blur > 0.0) {
                 vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
@@ -156,6 +171,22 @@ vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
     }
 #endif
     return opaque_light(body, normal, ray.direction, point);
+}
+
+// What a ray sees that is not followed on: the environment, or the ground before it.
+vec3 seen_ahead(vec3 origin, Ray ray, vec3 direction, bool reflected) {
+#if OPAQUE
+    if (ground_object >= 0) {
+        float falling = -dot(ground_plane.xyz, direction), height = dot(ground_plane.xyz, origin) - ground_plane.w;
+        if (falling > 1e-3 && height > 0.0) {
+            Ray down = ray;
+            down.direction = direction;
+            down.reflected = reflected;
+            return opaque_seen(traced_body(ground_object), ground_plane.xyz, down, origin + height / falling * direction);
+        }
+    }
+#endif
+    return environment_seen(origin, direction, reflected, ray.blur);
 }
 
 // The first interface, as the rasterizer has found it.
@@ -345,13 +376,13 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         } else
 #endif
         if (strength(weaker.share) > 0.0) {
-            sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * environment_seen(weaker.origin, weaker.direction, weaker.reflected, weaker.blur);
+            sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * seen_ahead(weaker.origin, weaker, weaker.direction, weaker.reflected);
         }
         if (last || strength(ray.share) < faintest_share) {
             // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
             bool total = reflectance == 1.0;
             sum.light += (on_stronger ? vec3(1.0) : again) * ray.share
-                * environment_seen(ray.origin, total ? arrival : ray.direction, total ? arrived_reflected : ray.reflected, ray.blur);
+                * seen_ahead(ray.origin, ray, total ? arrival : ray.direction, total ? arrived_reflected : ray.reflected);
             ends = true;
         }
     }

@@ -27,6 +27,7 @@ from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.ledger import before_making
 from translucent.media.medium import VACUUM, Medium
+from translucent.scene.falloff import Falloff
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import SMOOTH
 
@@ -259,6 +260,7 @@ class SceneHierarchies:
             "emissive": np.asarray(surface.emissive),
             "metallic": surface.metallic,
             "one_sided": float(not surface.double_sided),
+            "fading": _fading(body, packed.scale) if opaque else (0.0, 0.0, 0.0),
         }
 
     def release(self) -> None:
@@ -299,6 +301,17 @@ def _kind(body: Object, sheet: float | None) -> float:
     if body.covers:
         return 3.0
     return 0.0 if sheet is None else 1.0 if body.has_interface else 4.0
+
+
+def _fading(body: Object, scale: float) -> tuple[float, float, float]:
+    """Radii in coordinates of the hierarchy between which paint loses a share of its color, and this share."""
+    falloff, mesh = body.surface and body.surface.color_texture, body.mesh
+    if not isinstance(falloff, Falloff) or mesh.uv is None:
+        return 0.0, 0.0, 0.0
+    one, other = mesh.faces[0, :2]
+    unit = scale * float(np.linalg.norm(mesh.vertices[one] - mesh.vertices[other]))
+    unit /= float(np.linalg.norm(mesh.uv[one] - mesh.uv[other]))
+    return falloff.start * unit, 0.5 * unit, 1.0 - falloff.far
 
 
 def _decides(scene: Scene, body: Object) -> bool:

@@ -271,6 +271,9 @@ TRACED_BODY = PackedTable(
         ("slot", "f4", ()),  # the same for objects of one medium
         ("anisotropy", "f4", ()),
         ("scattering", "f4", (3,)),
+        # Of paint around the middle of the mesh, in coordinates of the hierarchy: where it begins to get darker, where
+        # it ends to, and how much of it is lost there; 0 for none.
+        ("fading", "f4", (3,)),
     ),
 )
 

@@ -19,7 +19,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center
 from translucent.media.given_back import LayeredMedium
-from translucent.planning.mirrors import Mirror, mirror_of
+from translucent.planning.mirrors import Mirror, ground_of, mirror_of
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
 
@@ -111,6 +111,7 @@ class TracedInterfacesPass:
             "object_nodes": hierarchies.object_nodes,
             "objects_frame": frame,
             "bodies_radius": bodies_radius(job.scene),
+            **_ground(job.scene),
         }
         _set(program, values)
         if job.bending or not job.bent_apart:
@@ -205,6 +206,14 @@ class TracedInterfacesPass:
             textures["seen_map"] = environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
+
+
+def _ground(scene: Scene) -> dict[str, Any]:
+    """Number and plane of the ground, which rays see that are not followed on; -1 for none."""
+    if (ground := ground_of(scene)) is None:
+        return {"ground_object": -1}
+    height = ground.height - float(ground.normal @ media_center(scene))
+    return {"ground_object": scene.objects.index(ground.ground), "ground_plane": (*ground.normal, height)}
 
 
 def _set(program: moderngl.Program, values: dict[str, Any]) -> None:
