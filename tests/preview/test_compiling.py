@@ -24,7 +24,7 @@ from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
 from translucent.preview.stage import Stage
-from translucent.preview.worker import Companion
+from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import showcase
 from translucent.scene.texture import Texture
@@ -55,11 +55,11 @@ def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
     """What another process would do, done in this one, once the event is set."""
     go = threading.Event()
 
-    def call(_: Companion, task: Any, work: Callable[..., Any], *arguments: Any) -> Any:
+    def call(_: Pool, task: Any, work: Callable[..., Any], *arguments: Any, **_urgency: Any) -> Any:
         go.wait(60.0)
         return work(task.report, *arguments)
 
-    monkeypatch.setattr(Companion, "call", call)
+    monkeypatch.setattr(Pool, "call", call)
     compiling._engine.cache_clear()
     return go
 
@@ -148,7 +148,7 @@ def test_normals_of_a_large_mesh_come_from_another_process(
 
 
 def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
-    scene, compiler, found = stand_in(showcase(BALL, stage="none")), Compiler(), list[Compiled]()
+    scene, compiler, found = stand_in(showcase(BALL, stage="none")), Compiler(work.pool), list[Compiled]()
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
@@ -162,7 +162,7 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
 
 def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> None:
     near.set()
-    scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(), list[Compiled]()
+    scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(work.pool), list[Compiled]()
     compiler.device = "a card from the future"
     compiler.ask("", scene, [], found.append)
     while not found:
@@ -276,10 +276,10 @@ def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: thr
 def test_where_no_process_can_draw_the_window_compiles_by_itself(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def call(*_: Any) -> Any:
+    def call(*_: Any, **_urgency: Any) -> Any:
         raise tl.RenderError("preparing the picture", "its process ended with status 9", "close other programs")
 
-    monkeypatch.setattr(Companion, "call", call)
+    monkeypatch.setattr(Pool, "call", call)
     finish(stage, work)
     work.do(ChoosePreset("whole_milk"))
     finish(stage, work)

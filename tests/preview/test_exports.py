@@ -127,7 +127,7 @@ def test_what_a_killed_process_has_left_is_removed(
     work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(worker._Running, "stop", lambda _: False)
-    monkeypatch.setattr(worker.Companion._end, "__defaults__", (0.3,))
+    monkeypatch.setattr(worker, "PARTING", 0.3)
     work.export(str(tmp_path / "a.png"), hard)
     task = work.lanes["write"].task
     assert task is not None

@@ -16,7 +16,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
 from translucent.preview import worker
 from translucent.preview.tasks import CancelledError, Report, Task
-from translucent.preview.worker import Companion, in_a_process
+from translucent.preview.worker import Pool
 
 _seen: list[Mesh] = []
 
@@ -27,8 +27,8 @@ def task() -> Task:
 
 
 @pytest.fixture
-def companion() -> Iterator[Companion]:
-    made = Companion()
+def pool() -> Iterator[Pool]:
+    made = Pool()
     yield made
     made.close()
 
@@ -85,58 +85,58 @@ def cancelling(task: Task) -> Callable[..., None]:
     return cancel
 
 
-def test_a_process_that_nobody_waits_for_ends(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_nobody_waits_for_ends(task: Task, pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "PARTING", 0.2)
     monkeypatch.setattr(task, "report", cancelling(task))
     with pytest.raises(CancelledError):
-        in_a_process(task, slow)
+        pool.call(task, slow)
     with pytest.raises(ProcessLookupError):
         os.kill(int(task.detail), 0)
 
 
 def test_work_that_reports_ends_and_its_process_goes_on(
-    task: Task, companion: Companion, monkeypatch: pytest.MonkeyPatch
+    task: Task, pool: Pool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(task, "report", cancelling(task))
     with pytest.raises(CancelledError):
-        companion.call(task, steps)
+        pool.call(task, steps)
     # What was meant for the last work does not stop the next.
     for _ in range(2):
-        assert companion.call(Task("next", lambda _: None, lambda _: None), pid) == int(task.detail)
+        assert pool.call(Task("next", lambda _: None, lambda _: None), pid) == int(task.detail)
 
 
-def test_a_process_that_dies_is_told_and_the_next_one_begins(task: Task, companion: Companion) -> None:
+def test_a_process_that_dies_is_told_and_the_next_one_begins(task: Task, pool: Pool) -> None:
     with pytest.raises(tl.RenderError, match=r"baking; its process ended with status 9"):
-        companion.call(task, dies)
-    assert companion.call(task, pid) != os.getpid()
+        pool.call(task, dies)
+    assert pool.call(task, pid) != os.getpid()
 
 
-def test_what_the_work_refuses_is_raised_here(task: Task, companion: Companion) -> None:
-    first = companion.call(task, pid)
+def test_what_the_work_refuses_is_raised_here(task: Task, pool: Pool) -> None:
+    first = pool.call(task, pid)
     with pytest.raises(tl.InputError, match="cheese; it is no mesh"):
-        companion.call(task, refuses)
-    assert companion.call(task, pid) == first
+        pool.call(task, refuses)
+    assert pool.call(task, pid) == first
 
 
-def test_warnings_come_back_with_the_result(task: Task, companion: Companion) -> None:
+def test_warnings_come_back_with_the_result(task: Task, pool: Pool) -> None:
     with pytest.warns(tl.TranslucentWarning, match="look out"):
-        np.testing.assert_array_equal(companion.call(task, warns, "look out"), np.arange(3))
+        np.testing.assert_array_equal(pool.call(task, warns, "look out"), np.arange(3))
 
 
-def test_a_mesh_is_sent_once_and_kept_while_it_lives(task: Task, companion: Companion) -> None:
+def test_a_mesh_is_sent_once_and_kept_while_it_lives(task: Task, pool: Pool) -> None:
     first, second = Box().tessellate(), Box.slab().tessellate(2)
-    assert companion.call(task, same_mesh, first) == (False, 12)
-    assert companion.call(task, same_mesh, first) == (True, 12)
-    assert companion.call(task, same_mesh, second) == (False, len(second.faces))
-    assert companion.call(task, alive) == 2
+    assert pool.call(task, same_mesh, first) == (False, 12)
+    assert pool.call(task, same_mesh, first) == (True, 12)
+    assert pool.call(task, same_mesh, second) == (False, len(second.faces))
+    assert pool.call(task, alive) == 2
     del first
-    assert companion.call(task, alive) == 1
+    assert pool.call(task, alive) == 1
 
 
-def test_a_companion_that_is_closed_begins_nothing(task: Task, companion: Companion) -> None:
-    first = companion.call(task, pid)
-    companion.close()
+def test_a_pool_that_is_closed_begins_nothing(task: Task, pool: Pool) -> None:
+    first = pool.call(task, pid)
+    pool.close()
     with pytest.raises(ProcessLookupError):
         os.kill(first, 0)
     with pytest.raises(CancelledError):
-        companion.call(task, pid)
+        pool.call(task, pid)

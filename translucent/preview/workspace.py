@@ -28,7 +28,7 @@ from translucent.preview.scenes import load, medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.staging import own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
-from translucent.preview.worker import PARTING, Companion, in_a_process
+from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
 from translucent.scene.showcase import fillable, framing
 from translucent.scene.stages import NO_STAGE, stage_named
@@ -40,7 +40,7 @@ MAX_MESSAGES = 50
 KEPT_MODELS = 2
 
 #: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
-PATIENCE = {"write": 60.0, "bake": 2.5 * PARTING}
+PATIENCE = {"write": 60.0, "bake": 12.0}
 
 #: Largest number of recently opened files.
 MAX_RECENT = 8
@@ -77,6 +77,8 @@ class Workspace:
         The reference of the whole picture, if the split shows it.
     bake : Bake, optional
         The last map.
+    pool : Pool
+        Worker processes.
     compiler : Compiler
         Compiles shaders in the background, for a stage that waits for them.
     """
@@ -93,9 +95,8 @@ class Workspace:
         self.truth: Truth | None = None
         self.bake: Bake | None = None
         self.show_bake = True
-        self.compiler = Compiler()
-        #: Worker processes for work that takes a moment, and for work that takes long.
-        self._measuring, self._reference = Companion(), Companion()
+        self.pool = Pool()
+        self.compiler = Compiler(self.pool)
         self.lanes = {
             "load": Lane("load"),
             "draw": Lane("draw"),
@@ -238,7 +239,7 @@ class Workspace:
         """Compare a small picture with the reference, in the background."""
 
         def work(task: Task) -> Measured:
-            found = self._measuring.call(task, measure, scene, method, size)
+            found = self.pool.call(task, measure, scene, method, size)
             return Measured(**vars(found), scene=scene, method=method)
 
         self.lanes["draw"].start("measuring", work, then)
@@ -247,7 +248,7 @@ class Workspace:
         self, scene: Scene, size: tuple[int, int], pixel: tuple[int, int], then: Callable[[Crossing], None]
     ) -> None:
         """Follow the ray of a pixel in the reference, in the background."""
-        self.lanes["ray"].start("", lambda task: self._measuring.call(task, crossing, scene, size, pixel), then)
+        self.lanes["ray"].start("", lambda task: self.pool.call(task, crossing, scene, size, pixel), then)
 
     def draw_truth(
         self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
@@ -259,7 +260,7 @@ class Workspace:
             for number, level in enumerate(shares):
                 task.report(number / len(shares), f"at 1/{level}")
                 small = max(size[0] // level, 1), max(size[1] // level, 1)
-                frame = self._reference.call(task, truth_frame, seen, method, small)
+                frame = self.pool.call(task, truth_frame, seen, method, small, urgency=Urgency.LATER)
                 self.truth = Truth(scene, method, frame, level, straight=levels is not None)
 
         self.lanes["truth"].start("float64 reference", work, lambda _: None)
@@ -274,7 +275,10 @@ class Workspace:
         def show(bake: Bake) -> None:
             self.bake, self.show_bake = bake, True
 
-        self.lanes["bake"].start(f"baking {mode}", lambda task: bake_map(task, body, medium, mode, size, rays), show)
+        def work(task: Task) -> Bake:
+            return bake_map(task, self.pool, body, medium, mode, size, rays)
+
+        self.lanes["bake"].start(f"baking {mode}", work, show)
 
     def export(self, path: str, work: Callable[..., None], *arguments: Any) -> None:
         """Have another process draw a file by ``work(report, path, *arguments)``."""
@@ -285,7 +289,7 @@ class Workspace:
 
         def write(task: Task) -> None:
             try:
-                in_a_process(task, work, path, *arguments)
+                self.pool.call(task, work, path, *arguments, urgency=Urgency.LATER)
             except Exception:
                 remove_partial(Path(path))  # of a process that had to be killed
                 raise
@@ -319,8 +323,7 @@ class Workspace:
         for lane in self.lanes.values():
             if lane.task is not None:
                 lane.task.cancel()
-        for companion in (self._measuring, self._reference, self.compiler):
-            companion.close(0.5)  # nobody will see what they are at
+        self.pool.close(0.5)  # nobody will see what it is at
         for name, lane in self.lanes.items():
             lane.close(PATIENCE.get(name, 0.5))
 
