@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 import weakref
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -47,6 +47,9 @@ _MOST_ROWS = 1 << (_FIRST_BITS - HIERARCHY_WIDTH_BITS)
 _PACKED_BYTES = 300
 _BUILD_BYTES = 650
 
+#: Triangles that are packed at a time, and rows of texels that are written at a time.
+_CHUNK, _MOST_WRITTEN = 1 << 15, 256
+
 #: Bytes of memory that nobody expects a picture to take.
 MUCH_MEMORY = 4 << 30
 
@@ -80,15 +83,44 @@ _packed: WeakKeyDictionary[Mesh, PackedMesh] = WeakKeyDictionary()
 def packed_mesh(mesh: Mesh) -> PackedMesh:
     """The hierarchy of a mesh as texels, made once for each mesh."""
     if (found := _packed.get(mesh)) is None:
-        center, scale = _frame(*mesh.bounds)
-        with np.errstate(under="ignore", over="ignore"):  # vertices that no face uses may be anywhere
-            corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
-        tree = build_hierarchy(corners.min(axis=1), corners.max(axis=1))
-        triangles = np.empty((*mesh.faces.shape, 4), np.uint32)
-        triangles[..., :3] = corners[tree.faces].view(np.uint32)
-        triangles[..., 3] = packed_normals(drawn_normals(mesh)[tree.faces])
-        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), tree.faces, center, scale)
+        found = _packed[mesh] = pack_mesh(mesh, drawn_normals(mesh))
     return found
+
+
+def keep_packed(mesh: Mesh, packed: PackedMesh) -> None:
+    """Cache this `packed_mesh`, which has been made elsewhere."""
+    _packed[mesh] = packed
+
+
+def has_packed(mesh: Mesh) -> bool:
+    """Whether `packed_mesh` has been made."""
+    return mesh in _packed
+
+
+def pack_mesh(mesh: Mesh, normals: npt.NDArray[np.float32]) -> PackedMesh:
+    """Build the hierarchy of a mesh with these `drawn_normals`."""
+    center, scale = _frame(*mesh.bounds)
+    with np.errstate(under="ignore", over="ignore"):  # vertices that no face uses may be anywhere
+        vertices = ((mesh.vertices - center) * scale).astype(np.float32)
+    count = len(mesh.faces)
+    low, high = np.empty((2, count, 3), np.float32)
+    for part in _chunks(count):
+        corners = vertices[mesh.faces[part]]
+        low[part], high[part] = corners.min(axis=1), corners.max(axis=1)
+    tree = build_hierarchy(low, high)
+    del low, high
+    nodes = packed_nodes(tree)
+    triangles = np.empty((count, 3, 4), np.uint32)
+    for part in _chunks(count):
+        faces = tree.faces[part]
+        triangles[part, :, :3] = vertices[mesh.faces[faces]].view(np.uint32)
+        triangles[part, :, 3] = packed_normals(normals[faces])
+    return PackedMesh(nodes, triangles.reshape(-1, 4), tree.faces, center, scale)
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    """Slices of so many, some of them each, so that little memory is taken meanwhile."""
+    return (slice(begin, begin + _CHUNK) for begin in range(0, count, _CHUNK))
 
 
 def _frame(low: Array, high: Array) -> tuple[Array, float]:
@@ -103,17 +135,18 @@ def packed_nodes(tree: Hierarchy) -> Words:
     the others. Links count from the first node of their order.
     """
     half = STEPS / 2
-    low = np.clip(np.floor((tree.low.astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
-    high = np.clip(np.ceil((tree.high.astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
-    leaf = tree.count > 0
-    held = np.uint32(1 << 31) | (tree.count - 1).astype(np.uint32) << _FIRST_BITS | tree.first.astype(np.uint32)
-    nodes = np.empty((8, len(leaf), 4), np.uint32)
-    for octant, (order, found) in enumerate(zip(tree.orders, nodes, strict=True)):
-        turned = (octant >> np.arange(3) & 1).astype(bool)
-        near, far = np.where(turned, high, low).T, np.where(turned, low, high).T
-        bounds = [near[0] | near[1] << 16, near[2] | far[0] << 16, far[1] | far[2] << 16]
-        link = np.where(leaf, held, (order + tree.size).astype(np.uint32))
-        found[order] = np.stack([*bounds, link], axis=1)
+    nodes = np.empty((8, len(tree.size), 4), np.uint32)
+    for part in _chunks(len(tree.size)):
+        low = np.clip(np.floor((tree.low[part].astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
+        high = np.clip(np.ceil((tree.high[part].astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
+        count, first = tree.count[part], tree.first[part].astype(np.uint32)
+        held = np.uint32(1 << 31) | (count - 1).astype(np.uint32) << _FIRST_BITS | first
+        for octant, (order, found) in enumerate(zip(tree.orders[:, part], nodes, strict=True)):
+            turned = (octant >> np.arange(3) & 1).astype(bool)
+            near, far = np.where(turned, high, low).T, np.where(turned, low, high).T
+            bounds = [near[0] | near[1] << 16, near[2] | far[0] << 16, far[1] | far[2] << 16]
+            link = np.where(count > 0, held, (order + tree.size[part]).astype(np.uint32))
+            found[order] = np.stack([*bounds, link], axis=1)
     return nodes
 
 
@@ -154,20 +187,20 @@ class SceneHierarchies:
         self._rows = -(-8 * 2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
         packed = [packed_mesh(mesh) for mesh in meshes]
-        nodes = _texels(gl, self._rows * _WIDTH + sum(8 * part.nodes.shape[1] for part in packed))
-        triangles = _texels(gl, sum(len(part.triangles) for part in packed))
         first, triangle = self._rows * _WIDTH, 0
+        nodes, triangles = list[_Piece](), list[_Piece]()
         for mesh, part in zip(meshes, packed, strict=True):
-            count, texels = part.nodes.shape[1], len(part.triangles)
+            count = part.nodes.shape[1]
             self._spans[id(mesh)] = _Span(first, count, triangle)
-            triangles[3 * triangle : 3 * triangle + texels] = part.triangles
-            for order in part.nodes:
-                own = nodes[first : first + count]
-                own[:] = order
-                own[:, 3] += np.where(order[:, 3] >= 1 << 31, triangle, first).astype(np.uint32)
-                first += count
-            triangle += texels // 3
-        self.nodes, self.triangles = _texture(gl, nodes), _texture(gl, triangles)
+            triangles.append(_Piece(3 * triangle, part.triangles))
+            nodes += [
+                _Piece(first + i * count, order, (first + i * count, triangle)) for i, order in enumerate(part.nodes)
+            ]
+            first += 8 * count
+            triangle += len(part.triangles) // 3
+        for texels in (first, 3 * triangle):
+            _check_texels(gl, texels)
+        self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, 3 * triangle, triangles)
         self.object_nodes = 0
         self._placed: tuple[Hashable, npt.NDArray[np.float32], tuple[float, float, float, float]] | None = None
 
@@ -342,19 +375,43 @@ def _check_texels(gl: moderngl.Context, texels: int) -> None:
     raise RenderError("tracing rays through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
 
 
-def _texels(gl: moderngl.Context, count: int) -> Words:
-    """Whole rows of texels, 0 yet, for so many."""
-    _check_texels(gl, count)
-    return np.zeros((-(-count // _WIDTH) * _WIDTH, 4), np.uint32)
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """Texels from a place on; links in them are raised: those of nodes, and those of leaves."""
+
+    first: int
+    texels: Words
+    raised: tuple[int, int] | None = None
 
 
-def _texture(gl: moderngl.Context, texels: Words) -> moderngl.Texture:
+def _rows(pieces: Sequence[_Piece], begin: int, end: int) -> Words:
+    """Texels from one place to another, 0 where there is none of the pieces."""
+    found = np.zeros((end - begin, 4), np.uint32)
+    for piece in pieces:
+        low, high = max(piece.first, begin), min(piece.first + len(piece.texels), end)
+        if low < high:
+            own = found[low - begin : high - begin]
+            own[:] = piece.texels[low - piece.first : high - piece.first]
+            if piece.raised is not None:
+                node, triangle = piece.raised
+                own[:, 3] += np.where(own[:, 3] >= 1 << 31, triangle, node).astype(np.uint32)
+    return found
+
+
+def _texture(gl: moderngl.Context, count: int, pieces: Sequence[_Piece]) -> moderngl.Texture:
+    """Texture with so many texels, in whole rows, which are made some at a time."""
+    rows, step = -(-count // _WIDTH), _MOST_WRITTEN
     try:
-        texture = gl.texture((_WIDTH, len(texels) // _WIDTH), 4, texels, dtype="u4")
+        content = _rows(pieces, 0, rows * _WIDTH) if rows <= step else None
+        texture = gl.texture((_WIDTH, rows), 4, content, dtype="u4")
+        for row in range(0, rows, step) if content is None else ():
+            height = min(step, rows - row)
+            part = _rows(pieces, row * _WIDTH, (row + height) * _WIDTH)
+            texture.write(part, viewport=(0, row, _WIDTH, height))
     except moderngl.Error as error:
         raise RenderError(
             "tracing rays through the meshes",
-            f"OpenGL has no room for {size_text(texels.nbytes)} of them ({error})",
+            f"OpenGL has no room for {size_text(16 * rows * _WIDTH)} of them ({error})",
             "use interfaces=tl.ScreenInterfaces(), or coarser meshes",
         ) from error
     texture.filter = moderngl.NEAREST, moderngl.NEAREST
