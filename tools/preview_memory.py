@@ -25,7 +25,7 @@ BEGUN = "TRANSLUCENT_BEGUN"
 INTERVAL, REST = 0.1, 1.0
 
 #: Seconds after which the next thing is done, whatever is under way.
-PATIENCE = 120.0
+PATIENCE = 60.0
 
 
 def main() -> int:

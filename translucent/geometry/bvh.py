@@ -42,7 +42,7 @@ LEAST_MERGED = 0.05
 _CURVE_BITS = 20
 
 #: Boxes along the curve that have a tree of their own, so that building the trees of many takes little memory.
-BLOCK = 1 << 18
+BLOCK = 1 << 17
 
 #: Boxes whose places along the curve are found at a time.
 _CHUNK = 1 << 15

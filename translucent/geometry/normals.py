@@ -26,9 +26,7 @@ def corner_normals(mesh: Mesh) -> Array:
     return smooth_normals(mesh.vertices, mesh.faces, unit_normals(mesh.vertices, mesh.faces))
 
 
-def smooth_normals(
-    vertices: Array, faces: npt.NDArray[np.integer], normals: Array, dtype: npt.DTypeLike = np.float64
-) -> npt.NDArray[np.floating]:
+def smooth_normals(vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> Array:
     """(m, 3, 3): a unit normal for each corner of faces (m, 3).
 
     The mean of the normals of those faces at the vertex that are joined to this one over edges that are no creases,
@@ -42,13 +40,19 @@ def smooth_normals(
     normals : (m, 3) float64
         Of the faces, of unit length; 0 of those without area.
     """
+    found = np.empty((*faces.shape, 3))
+    _fill(found, vertices, faces, normals)
+    return found
+
+
+def _fill(found: npt.NDArray[np.floating], vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> None:
+    """Write `smooth_normals` into an array of any precision."""
     group = _smooth_groups(equal_rows(vertices).of.astype(np.int32)[faces], normals)
     sums = np.zeros((3, int(group.max()) + 1))
     for block in _blocks(len(faces)):
         weighted = normals[block, None] * corner_angles(vertices[faces[block]])[..., None]
         for axis in range(3):
             np.add.at(sums[axis], group[block].ravel(), weighted[..., axis].ravel())
-    found = np.empty((*faces.shape, 3), dtype)
     with np.errstate(under="ignore"):
         for block in _blocks(len(faces)):
             smooth = np.moveaxis(sums[:, group[block]], 0, -1)
@@ -56,7 +60,6 @@ def smooth_normals(
             found[block] = np.where(
                 length > 1e-12, smooth / np.where(length > 1e-12, length, 1.0), normals[block, None]
             )
-    return found
 
 
 def _blocks(count: int) -> Iterator[slice]:
@@ -83,8 +86,9 @@ def drawn_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
 
 def made_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
     """`corner_normals` in the precision of the GPU."""
-    normals = unit_normals(mesh.vertices, mesh.faces)
-    return smooth_normals(mesh.vertices, mesh.faces, normals, np.float32).astype(np.float32, copy=False)
+    found = np.empty((*mesh.faces.shape, 3), np.float32)
+    _fill(found, mesh.vertices, mesh.faces, unit_normals(mesh.vertices, mesh.faces))
+    return found
 
 
 def keep_drawn_normals(mesh: Mesh, normals: npt.NDArray[np.floating]) -> None:
@@ -98,12 +102,11 @@ def has_drawn_normals(mesh: Mesh) -> bool:
     return mesh in _drawn
 
 
-def _smooth_groups(faces: npt.NDArray[np.int32], normals: Array) -> npt.NDArray[np.integer]:
+def _smooth_groups(faces: npt.NDArray[np.int32], normals: Array) -> npt.NDArray[np.int32]:
     """(m, 3): number of each corner's group: the corners at its vertex that smooth edges join to it."""
-    number = np.int32 if faces.size < 2**31 else np.int64
     sides = sorted_sides(faces)
     same = np.flatnonzero(sides.edge[1:] == sides.edge[:-1])
-    sorted_ = sides.number.astype(number)  # edges as 3 face + number of their first corner
+    sorted_ = sides.number.astype(np.int32)  # edges as 3 face + number of their first corner
     del sides
     one, other = sorted_[same], sorted_[same + 1]
     del same, sorted_
@@ -119,9 +122,9 @@ def _smooth_groups(faces: npt.NDArray[np.int32], normals: Array) -> npt.NDArray[
     first = np.concatenate([one, behind])
     second = np.concatenate([np.where(alike, other, after), np.where(alike, after, other)])
     del one, other, behind, after, alike
-    return connected(faces.size, first, second).reshape(faces.shape)
+    return np.asarray(connected(faces.size, first, second), np.int32).reshape(faces.shape)
 
 
-def _following(corner: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:
+def _following(corner: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
     """The next corner of the same face, of corners as 3 face + number."""
-    return corner + np.where(corner % 3 == 2, -2, 1).astype(corner.dtype)
+    return corner + np.where(corner % 3 == 2, np.int32(-2), np.int32(1))

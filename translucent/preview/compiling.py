@@ -16,13 +16,12 @@ from itertools import product
 from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.assets import newest_shader
 from translucent.errors import RenderError, TranslucentError
 from translucent.formulas.tone import TONES
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.normals import has_drawn_normals, keep_drawn_normals, made_normals
+from translucent.geometry.normals import has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
 from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.photon_light import PhotonLight
@@ -32,6 +31,7 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering.diffusion import LEAST_RESOLUTION, Diffusion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
+from translucent.preview.tracing import smoothed
 from translucent.preview.worker import Pool, Urgency
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap
@@ -124,7 +124,6 @@ class Compiler:
 
     def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan]) -> Compiled:
         for mesh in unsmoothed(scene, plans):
-            task.report(None, "normals")
             keep_drawn_normals(mesh, self._call(task, smoothed, mesh))
         return self._call(task, compile_frames, stand_in(scene), tuple(map(_quick, plans)), self.device)
 
@@ -166,11 +165,6 @@ def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
     }
     meshes = (scene.objects[i].mesh for i in sorted(drawn))
     return [mesh for mesh in meshes if len(mesh.faces) > SMOOTHED_AT_ONCE and not has_drawn_normals(mesh)]
-
-
-def smoothed(report: Report, mesh: Mesh) -> npt.NDArray[np.float32]:
-    """`drawn_normals` of a mesh."""
-    return made_normals(mesh)
 
 
 def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], device: str) -> Compiled:

@@ -23,8 +23,9 @@ from translucent.preview.exports import check_export
 from translucent.preview.history import History
 from translucent.preview.lighting import Lighting, prepare
 from translucent.preview.loaded import Loaded
+from translucent.preview.loading import load_with
 from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
-from translucent.preview.scenes import load, medium_of, scene_of
+from translucent.preview.scenes import medium_of, scene_of
 from translucent.preview.session import load_session, save_session
 from translucent.preview.staging import own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
@@ -41,6 +42,9 @@ KEPT_MODELS = 2
 
 #: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
 PATIENCE = {"write": 60.0, "bake": 12.0}
+
+#: Kinds of background work, of which each does one thing at a time.
+LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write")
 
 #: Largest number of recently opened files.
 MAX_RECENT = 8
@@ -97,17 +101,7 @@ class Workspace:
         self.show_bake = True
         self.pool = Pool()
         self.compiler = Compiler(self.pool)
-        self.lanes = {
-            "load": Lane("load"),
-            "draw": Lane("draw"),
-            "diffuse": Lane("diffuse"),
-            "truth": Lane("truth"),
-            "bake": Lane("bake"),
-            "ray": Lane("ray"),
-            "light": Lane("light"),
-            "write": Lane("write"),
-            "compile": self.compiler.lane,
-        }
+        self.lanes = {name: Lane(name) for name in LANES} | {"compile": self.compiler.lane}
         self._lighting = Lighting(self.lanes["light"])
         self._models: list[Loaded] = []
         self._refused: Model | None = None
@@ -360,7 +354,7 @@ class Workspace:
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
             try:
-                return load(model, self.allow_outside)
+                return load_with(task, self.pool, model, self.allow_outside)
             except InputError:
                 self._refused = model
                 raise

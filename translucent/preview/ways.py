@@ -1,0 +1,58 @@
+"""Ways of showing scattered light and interfaces: those asked for, or quicker ones until what they need is there."""
+
+from __future__ import annotations
+
+from translucent.planning.interfaces import Interfaces, ScreenInterfaces
+from translucent.planning.methods import Method
+from translucent.planning.passes import PassName
+from translucent.planning.scattering import Scattering
+from translucent.preview.diffusing import Diffusing
+from translucent.preview.scenes import scattering_of
+from translucent.preview.tracing import Tracing
+from translucent.preview.workspace import Workspace
+from translucent.renderer import Renderer
+from translucent.scene.scene import Scene
+
+#: Interfaces of a picture in which rays cannot be traced, or would take too long.
+SCREEN = ScreenInterfaces()
+
+
+class Ways:
+    """Ways of showing the scene on show.
+
+    Parameters
+    ----------
+    traced_at_once : bool
+        Nobody else makes what rays need.
+
+    Attributes
+    ----------
+    scattering : Scattering, optional
+    interfaces : Interfaces, optional
+        None, as the planner picks.
+    """
+
+    def __init__(self, traced_at_once: bool) -> None:
+        self.scattering: Scattering | None = None
+        self.interfaces: Interfaces | None = None
+        self._at_once = traced_at_once
+        self._diffusing, self._tracing = Diffusing(), Tracing()
+
+    @property
+    def told(self) -> tuple[str, str]:
+        """Remarks on what is shown more simply until something is known; empty if it is."""
+        return self._tracing.told, self._diffusing.told
+
+    def choose(self, workspace: Workspace, scene: Scene, method: Method | None, renderer: Renderer) -> None:
+        """Choose the ways in which to draw now, and request what better ones need."""
+        asked = scattering_of(workspace.document.display.scattering)
+        back = renderer.plan(scene, method, scattering=asked).given_back
+        cache, lane = renderer.gpu.diffusion, workspace.lanes["diffuse"]
+        self.scattering = self._diffusing.scattering(scene, asked, back, cache, lane)
+        self._tracing.told = ""
+        traced = renderer.plan(scene, method, scattering=self.scattering).has(PassName.TRACED)
+        self.interfaces = None if not traced or self.traceable(workspace, scene) else SCREEN
+
+    def traceable(self, workspace: Workspace, scene: Scene) -> bool:
+        """Whether rays can be traced through the meshes of the scene without making the window wait."""
+        return self._at_once or self._tracing.ready(scene, workspace.pool, workspace.lanes["trace"])
