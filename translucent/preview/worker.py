@@ -34,8 +34,8 @@ from translucent.scene.texture import Texture
 #: Seconds between checks whether the result is still wanted.
 PATIENCE = 0.1
 
-#: Niceness of worker processes, so that the window comes first.
-NICENESS = 10
+#: Niceness of processes whose work the picture waits for, and of the others, so that the window comes first.
+URGENT_NICENESS, NICENESS = 4, 10
 
 #: Seconds that canceled work has to end, before its process is ended.
 PARTING = 5.0
@@ -147,10 +147,12 @@ class Pool:
             finally:
                 self._waiting.remove(ticket)
                 self._changed.notify_all()
+            nice = URGENT_NICENESS if urgency == Urgency.PICTURE else NICENESS
             self._idle = [worker for worker in self._idle if worker.alive]
-            known = [worker for worker in self._idle if work.__module__ in worker.modules]
-            worker = (known or self._idle)[-1] if self._idle else _Worker(self._kept)
-            if worker in self._idle:
+            able = [worker for worker in self._idle if worker.nice == nice]  # no process can become less nice
+            known = [worker for worker in able if work.__module__ in worker.modules]
+            worker = (known or able)[-1] if able else _Worker(self._kept, nice)
+            if able:
                 self._idle.remove(worker)
             self._busy.append(worker)
             return worker
@@ -209,15 +211,16 @@ class _Worker:
 
     Attributes
     ----------
+    nice : int
     modules : set of str
         That it has done work of, and has made ready what that needs.
     """
 
-    def __init__(self, kept: _Kept) -> None:
+    def __init__(self, kept: _Kept, nice: int) -> None:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_run, args=(theirs, NICENESS), daemon=True)
+        self._process: BaseProcess = context.Process(target=_run, args=(theirs, nice), daemon=True)
         self._process.start()
         theirs.close()
         assert self._process.pid is not None
@@ -226,6 +229,7 @@ class _Worker:
         self._known: dict[int, object] = {}
         self._number = 0
         self.modules: set[str] = set()
+        self.nice = nice
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         """Send work, preceded by the values that it needs and that were not sent before."""
