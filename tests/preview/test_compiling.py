@@ -19,7 +19,9 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.ledger import Ledger, PostponedError, ProgramName
-from translucent.preview import compiling
+from translucent.gpu.packed_meshes import has_packed
+from translucent.planning.passes import PassName
+from translucent.preview import compiling, tracing
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
@@ -260,6 +262,32 @@ def test_a_request_that_cannot_be_made_is_told_once(
     finish(stage, work)
     assert stage.problem == ""
     assert [m.text for m in work.messages if "in the window" in m.text]
+
+
+def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierarchy(
+    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracing, "PACKED_AT_ONCE", 10)
+    work.do(Change("display.antialias", False))
+    near.set()
+    finish(stage, work)
+    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    near.clear()
+    assert work.loaded is not None
+    mesh = work.loaded.scene.objects[0].mesh
+    work.do(ChoosePreset("merlot"))
+    stage.draw(work, SIZE)
+    assert "until rays can be traced" in stage.ways.told[0]
+    assert isinstance(stage.ways.interfaces, tl.ScreenInterfaces)
+    assert not has_packed(mesh)
+    near.set()
+    finish(stage, work)
+    assert (stage.ways.told[0], stage.ways.interfaces) == ("", None)
+    assert has_packed(mesh)
+    assert stage.plans[0] is not None
+    assert stage.plans[0].has(PassName.TRACED)
+    differs = (np.abs(pixels(stage).astype(int) - drawn_alone(work).astype(int)) > 1).any(axis=-1)
+    assert differs.sum() <= 2
 
 
 def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: threading.Event) -> None:
