@@ -24,9 +24,6 @@ BEGUN = "TRANSLUCENT_BEGUN"
 #: Seconds between two looks at the memory, and without work after which the picture is at rest.
 INTERVAL, REST = 0.1, 1.0
 
-#: Seconds after which the next thing is done, whatever is under way.
-PATIENCE = 60.0
-
 
 def main() -> int:
     """Start the window, and watch it."""
@@ -35,14 +32,24 @@ def main() -> int:
     parser.add_argument("--format", default="ply")
     parser.add_argument("--stage", default="auto")
     parser.add_argument("--inset", action="store_true", help="compare with the reference in the background")
+    parser.add_argument("--patience", type=float, default=120.0, help="seconds to wait for rest")
     parser.add_argument("--show", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.show:
-        show(given.show, given.stage, given.inset)
+        show(given.show, given.stage, given.inset, given.patience)
         return 0
     with tempfile.TemporaryDirectory() as folder:
         path = written(Path(folder), given.format, given.subdivisions)
-        command = [sys.executable, __file__, "--show", str(path), "--stage", given.stage]
+        command = [
+            sys.executable,
+            __file__,
+            "--show",
+            str(path),
+            "--stage",
+            given.stage,
+            "--patience",
+            str(given.patience),
+        ]
         command += ["--inset"] * given.inset
         environment = {**os.environ, BEGUN: str(time.time())}
         window = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
@@ -115,7 +122,7 @@ def held(pid: int) -> dict[int, int]:
     return found
 
 
-def show(path: Path, stage: str, inset: bool) -> None:
+def show(path: Path, stage: str, inset: bool, patience: float) -> None:
     """Open the window, tell what is reached, and close it."""
     from translucent.preview import app
     from translucent.preview.actions import Turn
@@ -139,7 +146,7 @@ def show(path: Path, stage: str, inset: bool) -> None:
                 if desk.stage.timings[0].wall:
                     self.reach("first picture", now)
                 return False
-            if now - self.busy < REST and now - self.since < PATIENCE:
+            if now - self.busy < REST and now - self.since < patience:
                 return False
             self.reach(("at rest", "turned, at rest")[self.reached], now)
             desk.work.do(Turn(30.0, 5.0))

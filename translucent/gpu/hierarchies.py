@@ -17,7 +17,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Integers
 from translucent.errors import RenderError, TranslucentWarning
 from translucent.files.reading import size_text
-from translucent.geometry.bvh import LEAF_SIZE, Floats, build_hierarchy
+from translucent.geometry.bvh import BLOCK, LEAF_SIZE, Floats, build_hierarchy
 from translucent.geometry.mesh import Mesh
 from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
@@ -36,6 +36,9 @@ _MOST_ROWS = 1 << (FIRST_BITS - HIERARCHY_WIDTH_BITS)
 #: Bytes for each triangle that are kept, with the copy in OpenGL, and those that building takes for a while.
 _PACKED_BYTES = 300
 _BUILD_BYTES = 650
+
+#: Bytes that building takes for each triangle beyond the first `BLOCK` of a mesh.
+_BLOCK_BYTES = 100
 
 #: Rows of texels that are written at a time.
 _MOST_WRITTEN = 256
@@ -234,7 +237,9 @@ def _require_room(gl: moderngl.Context, meshes: Sequence[Mesh]) -> None:
     for texels in (least_nodes, 3 * sum(faces)):
         _check_texels(gl, texels)
     new = [len(mesh.faces) for mesh in meshes if not has_packed(mesh)]
-    needed = _PACKED_BYTES * sum(faces) + _BUILD_BYTES * max(new, default=0)
+    largest = max(new, default=0)
+    building = _BUILD_BYTES * min(largest, BLOCK) + _BLOCK_BYTES * max(largest - BLOCK, 0)
+    needed = _PACKED_BYTES * sum(faces) + building
     if needed > MUCH_MEMORY:
         warnings.warn(
             TranslucentWarning(

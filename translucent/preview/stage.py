@@ -17,7 +17,6 @@ from translucent.gpu.viewport import Probe, Viewport
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.shadow_maps import ShadowMaps
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
 from translucent.preview.photons import Photons
@@ -40,9 +39,6 @@ FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
 #: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
 COARSEST_TRACED = 3.0
-
-#: Shadows of a picture that moves: those of a few directions of the environment.
-QUICK_SHADOWS = ShadowMaps(directions=8)
 
 #: Seconds between checks of the shader files.
 WATCH = 0.5
@@ -73,6 +69,8 @@ class Stage:
         Paths of the still picture.
     photons : Photons
         That light it, unless it is made of paths.
+    state : str
+        Which picture is on show: one that moves, one that becomes sharp, or the full one.
     simpler : str
         What is drawn more simply while the picture moves, and why, or nothing.
     drawing : float
@@ -93,7 +91,7 @@ class Stage:
             compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
-        self.problem = self.shader_problem = self.simpler = ""
+        self.problem = self.shader_problem = self.simpler = self.state = ""
         self.drawing, self._begun = 0.0, False
         self._moving: RenderPlan | None = None
         self._shown: tuple[object, ...] = ()
@@ -193,7 +191,7 @@ class Stage:
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
         look, scattering, interfaces = workspace.document.look, self.ways.scattering, self.ways.interfaces
-        shadows = QUICK_SHADOWS if scene.environment_shadows else None
+        shadows = self.ways.quick_shadows(scene)
         if shadows is not None:
             self._moving = self.renderer.plan(
                 scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
@@ -221,6 +219,7 @@ class Stage:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
+        self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
         if interfaces is not self.ways.interfaces:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
@@ -238,7 +237,9 @@ class Stage:
         """Draw the next sample of a side, if there is one left to draw."""
         stride, plan = self._strides[side], self.plans[side]
         samples = self._samples(stride, antialias)
-        if plan is None or self.viewport.steps(side) >= stride * stride * (1 + samples):
+        drawn, whole = self.viewport.steps(side), stride * stride
+        self.state = "sharpening" if drawn + 1 < whole else f"full picture, {max(drawn // whole, 1)} samples"
+        if plan is None or drawn >= whole * (1 + samples):
             return False
         self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, scene, plan, stride, max(samples, 1))

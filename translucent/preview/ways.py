@@ -6,6 +6,7 @@ from translucent.planning.interfaces import Interfaces, ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.scattering import Scattering
+from translucent.planning.shadow_maps import ShadowMaps
 from translucent.preview.diffusing import Diffusing
 from translucent.preview.scenes import scattering_of
 from translucent.preview.tracing import Tracing
@@ -15,6 +16,10 @@ from translucent.scene.scene import Scene
 
 #: Interfaces of a picture in which rays cannot be traced, or would take too long.
 SCREEN = ScreenInterfaces()
+
+#: Shadows of a picture that moves: those of a few directions of the environment, and while lights move, which takes new
+#: maps for every picture, of fewer.
+QUICK_SHADOWS, QUICKER_SHADOWS = ShadowMaps(directions=8), ShadowMaps(directions=2)
 
 
 class Ways:
@@ -35,6 +40,7 @@ class Ways:
     def __init__(self, traced_at_once: bool) -> None:
         self.scattering: Scattering | None = None
         self.interfaces: Interfaces | None = None
+        self._lit: tuple[object, ...] = ()
         self._at_once = traced_at_once
         self._diffusing, self._tracing = Diffusing(), Tracing()
 
@@ -56,3 +62,10 @@ class Ways:
     def traceable(self, workspace: Workspace, scene: Scene) -> bool:
         """Whether rays can be traced through the meshes of the scene without making the window wait."""
         return self._at_once or self._tracing.ready(scene, workspace.pool, workspace.lanes["trace"])
+
+    def quick_shadows(self, scene: Scene) -> ShadowMaps | None:
+        """Shadows of a picture that moves, for which those of the pictures before tell whether its lights do."""
+        lit, self._lit = self._lit, (scene.environment, *scene.lights)
+        if not scene.environment_shadows:
+            return None
+        return QUICK_SHADOWS if lit in ((), self._lit) else QUICKER_SHADOWS
