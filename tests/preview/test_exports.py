@@ -126,7 +126,7 @@ def hard(report: Callable[[float | None, str], None], path: str) -> None:
 def test_what_a_killed_process_has_left_is_removed(
     work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker._Running, "stop", lambda _: False)
+    monkeypatch.setattr(worker._Worker, "stop", lambda _: False)
     monkeypatch.setattr(worker, "PARTING", 0.3)
     work.export(str(tmp_path / "a.png"), hard)
     task = work.lanes["write"].task

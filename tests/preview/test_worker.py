@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,13 +31,6 @@ _seen: list[Mesh] = []
 @pytest.fixture
 def task() -> Task:
     return Task("baking", lambda _: None, lambda _: None)
-
-
-@pytest.fixture
-def pool() -> Iterator[Pool]:
-    made = Pool()
-    yield made
-    made.close()
 
 
 def pid(report: Report) -> int:
