@@ -17,8 +17,11 @@ from translucent.scene.scene import Scene
 #: Interfaces of a picture in which rays cannot be traced, or would take too long.
 SCREEN = ScreenInterfaces()
 
-#: Shadows of a picture that moves: those of a few directions of the environment, and while lights move, which takes new
-#: maps for every picture, of fewer.
+#: Triangles of which a picture takes long to draw, and a map of shadows, too.
+MANY = 1_000_000
+
+#: Shadows of a picture that moves: those of a few directions of the environment; and of fewer for many triangles, and
+#: while lights move, which takes new maps for every picture.
 QUICK_SHADOWS, QUICKER_SHADOWS = ShadowMaps(directions=8), ShadowMaps(directions=2)
 
 
@@ -68,4 +71,5 @@ class Ways:
         lit, self._lit = self._lit, (scene.environment, *scene.lights)
         if not scene.environment_shadows:
             return None
-        return QUICK_SHADOWS if lit in ((), self._lit) else QUICKER_SHADOWS
+        still = lit in ((), self._lit) and sum(len(item.mesh.faces) for item in scene.objects) <= MANY
+        return QUICK_SHADOWS if still else QUICKER_SHADOWS
