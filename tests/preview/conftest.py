@@ -14,6 +14,7 @@ import pytest
 from tests.preview.waiting import SIZE, wait
 from translucent.preview import worker
 from translucent.preview.document import Document, Model
+from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 
 
@@ -21,6 +22,15 @@ from translucent.preview.workspace import Workspace
 def not_nice(monkeypatch: pytest.MonkeyPatch) -> None:
     """Worker processes that tests wait for are not nice: they would wait for the tests beside them."""
     monkeypatch.setattr(worker, "NICENESS", 0)
+    monkeypatch.setattr(worker, "URGENT_NICENESS", 0)
+
+
+@pytest.fixture
+def pool() -> Iterator[Pool]:
+    """Worker processes, which end with the test."""
+    made = Pool()
+    yield made
+    made.close()
 
 
 @pytest.fixture

@@ -130,6 +130,10 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
     assert stage.simpler
     assert stage._moving is not None
     assert stage._moving.shadows.directions == 8
+    assert stage.state.startswith("moving")
+    staged.do(Change("look.rotation", 20.0))  # which takes new maps
+    stage.draw(staged, SIZE)
+    assert stage._moving.shadows.directions == 2
     stage.close()
 
 

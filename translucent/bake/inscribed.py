@@ -202,7 +202,7 @@ class _Tree:
     def of(cls, surface: Surface) -> _Tree:
         """Tree of the faces of a surface."""
         corners = surface.corners
-        order = curve_order((0.5 * corners.min(axis=1) + 0.5 * corners.max(axis=1)).astype(np.float32))
+        order = curve_order(*(end.astype(np.float32) for end in (corners.min(axis=1), corners.max(axis=1))))
         corners, normals = corners[order], surface.planes[order, :3]
         sizes = [1]
         while -(-len(order) // sizes[-1]) > TOP:

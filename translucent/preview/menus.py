@@ -84,6 +84,8 @@ def status(desk: Desk) -> None:
     if loaded is not None:
         name = Path(loaded.model.path).name
         imgui.text(f"{name}: {loaded.triangles} triangles, {stage.renderer.provenance['renderer']}")
+        imgui.same_line()
+        imgui.text(f"|  {stage.state}")
     task = next((one for one in desk.work.busy if one.name), None)
     if task is None:
         return

@@ -6,17 +6,15 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.geometry.normals import drawn_normals
 from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
-from translucent.preview.document import AUTO, Assigned, Document, Look, Material, Model
+from translucent.preview.document import AUTO, Assigned, Document, Look, Material
 from translucent.preview.loaded import Loaded
 from translucent.preview.orbiting import camera_of
 from translucent.preview.staging import environment_of, stage_name, standing
@@ -26,32 +24,6 @@ from translucent.scene.scene import Object, Scene
 from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH, fillable
 from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
-
-
-def load(model: Model, allow_outside: bool = False) -> Loaded:
-    """Load a model, and compute everything that would delay its first picture.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
-    from translucent.assets import mesh_names, mesh_path
-    from translucent.gltf.load import SUFFIXES, load_scene
-    from translucent.mesh_files import load_mesh
-    from translucent.scene.showcase import showcase
-
-    if Path(model.path).suffix.lower() in SUFFIXES:
-        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
-    elif model.path in mesh_names() and not Path(model.path).exists():
-        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
-    else:
-        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
-    for item in scene.objects:
-        _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
-        if item.has_interface or item.surface is not None:
-            drawn_normals(item.mesh)
-    return Loaded(model, scene, material_of(scene))
 
 
 def material_of(scene: Scene, number: int | None = None) -> Material:

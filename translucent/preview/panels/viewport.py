@@ -317,7 +317,7 @@ def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) ->
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
     stage = desk.stage
-    known = stage.simpler, stage.diffusing, stage.converging.told, stage.photons.told
+    known = stage.simpler, *stage.ways.told, stage.converging.told, stage.photons.told
     lines = [text for text in (stage.problem, stage.shader_problem, *known) if text]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
     lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]
