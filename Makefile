@@ -14,7 +14,7 @@ BIN = .venv/bin
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv demo test test-drivers lint bench gpu-report docs meshes web wheel clean
+.PHONY: help venv demo test test-drivers lint bench gpu-report docs gallery meshes web wheel clean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +58,11 @@ docs: ## build the site of docs/ into out/docs/, with the pictures of examples/
 	$(BOOTSTRAP) --group docs
 	@rm -rf docs/generated
 	$(BIN)/python -m sphinx -W --keep-going -q docs out/docs
+
+gallery: ## draw the pictures of docs/gallery and the contact sheets of docs/presets; it takes half an hour without a GPU
+	$(BOOTSTRAP)
+	$(BIN)/python tools/gallery.py
+	$(BIN)/python tools/preset_sheets.py
 
 meshes: ## regenerate the files in meshes/
 	$(BOOTSTRAP) --group meshes

@@ -28,6 +28,7 @@ extensions = [
     "mathml",
     "method_reference",
     "shadow_reference",
+    "preset_reference",
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_ext", "_templates", "generated/*.md"]

@@ -1,13 +1,25 @@
 """How many rays a second a bake traces, beside Embree alone on the same rays.
 
 Run it with ``python tools/bake_throughput.py [MESH] [--size 1024] [--rays 64] [--threads N] [--rounds 3]``.
+
+``--batch 200`` bakes so many assets instead, each another size of MESH with UVs of its own, in ``--threads`` processes,
+from start to end: processes that start, models that are read, maps that are written. ``--dask`` does so on workers of
+Dask, of which all but one come when a tenth of the assets is done, and one is killed, and another comes, at a third.
+``processor_share`` is of processor time, which other work on the machine changes less than the clock.
 """
 
 from __future__ import annotations
 
 import json
+import logging
+import os
+import resource
+import signal
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -15,13 +27,18 @@ import numpy.typing as npt
 
 from translucent.assets import mesh_path
 from translucent.bake.bake import bake_thickness
+from translucent.bake.batch import BatchReport, bake_many
+from translucent.bake.gltf.export import mesh_file
+from translucent.bake.jobs import Job
 from translucent.bake.measure import CHUNK_RAYS, Measure
+from translucent.bake.record import parts_of, read_record
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points, Surface
 from translucent.bake.texels import Atlas
 from translucent.bake.unwrap import Unwrapped, unwrap
 from translucent.cpu.threads import in_threads, processors
 from translucent.geometry.mesh import Mesh
+from translucent.gltf.write_file import write_gltf
 from translucent.mesh_files import load_mesh
 
 #: Rays that Embree alone traces in a round: enough for some seconds, and little memory.
@@ -51,20 +68,96 @@ def throughput(
     """
     threads = threads or processors()
     unwrapped = unwrap(mesh, size, None)
-    settings = BakeSettings(size=size, rays=rays)
-    surface = Surface.of(unwrapped.mesh)
-    measure = Measure.of(surface, settings)
-    prepared = _prepared(measure, _some_points(surface, unwrapped, size, SAMPLE // rays))
-    count = sum(len(origins) for origins, _ in prepared)
+    trace = _embree_alone(unwrapped, size, rays, threads)
     found: dict[str, list[float]] = {"embree": [], "bake": []}
     for _ in range(rounds):
-        started = time.perf_counter()
-        in_threads(lambda ray: surface.embree.scene.run(*ray), prepared, threads)
-        found["embree"].append(count / (time.perf_counter() - started) / 1e6)
+        found["embree"].append(trace()[0])
         report = bake_thickness(unwrapped.mesh, size, rays=rays, threads=threads).report
         found["bake"].append(report.mrays_per_second)
     medians = {name: float(np.median(rates)) for name, rates in found.items()}
     return {**medians, "share": medians["bake"] / medians["embree"], "rays": float(report.rays)}
+
+
+def _embree_alone(unwrapped: Unwrapped, size: int, rays: int, threads: int) -> Callable[[], tuple[float, float]]:
+    """A round of Embree alone: millions of rays a second, by the clock and of processor time."""
+    surface = Surface.of(unwrapped.mesh)
+    measure = Measure.of(surface, BakeSettings(size=size, rays=rays))
+    prepared = _prepared(measure, _some_points(surface, unwrapped, size, SAMPLE // rays))
+    count = sum(len(origins) for origins, _ in prepared) / 1e6
+
+    def trace() -> tuple[float, float]:
+        started, used = time.perf_counter(), time.process_time()
+        in_threads(lambda ray: surface.embree.scene.run(*ray), prepared, threads)
+        return count / (time.perf_counter() - started), count / (time.process_time() - used)
+
+    return trace
+
+
+def batch(mesh: Mesh, count: int, size: int, rays: int, workers: int, dask: bool) -> dict[str, Any]:
+    """A batch from start to end, beside Embree alone before and after it.
+
+    Returns
+    -------
+    dict of str to float
+        ``embree`` and ``bake`` in millions of rays a second by the clock, ``share`` of the second in the first, and
+        ``processor_share``; ``jobs``: seconds of all jobs together, and of these ``bakes``, from mesh to padded map.
+    """
+    unwrapped = unwrap(mesh, size, None)
+    trace = _embree_alone(unwrapped, size, rays, workers)
+    with tempfile.TemporaryDirectory() as folder:
+        jobs = []
+        for number in range(count):
+            scaled = Mesh(unwrapped.mesh.vertices * (1.0 + 0.001 * number), unwrapped.mesh.faces, unwrapped.mesh.uv)
+            path = Path(folder) / f"asset{number:03}.glb"
+            write_gltf(mesh_file(scaled), path)
+            output = str(path.with_suffix(".exr"))
+            jobs.append({"model": str(path), "output": output, "settings": {"size": size, "rays": rays}})
+        alone, used, started = [trace()], _used(), time.perf_counter()
+        report = _on_dask(jobs, workers) if dask else bake_many(jobs, workers=workers)
+        seconds, used = time.perf_counter() - started, _used() - used
+        alone.append(trace())
+        records = [read_record(Path(str(job["output"]))) or {} for job in jobs]
+        bakes = sum(part["report"]["seconds"] for record in records for part in parts_of(record))
+    traced = sum(asset["rays"] for asset in report.assets if "rays" in asset) / 1e6
+    clock, processor = np.mean(alone, axis=0).tolist()
+    return {
+        "embree": clock,
+        "bake": traced / seconds,
+        "share": traced / seconds / clock,
+        "processor_share": traced / used / processor,
+        "seconds": seconds,
+        "jobs": sum(asset["seconds"] for asset in report.assets),
+        "bakes": bakes,
+        **{status: report.count(status) for status in ("baked", "skipped", "failed")},
+    }
+
+
+def _used() -> float:
+    """Processor seconds of this process and of those that it has had and that have ended."""
+    found = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in found)
+
+
+def _on_dask(jobs: list[Job], workers: int) -> BatchReport:
+    """A batch on workers that come and go."""
+    from distributed import Client, LocalCluster
+
+    logging.getLogger("distributed").setLevel(logging.ERROR)
+    done = 0
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, memory_limit=0) as cluster,
+        Client(cluster) as client,
+    ):
+
+        def changed(_: object) -> None:
+            nonlocal done
+            done += 1
+            if done == max(len(jobs) // 10, 1):
+                cluster.scale(workers)
+            if done == len(jobs) // 3:
+                os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
+
+        return bake_many(jobs, client.get_executor(), progress=changed)
 
 
 def _some_points(surface: Surface, unwrapped: Unwrapped, size: int, most: int) -> Points:
@@ -94,9 +187,17 @@ def _prepared(measure: Measure, points: Points) -> list[tuple[npt.NDArray[np.flo
 @click.option("--rays", default=64, show_default=True, help="Rays from each texel.")
 @click.option("--threads", type=int, help="Default: as many as there are processors.")
 @click.option("--rounds", default=3, show_default=True, help="Of both; the medians are printed.")
-def main(mesh: Path | None, size: int, rays: int, threads: int | None, rounds: int) -> None:
+@click.option("--batch", "assets", type=int, metavar="N", help="Bake a batch of so many assets instead.")
+@click.option("--dask", is_flag=True, help="Of --batch: on Dask, with workers that come and go.")
+def main(
+    mesh: Path | None, size: int, rays: int, threads: int | None, rounds: int, assets: int | None, dask: bool
+) -> None:
     """Rays a second of a bake of MESH (default: the bear of the toolkit), and of Embree alone."""
-    found = throughput(load_mesh(mesh or mesh_path("bear")), size, rays, threads, rounds)
+    model = load_mesh(mesh or mesh_path("bear"))
+    if assets is None:
+        found: dict[str, Any] = throughput(model, size, rays, threads, rounds)
+    else:
+        found = batch(model, assets, size, rays, threads or processors(), dask)
     click.echo(json.dumps(found, indent=1))
 
 

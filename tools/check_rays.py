@@ -26,7 +26,8 @@ from translucent.assets import mesh_path
 from translucent.geometry.bvh import build_hierarchy, sah_cost
 from translucent.geometry.embree import EmbreeMesh
 from translucent.geometry.normals import drawn_normals
-from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
+from translucent.gpu.hierarchies import SceneHierarchies
+from translucent.gpu.packed_meshes import packed_mesh
 from translucent.gpu.ray_probe import RayProbe
 
 #: Meshes of the toolkit: a shape of blobs, thin walls, many turns, and holes.

@@ -15,18 +15,24 @@ from translucent.scene.stages import stage_named
 SIZE = (960, 720)
 OUT = Path("out")
 
-#: Each picture: bodies as (mesh, preset of its medium).
+#: A young red wine: what 2 cm of it leave of white light. Merlot as it was measured is nearly black in a glass.
+RED_WINE = tl.Medium.from_color((0.62, 0.05, 0.09), distance=0.02, ior=1.34)
+
+#: Each picture: bodies as (mesh, its medium); the first has what two of them claim.
 PICTURES = {
-    "bear": [("bear", "gummy")],
-    "wine": [("goblet", "crystal"), ("wine", "white_zinfandel")],
+    "bear": [("bear", tl.preset("gummy").medium)],
+    "wine": [("goblet", tl.preset("crystal").medium), ("wine", RED_WINE)],
 }
 
 
-def scene_of(bodies: list[tuple[str, str]]) -> tl.Scene:
+def scene_of(bodies: list[tuple[str, tl.Medium]]) -> tl.Scene:
     """The bodies, framed together for a studio."""
-    meshes = [tl.load_mesh(mesh_path(name)) for name, _ in bodies]
-    objects = [tl.Object(mesh, medium=tl.preset(name).medium) for mesh, (_, name) in zip(meshes, bodies, strict=True)]
-    return tl.Scene(objects, framing(objects, SIZE, stage=stage_named("studio")))
+    objects = [
+        tl.Object(tl.load_mesh(mesh_path(name)), medium, priority=-number)
+        for number, (name, medium) in enumerate(bodies)
+    ]
+    camera = framing(objects, SIZE, stage=stage_named("studio"))
+    return tl.Scene(objects, camera, overlap="priority" if len(objects) > 1 else "add")
 
 
 def main() -> int:

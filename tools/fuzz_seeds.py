@@ -28,7 +28,7 @@ from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium
 from translucent.materials import load_medium, text_block
 from translucent.media.pixel import pixel_color
-from translucent.media.presets import read_presets
+from translucent.media.preset_file import read_presets
 from translucent.scene.environment_files import read_environment_map
 
 JADE = tl.Medium.from_color((0.2, 0.6, 0.4), 0.02, ior=1.5)

@@ -2,15 +2,19 @@
 
 ``python tools/measure_baking.py [MODEL...]`` measures points a second of the modes ``normal`` and ``inscribed``, beside
 ``trimesh.proximity.thickness`` with ``ray`` and ``max_sphere`` for the same points and normals; default: the bear and
-the knot of the toolkit. Both take one ray for a point, or one sphere, which a bake starts from 64 rays. ``--memory``
-bakes a map instead, of 4096 x 4096 texels with 64 rays each, and tells the most memory that the process has held.
+the knot of the toolkit. Both take one ray for a point, or one sphere; trimesh needs rtree for its spheres. ``--memory``
+bakes a map instead, of 4096 x 4096 texels, writes it and tells the most memory that the process has held; rays are
+traced in strips, so a ``--share`` of the rows takes as much memory as all of them, and less time.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import resource
+import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import click
@@ -28,19 +32,18 @@ from translucent.cpu.threads import in_threads, processors
 
 Array = npt.NDArray[np.float64]
 
-#: Points of a round: trimesh's spheres take a hundredth of the time for each on large meshes.
-POINTS = {"normal": 200_000, "inscribed": 2_000}
+#: Seconds of a round, and points of the first one, which tells how many fill them, and of the longest.
+SECONDS, FEWEST, MOST = 0.3, 50, 200_000
 
 #: What trimesh calls the same.
 THEIRS = {"normal": "ray", "inscribed": "max_sphere"}
-
-ROUNDS = 5
 
 
 def sampled(surface: Surface, count: int) -> tuple[npt.NDArray[np.int64], Array]:
     """Faces (count,) and barycentric weights (count, 3) of points that are spread by area."""
     rng = np.random.default_rng(2)
-    area = np.linalg.norm(np.cross(*(surface.corners[:, i] - surface.corners[:, 0] for i in (1, 2))), axis=1)
+    a, b, c = surface.corners.transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     face = rng.choice(len(area), count, p=area / area.sum())
     return face, 0.02 + 0.94 * rng.dirichlet([1, 1, 1], count)
 
@@ -52,59 +55,72 @@ def seconds(call: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
-def compare(mesh: tl.Mesh, mode: str) -> str:
+def compare(mesh: tl.Mesh, mode: str, rounds: int) -> str:
     """One line of the table."""
-    surface = Surface.of(mesh, crease=0.0)
+    smooth = Surface.of(mesh)
+    # trimesh has the normals of the faces.
+    surface = dataclasses.replace(smooth, normals=np.repeat(smooth.planes[:, None, :3], 3, axis=1))
     measure = Measure.of(surface, BakeSettings(mode=mode))  # type: ignore[arg-type]
-    face, weights = sampled(surface, POINTS[mode])
+    face, weights = sampled(surface, MOST)
     position = np.einsum("kc,kci->ki", weights, mesh.vertices[mesh.faces[surface.faces[face]]])
     normals = surface.planes[face, :3]
     peer = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     points = surface.points(face, weights)
     threads = processors()
-    parts = [points[begin::threads] for begin in range(threads)]
 
-    def ours() -> object:
-        return in_threads(measure.at, parts, threads)
+    def ours(count: int) -> object:
+        return in_threads(measure.at, [points[begin:count:threads] for begin in range(threads)], threads)
 
-    def theirs() -> object:
+    def theirs(count: int) -> object:
         with np.errstate(all="ignore"):
-            return trimesh.proximity.thickness(peer, position, normals=normals, method=THEIRS[mode])
+            return trimesh.proximity.thickness(peer, position[:count], normals=normals[:count], method=THEIRS[mode])
 
-    ours(), theirs()  # what both prepare once
-    own, other = (
-        np.array(times) for times in zip(*[(seconds(ours), seconds(theirs)) for _ in range(ROUNDS)], strict=True)
-    )
-    rates = POINTS[mode] / np.median(own) / 1e3, POINTS[mode] / np.median(other) / 1e3
+    calls = ours, theirs
+    for call in calls:
+        call(FEWEST)  # what it prepares once
+    counts = [int(np.clip(FEWEST * SECONDS / seconds(partial(call, FEWEST)), FEWEST, MOST)) for call in calls]
+    counts = [
+        int(np.clip(n * SECONDS / seconds(partial(call, n)), FEWEST, MOST))
+        for call, n in zip(calls, counts, strict=True)
+    ]
+    pairs = [[n / seconds(partial(call, n)) for call, n in zip(calls, counts, strict=True)] for _ in range(rounds)]
+    own, other = np.array(pairs).T
     return (
-        f"{mesh.name:20} {len(mesh.faces):7} triangles  {mode:9} {rates[0]:9.1f} k points/s, trimesh {THEIRS[mode]:10} "
-        f"{rates[1]:9.1f} k points/s: {np.median(other / own):5.1f} times"
+        f"{mesh.name:20} {len(mesh.faces):7} triangles  {mode:9} {np.median(own) / 1e3:9.1f} k points/s, trimesh "
+        f"{THEIRS[mode]:10} {np.median(other) / 1e3:9.2f} k points/s: {np.median(own / other):5.1f} times"
     )
 
 
-def most_memory(mesh: tl.Mesh) -> str:
-    """Bake a large map, and tell what it took."""
+def most_memory(mesh: tl.Mesh, rays: int, share: float) -> str:
+    """Bake a large map, of which the mesh fills a share of the rows, write it, and tell what it took."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    report = tl.bake_thickness(unwrap(mesh, 4096, None).mesh, 4096, rays=64).report
+    with_uv = unwrap(mesh, 4096, None).mesh
+    assert with_uv.uv is not None
+    baked = tl.bake_thickness(dataclasses.replace(with_uv, uv=with_uv.uv * (1.0, share)), 4096, rays=rays)
+    with tempfile.TemporaryDirectory() as folder:
+        baked.save(Path(folder) / "thickness.exr")
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     return (
-        f"{mesh.name}: {report.rays / 1e6:.0f} million rays in {report.seconds:.0f} s, at most {most:.2f} GB "
-        f"({before:.2f} GB before)"
+        f"{mesh.name}: {baked.report.rays / 1e6:.0f} million rays in {baked.report.seconds:.0f} s, at most "
+        f"{most:.2f} GB ({before:.2f} GB before)"
     )
 
 
 @click.command()
 @click.argument("models", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--memory", is_flag=True, help="Bake 4096 x 4096 texels of the first MODEL.")
-def main(models: tuple[Path, ...], memory: bool) -> None:
+@click.option("--rays", default=64, show_default=True, help="With --memory: from each texel.")
+@click.option("--share", default=1.0, show_default=True, help="With --memory: of the rows that the mesh fills.")
+@click.option("--rounds", default=5, show_default=True, help="Of each; medians are printed.")
+def main(models: tuple[Path, ...], memory: bool, rays: int, rounds: int, share: float) -> None:
     """Time for a point beside trimesh, or memory of a large map."""
     meshes = [tl.load_mesh(path) for path in models or (mesh_path("bear"), mesh_path("knot"))]
     if memory:
-        click.echo(most_memory(meshes[0]))
+        click.echo(most_memory(meshes[0], rays, share))
         return
     for mesh in meshes:
-        for mode in POINTS:
-            click.echo(compare(mesh, mode))
+        for mode in THEIRS:
+            click.echo(compare(mesh, mode, rounds))
 
 
 if __name__ == "__main__":

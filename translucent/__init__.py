@@ -47,6 +47,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.frames.metrics import interior as interior
     from translucent.frames.photographs import Photograph as Photograph
     from translucent.frames.photographs import fit_photographs as fit_photographs
+    from translucent.frames.tiled import Tile as Tile
     from translucent.geometry.mesh import Mesh as Mesh
     from translucent.gltf.load import load_scene as load_scene
     from translucent.gltf.materials import read_materials as read_materials
@@ -106,6 +107,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.scene.staging import staged as staged
     from translucent.scene.surface import Surface as Surface
     from translucent.scene.texture import Texture as Texture
+    from translucent.tiles import render_tiles as render_tiles
 
 #: Modules of the public names. Each is imported when it is first asked for: SciPy and OpenGL take their time.
 _NAMES = {
@@ -127,6 +129,7 @@ _NAMES = {
     "frames.frame": "Frame",
     "frames.metrics": "Errors compare interior",
     "frames.photographs": "Photograph fit_photographs",
+    "frames.tiled": "Tile",
     "geometry.mesh": "Mesh",
     "gltf.load": "load_scene",
     "gltf.materials": "read_materials",
@@ -161,6 +164,7 @@ _NAMES = {
     "scene.staging": "staged",
     "scene.surface": "Surface",
     "scene.texture": "Texture",
+    "tiles": "render_tiles",
 }
 _MODULE_OF = {name: f"translucent.{module}" for module, names in _NAMES.items() for name in names.split()}
 

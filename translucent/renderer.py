@@ -163,6 +163,7 @@ class Renderer:
         scattering: Scattering | None = None,
         caustics: Caustics | None = None,
         shadows: ShadowMaps | None = None,
+        adaptive: bool = True,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
         """Render a scene.
@@ -177,6 +178,9 @@ class Renderer:
         samples : int
             Sub-pixel samples over which radiance and transmittance are averaged, for smooth edges. The other arrays
             belong to the ray through the pixel center, as all do with 1.
+        adaptive : bool
+            Trace rays from smooth interfaces for all samples of a pixel where they or neighbors differ, elsewhere for
+            one or a few; not for a transparent frame. False: for all everywhere.
         backdrop : Backdrop or TextureBackdrop, optional
             A picture of everything opaque, drawn elsewhere. The same for all samples of a pixel.
         transparent : bool
@@ -197,7 +201,7 @@ class Renderer:
         shadows : ShadowMaps, optional
             How sharp shadows on opaque objects are. Without OpenGL they are traced.
         progress : callable, optional
-            Takes the share of the samples, or of random paths, that is done, 0 to 1; with OpenGL.
+            Takes the share of the work that is done, 0 to 1; with OpenGL.
 
         Returns
         -------
@@ -234,9 +238,9 @@ class Renderer:
             if transparent:
                 frame = self._render_transparent(scene, size, chosen, samples, backdrop, progress)
             elif backdrop is not None:
-                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop)
+                frame = self._gpu("a backdrop").render(scene, size, chosen, samples, backdrop, adaptive=adaptive)
             else:
-                frame = self._run(scene, size, chosen, samples, progress)
+                frame = self._run(scene, size, chosen, samples, progress, adaptive=adaptive)
         except BaseException as error:
             self._note_interruption(error)
             raise
@@ -254,10 +258,12 @@ class Renderer:
         chosen: RenderPlan,
         samples: int,
         progress: Callable[[float], None] | None,
+        *,
+        adaptive: bool,
     ) -> Frame:
         engine = self._engine
         if isinstance(engine, GpuRenderer):
-            return engine.render(scene, size, chosen, samples, report=progress)
+            return engine.render(scene, size, chosen, samples, report=progress, adaptive=adaptive)
         return engine.render(scene, size, chosen, samples)
 
     def _render_transparent(
@@ -273,7 +279,8 @@ class Renderer:
             raise InputError("a transparent frame", "a backdrop is behind it", "leave out one of the two")
         white = page_radiance(scene)
         before_black, before_white = (
-            self._run(before_page(scene, level), size, chosen, samples, progress) for level in (0.0, white)
+            self._run(before_page(scene, level), size, chosen, samples, progress, adaptive=False)
+            for level in (0.0, white)
         )
         passed = np.clip((before_white.radiance.astype(np.float64) - before_black.radiance) / white, 0.0, 1.0)
         alpha = 1.0 - passed.mean(axis=-1)
@@ -374,11 +381,14 @@ def _check_backdrop(backdrop: Backdrop | TextureBackdrop | None, size: tuple[int
     if not isinstance(backdrop, Backdrop | TextureBackdrop):
         raise InputError(f"backdrop {backdrop!r}", f"of type {type(backdrop).__name__}", "give a tl.Backdrop")
     if backdrop.size != size:
-        raise InputError(
-            f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}",
-            f"the frame is {size[0]}x{size[1]}",
-            "draw both in the same size",
-        )
+        asked = f"backdrop of {backdrop.size[0]}x{backdrop.size[1]}"
+        raise InputError(asked, f"the frame is {size[0]}x{size[1]}", "draw both in the same size")
+
+
+def invalid_text(plan: RenderPlan, invalid: int, covered: int) -> str:
+    """Warning of so many pixels that cannot be trusted."""
+    why = "; ".join(plan.limits) or "a surface that does not balance"
+    return f"{invalid} pixels are not valid ({covered} are covered): {why}"
 
 
 def _warn(frame: Frame) -> None:
@@ -386,8 +396,5 @@ def _warn(frame: Frame) -> None:
         if effect.kind is NoteKind.LIGHTS_LEFT_OUT:
             warnings.warn(str(effect), TranslucentWarning, stacklevel=3)
     if invalid := int(np.count_nonzero(~frame.valid)):
-        covered = int(np.count_nonzero(frame.coverage))
-        why = "; ".join(frame.plan.limits) or "a surface that does not balance"
-        warnings.warn(
-            f"{invalid} pixels are not valid ({covered} are covered): {why}", TranslucentWarning, stacklevel=3
-        )
+        text = invalid_text(frame.plan, invalid, int(np.count_nonzero(frame.coverage)))
+        warnings.warn(text, TranslucentWarning, stacklevel=3)

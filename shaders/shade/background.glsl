@@ -25,6 +25,11 @@ vec3 seen_environment(vec2 at, vec3 ray) {
 #endif
 }
 
+// Position of a pixel in the picture, right and down, in heights of all of it: the frame may be a part.
+vec2 in_heights(vec2 pixel) {
+    return (pixel + beyond.xy) / (frame_size.y + beyond.w);
+}
+
 // What a straight ray meets.
 vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
 #if OPAQUE
@@ -32,5 +37,5 @@ vec3 background(vec2 pixel, vec3 ray, ivec2 texel) {
         return texelFetch(opaque_radiance, texel, 0).rgb;
     }
 #endif
-    return seen_environment(pixel / frame_size.y, normalize(ray));
+    return seen_environment(in_heights(pixel), normalize(ray));
 }

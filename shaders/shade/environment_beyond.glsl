@@ -18,12 +18,13 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
     return environment_light(direction, roughness);
 #else
     if (seen_kind != ENVIRONMENT_CHECKERBOARD) { return seen_environment(vec2(0.0), direction); }
-    float towards = dot(direction, ray_forward.xyz);
+    float towards = metres_ahead_of(direction);
     if (towards < 1e-2) { return seen_scale * mix(seen_first.rgb, seen_second.rgb, 0.5); }
-    float path = max(surface_ahead.w - dot(point, ray_forward.xyz), 0.0) / towards;
+    float path = max(surface_ahead.w - metres_ahead_of(point), 0.0) / towards;
     vec3 wall = seen_at(point + path * direction);
-    float heights = roughness * roughness * path / (length(surface_up.xyz) * (surface_right.w == 1.0 ? surface_ahead.w + surface_ahead.z : 1.0));
-    float share = blurred_checkerboard_share(wall.xy / frame_size.y, seen_tiles, heights * seen_tiles);
+    float whole = (frame_size.y + beyond.w) / frame_size.y;
+    float heights = roughness * roughness * path / (whole * length(surface_up.xyz) * (surface_right.w == 1.0 ? surface_ahead.w + surface_ahead.z : 1.0));
+    float share = blurred_checkerboard_share(in_heights(wall.xy), seen_tiles, heights * seen_tiles);
     return seen_scale * mix(seen_first.rgb, seen_second.rgb, share);
 #endif
 }
@@ -43,7 +44,7 @@ vec4 blurred_opaque(vec2 pixel, float width) {
 
 // Width in pixels of the blur of what a ray meets at a point, some metres behind a mirror with microfacets of this alpha.
 float blur_width(float alpha, float path, vec3 point) {
-    float spread = surface_right.w == 1.0 ? dot(point, ray_forward.xyz) + surface_ahead.z : 1.0;
+    float spread = surface_right.w == 1.0 ? metres_ahead_of(point) + surface_ahead.z : 1.0;
     float pixel = 2.0 * length(surface_up.xyz) * spread / frame_size.y;
     return 4.0 * alpha * path / max(pixel, 1e-30);
 }

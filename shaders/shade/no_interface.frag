@@ -1,6 +1,6 @@
 // Where a ray meets no interface: what is behind, through the media there. Row 0 of the output is the top row.
 // REST: beyond the part of the picture that media may cover. In that part, depth lets shade/surfaces.frag pass where there
-// is an interface, and nothing is added to a sum there.
+// is an interface, and nothing is added to a sum there; APART: but for transmittance.
 
 #include <constants>
 #include <View>
@@ -42,6 +42,10 @@ void main() {
 #endif
     gl_FragDepth = none ? 0.0 : 1.0;
     out_radiance = none ? vec4(behind * through + emitted, 1.0) : vec4(0.0);
+#if APART
+    out_transmittance = vec4(through, none ? 1.0 : 0.0);
+#else
     out_transmittance = none ? vec4(through, 1.0) : vec4(0.0);
+#endif
 #endif
 }

@@ -41,7 +41,7 @@ void main() {
 
     // Metres along the camera's axis for which the picture grows by its half extent; 1 where rays are parallel.
     bool perspective = surface_right.w == 1.0;
-    float spread = perspective ? dot(point.xyz, ray_forward.xyz) + surface_ahead.z : 1.0;
+    float spread = perspective ? metres_ahead_of(point.xyz) + surface_ahead.z : 1.0;
     vec3 from_eye = point.xyz + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
     vec3 view = perspective ? from_eye / spread : ray_forward.xyz;
     float facing = -dot(normal, view);

@@ -64,7 +64,7 @@ vec3 environment_seen(Path path, vec2 pixel) {
     return mirrored_environment(path.direction);
 #else
     if ((path.flags & FLAG_REFLECTED) != 0u) { return mirrored_environment(path.direction); }
-    if ((path.flags & FLAG_BENT) == 0u) { return seen_environment(pixel / frame_size.y, path.direction); }
+    if ((path.flags & FLAG_BENT) == 0u) { return seen_environment(in_heights(pixel), path.direction); }
     return environment_beyond(path.origin, path.direction, 0.0);
 #endif
 }
@@ -99,8 +99,9 @@ vec3 reaching_irradiance(vec3 point, vec3 normal) {
 
 // An opaque object, lit as where it is seen directly, but without its textures.
 vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
-    if (body.plain == 1.0) { return body.color * reaching_irradiance(point, normal) / PI; }
-    OpaqueFinish finish = OpaqueFinish(body.color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
+    vec3 color = paint_color(body, point);
+    if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
+    OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
         body.emissive, normal, 0.0, 1.0, 1.0, false);
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
@@ -396,7 +397,7 @@ void main() {
     float ended_in = texelFetch(path_spread, here, 0).w;
     if (known.count >= last_path && ended_in + 1.5 < pass_number) { discard; }  // both states have it
     Path path = stored_path(here);
-    Draws draws = Draws(uint(texel.y) * uint(frame_size.x) + uint(texel.x), known.count, drawn);
+    Draws draws = Draws(uint(texel.y + int(beyond.y)) * uint(frame_size.x + beyond.z) + uint(texel.x + int(beyond.x)), known.count, drawn);
     int most = (path.flags & FLAG_CAREFUL) != 0u ? 1 : events;
     int event = 0;
     bool done = known.count >= last_path;

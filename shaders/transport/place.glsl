@@ -28,6 +28,14 @@ float index_of(int body, int channel) {
 #endif
 }
 
+// Color of an opaque object at a point, as far as it is no texture's.
+vec3 paint_color(TracedBody body, vec3 point) {
+    if (body.fading.z == 0.0) { return body.color; }
+    vec3 offset = point - vec3(body.local_x.w, body.local_y.w, body.local_z.w);
+    float radius = length(vec3(dot(body.local_x.xyz, offset), dot(body.local_y.xyz, offset), dot(body.local_z.xyz, offset)));
+    return body.color * (1.0 - body.fading.z * smoothstep(body.fading.x, body.fading.y, radius));
+}
+
 // All surfaces that a ray meets in one place; solids are crossed together, and their interface is one.
 struct Place {
     int object;          // whose interface it is: of the solid that is entered, else of that left, else of a sheet; or opaque

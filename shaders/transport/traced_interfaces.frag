@@ -1,7 +1,8 @@
 // Rays that meet the interfaces of bodies, followed through the mesh: a tree of exact reflections and refractions. The
 // stronger branch is always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked
 // up in the environment; so are both at the last of `most_interfaces`. What is absorbed and emitted on each segment is exact. The first
-// interface is that which the rasterizer has found. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
+// interface is that which the rasterizer has found. ADAPTIVE: of several samples of a pixel, those that are worth it; with
+// the square of their luminance in place of the transmittance. Row 0 of the output is the top row. Radiance is basic radiance, L / n^2.
 
 #include <constants>
 #include <View>
@@ -10,6 +11,7 @@
 #include <Surfaces>
 #include <SurfaceRow>
 #include <TracedBody>
+#include "lib/color.glsl"
 #include "lib/interface.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
@@ -92,7 +94,7 @@ vec3 kept_on_side(vec3 direction, vec3 side) {
 // a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
 // random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
 vec2 microfacet_shares(int met, int turns) {
-    uvec2 at = uvec2(gl_FragCoord.xy);
+    uvec2 at = uvec2(gl_FragCoord.xy + beyond.xy);
     uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 2654435761u + uint(turns) * 40503u) * 747796405u + 2891336453u;
     state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     state = (state >> 22u) ^ state;
@@ -124,11 +126,26 @@ struct Sum {
 
 // Radiance of an opaque object along a ray, lit as where it is seen directly, but without its textures.
 vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
-    if (body.plain == 1.0) { return body.color * reaching_irradiance(point, normal) / PI; }
-    OpaqueFinish finish = OpaqueFinish(body.color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
+    vec3 color = paint_color(body, point);
+    if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
+    OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
         body.emissive, normal, 0.0, 1.0, 1.0, false);
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
+
+#if OPAQUE
+uniform int ground_object;   // number of the object that is the ground, or -1
+uniform vec4 ground_plane;   // unit normal upwards, and metres along it from the center of the media
+
+// How much the axial depth of a surface may differ between the centers of neighboring pixels.
+float depth_within_pixel(vec3 point, vec3 normal) {
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    float spread = surface_right.w == 1.0 ? dot(from_eye, ray_forward.xyz) : 1.0;
+    vec3 view = surface_right.w == 1.0 ? normalize(from_eye) : ray_forward.xyz;
+    float facing = abs(dot(view, normal));
+    return 2.0 * length(surface_up.xyz) * spread / frame_size.y * sqrt(1.0 - min(facing * facing, 1.0)) / max(facing, 1e-3);
+}
+#endif
 
 // The same where the picture shows it: with its textures, and blurred behind rough interfaces.
 vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
@@ -137,18 +154,39 @@ vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
     if (in_picture(shown.xy)) {
         ivec2 texel = stored(texel_of(shown.xy));
         float there = texelFetch(opaque_axial_depth, texel, 0).r;
-        if (abs(there - shown.z) * surface_ahead.y < 1e-2 * surface_reach) {
+        if (abs(there - shown.z) * surface_ahead.y < 1e-2 * surface_reach + depth_within_pixel(point, normal)) {
 #if MICROFACETS
             if (ray.blur > 0.0) {
                 vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
                 return blurred.rgb + (1.0 - blurred.a) * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
             }
 #endif
-            return texelFetch(opaque_radiance, texel, 0).rgb;
+            vec4 found = texelFetch(opaque_radiance, texel, 0);
+#if ADAPTIVE
+            return found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
+#else
+            return found.rgb;
+#endif
         }
     }
 #endif
     return opaque_light(body, normal, ray.direction, point);
+}
+
+// What a ray sees that is not followed on: the environment, or the ground before it.
+vec3 seen_ahead(vec3 origin, Ray ray, vec3 direction, bool reflected) {
+#if OPAQUE
+    if (ground_object >= 0) {
+        float falling = -dot(ground_plane.xyz, direction), height = dot(ground_plane.xyz, origin) - ground_plane.w;
+        if (falling > 1e-3 && height > 0.0) {
+            Ray down = ray;
+            down.direction = direction;
+            down.reflected = reflected;
+            return opaque_seen(traced_body(ground_object), ground_plane.xyz, down, origin + height / falling * direction);
+        }
+    }
+#endif
+    return environment_seen(origin, direction, reflected, ray.blur);
 }
 
 // The first interface, as the rasterizer has found it.
@@ -338,13 +376,13 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         } else
 #endif
         if (strength(weaker.share) > 0.0) {
-            sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * environment_seen(weaker.origin, weaker.direction, weaker.reflected, weaker.blur);
+            sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * seen_ahead(weaker.origin, weaker, weaker.direction, weaker.reflected);
         }
         if (last || strength(ray.share) < faintest_share) {
             // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
             bool total = reflectance == 1.0;
             sum.light += (on_stronger ? vec3(1.0) : again) * ray.share
-                * environment_seen(ray.origin, total ? arrival : ray.direction, total ? arrived_reflected : ray.reflected, ray.blur);
+                * seen_ahead(ray.origin, ray, total ? arrival : ray.direction, total ? arrived_reflected : ray.reflected);
             ends = true;
         }
     }
@@ -449,5 +487,9 @@ void main() {
 #endif
     out_radiance = vec4(min(light, vec3(NOTHING)), 1.0);
     out_transmittance.a = 1.0 - min(sum.lost, 1.0);
+#if ADAPTIVE
+    float level = min(luminance(out_radiance.rgb), 1e15);
+    out_transmittance.rgb = vec3(level * level, 0.0, 0.0);
+#endif
 }
 #endif

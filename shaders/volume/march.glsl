@@ -15,7 +15,7 @@ int marched_segments = 0;
 
 // A random number in 0..1 of a pixel, the same on all machines (pcg3d, Jarzynski & Olano 2020).
 float hashed(uint number) {
-    uvec3 v = uvec3(uint(gl_FragCoord.x), uint(frame_size.y - gl_FragCoord.y), number + 2654435769u * uint(march_seed));
+    uvec3 v = uvec3(uint(gl_FragCoord.x + beyond.x), uint(frame_size.y - gl_FragCoord.y + beyond.y), number + 2654435769u * uint(march_seed));
     v = v * 1664525u + 1013904223u;
     v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
     v ^= v >> 16u;

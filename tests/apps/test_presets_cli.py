@@ -63,7 +63,7 @@ def test_the_table_as_json(run: Run) -> None:
     result = run("--json")
     listed = strict_json(result.out)["presets"]
     assert [entry["name"] for entry in listed] == list(tl.presets())
-    keys = ("name", "kind", "regime", "colors", "diffuse_color", "source")
+    keys = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source")
     assert {tuple(entry) for entry in listed} == {keys}
     merlot = next(entry for entry in listed if entry["name"] == "merlot")
     assert merlot["regime"] == "absorbing"

@@ -318,30 +318,33 @@ def cluster() -> Iterator[Any]:
 
 
 @pytest.mark.filterwarnings("ignore")  # of Dask, about workers that end
-def test_dask_bakes_all_though_a_worker_is_killed(cluster: Any, make_jobs: Any, tmp_path: Path) -> None:
+def test_dask_bakes_all_though_workers_come_and_one_is_killed(cluster: Any, make_jobs: Any, tmp_path: Path) -> None:
     from distributed import Client
 
-    jobs, alone = make_jobs(50, suffix=".exr"), make_jobs(50, "alone", suffix=".exr")
+    jobs, alone = make_jobs(24, suffix=".exr"), make_jobs(24, "alone", suffix=".exr")
     killed = []
     with Client(cluster) as client:
         workers = client.run(os.getpid)
 
         def kill(entry: Job) -> None:
             done.append(entry)
+            if len(done) == 4:
+                cluster.scale(3)
             if len(done) == 10:
                 killed.append(next(iter(workers.values())))
                 os.kill(killed[0], signal.SIGKILL)
 
         done: list[Job] = []
         report = bake_many(jobs, client.get_executor(), progress=kill)
+        client.wait_for_workers(3, timeout=60)
     assert killed
     assert killed[0] not in [pid for pid in workers.values() if _lives(pid)]
     # A job whose output was whole when its worker died is found done by the next one.
-    assert len(report.assets) == 50
+    assert len(report.assets) == 24
     assert {asset["status"] for asset in report.assets} <= {"baked", "skipped"}, str(report)
-    assert report.count("baked") >= 48
+    assert report.count("baked") >= 22
     whole(jobs)
-    assert bake_many(alone, Serial()).count("baked") == 50
+    assert bake_many(alone, Serial()).count("baked") == 24
     # The same bytes, but for the files' own names, which nothing in them tells.
     assert contents(tmp_path / "maps") == contents(tmp_path / "alone")
 

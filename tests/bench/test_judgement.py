@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from translucent.bench.frontier import beats, mark_frontier
 from translucent.bench.hard.measure import CASES
 from translucent.bench.record import CaseRecord, HardCase, Report
 from translucent.bench.row import Errors, Ratio, Row, Timing
-from translucent.bench.timing import MOST, Sample, interleaved, ratio, timing
+from translucent.bench.timing import MOST, MOST_REPEATED, Sample, interleaved, ratio, timing
 
 from .test_record import PROVENANCE
 
@@ -242,3 +244,23 @@ def test_the_fastest_need_no_more_than_so_many_rounds() -> None:
     tiny = Sample(1e-9, 1e-9, 1e-9, 1e-9, 1e-9)
     found = interleaved(lambda: tiny, {"a": lambda: tiny}, 0.01, lambda *_: None)
     assert len(found["a"].wall) == len(found["a"].gpu) == MOST
+
+
+def test_tiny_drawings_are_repeated_within_a_sample_and_unsure_ones_measured_longer() -> None:
+    def steady(seconds: float) -> Callable[[], Sample]:
+        return lambda: Sample(seconds, seconds, None, seconds, seconds)
+
+    def unsteady(seconds: float) -> Callable[[], Sample]:
+        turns = itertools.cycle((0.6, 1.4))
+        return lambda: steady(next(turns) * seconds)()
+
+    # A share of 0.1 s: five rounds of 0.01 s with a floor of as much, and four times as many.
+    drawings = {"sure": steady(0.01), "unsure": unsteady(0.01)}
+    found = interleaved(steady(0.01), drawings, 0.23, lambda *_: None, patience=4.0)
+    assert len(found["sure"].wall) == 5
+    assert 19 <= len(found["unsure"].wall) <= 21
+    # Sixteen drawings make a sample, whose mean is steady; all of them count as spent.
+    tiny = interleaved(steady(2.5e-4), {"tiny": unsteady(1e-4)}, 0.1, lambda *_: None)["tiny"]
+    assert tiny.times == tiny.floor_times == MOST_REPEATED
+    assert tiny.wall == pytest.approx([1e-4] * len(tiny.wall))
+    assert 0.085 <= tiny.spent < 0.1

@@ -49,7 +49,7 @@ def test_frames_of_many_bodies_are_drawn_in_linear_time(method: tl.Method | None
 def test_samples_cost_each_body_little_more_than_its_draws(method: tl.Method | None, renderer: tl.Renderer) -> None:
     def work(count: int, samples: int) -> int:
         given = scene(count, "add")
-        return calls(lambda: renderer.render(given, (8, 8), method, samples=samples))
+        return calls(lambda: renderer.render(given, (8, 8), method, samples=samples, adaptive=False))
 
     work(FEW, 2)
     more = (work(2 * FEW, 4) - work(2 * FEW, 2)) - (work(FEW, 4) - work(FEW, 2))

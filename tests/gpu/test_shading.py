@@ -289,8 +289,13 @@ def test_samples_tell_their_share_one_by_one(renderer: tl.Renderer) -> None:
     shares: list[float] = []
     ball = tl.Object(Sphere().tessellate(12), tl.Medium(absorption=1.0, ior=1.5))
     scene = tl.Scene([ball], tl.Camera.look_at((0, 0, 5), (0, 0, 0)))
-    renderer.render(scene, (8, 8), samples=4, progress=shares.append)
+    renderer.render(scene, (8, 8), samples=4, adaptive=False, progress=shares.append)
     assert shares == [0.25, 0.5, 0.75, 1.0]
+    adaptive: list[float] = []
+    renderer.render(scene, (8, 8), samples=4, progress=adaptive.append)
+    assert adaptive == sorted(adaptive)
+    assert adaptive[:4] == [0.125, 0.25, 0.375, 0.5]
+    assert 0.5 < adaptive[-1] <= 1.0
 
 
 def test_samples_average_transmittance_not_thickness(renderer: tl.Renderer) -> None:

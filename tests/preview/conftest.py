@@ -14,6 +14,7 @@ import pytest
 from tests.preview.waiting import SIZE, wait
 from translucent.preview import worker
 from translucent.preview.document import Document, Model
+from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 
 
@@ -21,6 +22,15 @@ from translucent.preview.workspace import Workspace
 def not_nice(monkeypatch: pytest.MonkeyPatch) -> None:
     """Worker processes that tests wait for are not nice: they would wait for the tests beside them."""
     monkeypatch.setattr(worker, "NICENESS", 0)
+    monkeypatch.setattr(worker, "URGENT_NICENESS", 0)
+
+
+@pytest.fixture
+def pool() -> Iterator[Pool]:
+    """Worker processes, which end with the test."""
+    made = Pool()
+    yield made
+    made.close()
 
 
 @pytest.fixture
@@ -65,7 +75,8 @@ def preview(display: str, tmp_path: Path) -> Preview:
         (tmp_path / "script.toml").write_text(script or '[[action]]\ndo = "frame"\n')
         command = [sys.executable, "-m", "translucent", "preview", *arguments, "--size", "640x480", "--json"]
         command += ["--script", str(tmp_path / "script.toml"), "--screenshot", str(tmp_path / "window.png")]
-        environment = {**os.environ, "DISPLAY": display, "XDG_CONFIG_HOME": str(tmp_path)}
+        folders = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_CACHE_HOME"), str(tmp_path))
+        environment = {**os.environ, "DISPLAY": display, **folders}
         return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment, check=False)
 
     return run

@@ -11,6 +11,7 @@ from translucent.geometry.solids import Box
 from translucent.preview import baking
 from translucent.preview.document import Orbit
 from translucent.preview.tasks import Task
+from translucent.preview.worker import Pool
 
 BOX = Box((0.0, 0.0, 0.0), (0.02, 0.02, 0.02)).tessellate()
 
@@ -20,9 +21,9 @@ def task() -> Task:
     return Task("baking", lambda _: None, lambda _: None)
 
 
-def test_the_model_is_painted_with_its_map(task: Task) -> None:
+def test_the_model_is_painted_with_its_map(task: Task, pool: Pool) -> None:
     body = tl.Object(BOX, tl.Medium(absorption=1.0))
-    baked = baking.bake_map(task, body, tl.Medium(absorption=2.0), "transmittance", 32, 4)
+    baked = baking.bake_map(task, pool, body, tl.Medium(absorption=2.0), "transmittance", 32, 4)
     assert baked.map.settings.medium == tl.Medium(absorption=2.0)
     assert (baked.map.settings.size, baked.map.settings.rays) == (32, 4)
     assert task.share is not None
@@ -37,6 +38,6 @@ def test_the_model_is_painted_with_its_map(task: Task) -> None:
     assert scene.objects[0].surface.color_texture is not None
 
 
-def test_what_the_baker_refuses_is_told(task: Task) -> None:
+def test_what_the_baker_refuses_is_told(task: Task, pool: Pool) -> None:
     with pytest.raises(tl.InputError, match=r"rays 1"):
-        baking.bake_map(task, tl.Object(BOX, tl.Medium(absorption=1.0)), tl.Medium(), "cone", 8, 1)
+        baking.bake_map(task, pool, tl.Object(BOX, tl.Medium(absorption=1.0)), tl.Medium(), "cone", 8, 1)

@@ -19,12 +19,14 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals, drawn_normals, has_drawn_normals
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.ledger import Ledger, PostponedError, ProgramName
-from translucent.preview import compiling
+from translucent.gpu.packed_meshes import has_packed
+from translucent.planning.passes import PassName
+from translucent.preview import compiling, tracing
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset
 from translucent.preview.compiling import Compiled, Compiler, stand_in
 from translucent.preview.stage import Stage
-from translucent.preview.worker import Companion
+from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
 from translucent.scene.showcase import showcase
 from translucent.scene.texture import Texture
@@ -55,11 +57,11 @@ def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
     """What another process would do, done in this one, once the event is set."""
     go = threading.Event()
 
-    def call(_: Companion, task: Any, work: Callable[..., Any], *arguments: Any) -> Any:
+    def call(_: Pool, task: Any, work: Callable[..., Any], *arguments: Any, **_urgency: Any) -> Any:
         go.wait(60.0)
         return work(task.report, *arguments)
 
-    monkeypatch.setattr(Companion, "call", call)
+    monkeypatch.setattr(Pool, "call", call)
     compiling._engine.cache_clear()
     return go
 
@@ -148,7 +150,7 @@ def test_normals_of_a_large_mesh_come_from_another_process(
 
 
 def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
-    scene, compiler, found = stand_in(showcase(BALL, stage="none")), Compiler(), list[Compiled]()
+    scene, compiler, found = stand_in(showcase(BALL, stage="none")), Compiler(work.pool), list[Compiled]()
     with tl.Renderer() as renderer:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
@@ -162,7 +164,7 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
 
 def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> None:
     near.set()
-    scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(), list[Compiled]()
+    scene, compiler, found = stand_in(showcase(BALL, GLASS, stage="none")), Compiler(work.pool), list[Compiled]()
     compiler.device = "a card from the future"
     compiler.ask("", scene, [], found.append)
     while not found:
@@ -262,6 +264,32 @@ def test_a_request_that_cannot_be_made_is_told_once(
     assert [m.text for m in work.messages if "in the window" in m.text]
 
 
+def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierarchy(
+    stage: Stage, work: Workspace, near: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracing, "PACKED_AT_ONCE", 10)
+    work.do(Change("display.antialias", False))
+    near.set()
+    finish(stage, work)
+    wait(work, lambda: work.compiler.ledger.postpones and work.compiler.lane.task is None)
+    near.clear()
+    assert work.loaded is not None
+    mesh = work.loaded.scene.objects[0].mesh
+    work.do(ChoosePreset("merlot"))
+    stage.draw(work, SIZE)
+    assert "until rays can be traced" in stage.ways.told[0]
+    assert isinstance(stage.ways.interfaces, tl.ScreenInterfaces)
+    assert not has_packed(mesh)
+    near.set()
+    finish(stage, work)
+    assert (stage.ways.told[0], stage.ways.interfaces) == ("", None)
+    assert has_packed(mesh)
+    assert stage.plans[0] is not None
+    assert stage.plans[0].has(PassName.TRACED)
+    differs = (np.abs(pixels(stage).astype(int) - drawn_alone(work).astype(int)) > 1).any(axis=-1)
+    assert differs.sum() <= 2
+
+
 def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: threading.Event) -> None:
     near.set()
     finish(stage, work)
@@ -276,10 +304,10 @@ def test_nobody_waits_for_what_is_known(stage: Stage, work: Workspace, near: thr
 def test_where_no_process_can_draw_the_window_compiles_by_itself(
     stage: Stage, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def call(*_: Any) -> Any:
+    def call(*_: Any, **_urgency: Any) -> Any:
         raise tl.RenderError("preparing the picture", "its process ended with status 9", "close other programs")
 
-    monkeypatch.setattr(Companion, "call", call)
+    monkeypatch.setattr(Pool, "call", call)
     finish(stage, work)
     work.do(ChoosePreset("whole_milk"))
     finish(stage, work)

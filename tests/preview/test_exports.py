@@ -126,8 +126,8 @@ def hard(report: Callable[[float | None, str], None], path: str) -> None:
 def test_what_a_killed_process_has_left_is_removed(
     work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker._Running, "stop", lambda _: False)
-    monkeypatch.setattr(worker.Companion._end, "__defaults__", (0.3,))
+    monkeypatch.setattr(worker._Worker, "stop", lambda _: False)
+    monkeypatch.setattr(worker, "PARTING", 0.3)
     work.export(str(tmp_path / "a.png"), hard)
     task = work.lanes["write"].task
     assert task is not None
@@ -136,3 +136,28 @@ def test_what_a_killed_process_has_left_is_removed(
     task.cancel()
     wait(work, lambda: task.finished)
     assert not list(tmp_path.iterdir())
+
+
+def slowly(report: Callable[[float | None, str], None], path: str) -> None:
+    """Writes in two halves."""
+
+    def write(temporary: Path) -> None:
+        temporary.write_bytes(b"ha")
+        report(0.5, "")
+        time.sleep(0.3)
+        temporary.write_bytes(b"half")
+
+    write_atomically(Path(path), write)
+
+
+def test_a_window_closed_while_it_saves_leaves_the_file_whole_or_as_it_was(tmp_path: Path) -> None:
+    work = Workspace(Document(Model("sphere")))
+    (path := tmp_path / "a.png").write_bytes(b"whole")
+    work.export(str(path), slowly)
+    task = work.lanes["write"].task
+    assert task is not None
+    wait(work, lambda: task.share == 0.5)
+    work.close()
+    assert work.ended
+    assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
+    assert path.read_bytes() in (b"whole", b"half")

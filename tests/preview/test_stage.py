@@ -97,11 +97,11 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspac
     work.do(ChoosePreset("whole_milk"))
     work.do(Change("display.antialias", False))
     assert stage.draw(work, SIZE)
-    assert "until its diffusion is solved for" in stage.diffusing
+    assert "until its diffusion is solved for" in stage.ways.told[1]
     assert stage.plans[0] is not None
     assert stage.plans[0].given_back.layered == (0,)
     finish(stage, work)
-    assert stage.diffusing == ""
+    assert stage.ways.told[1] == ""
     assert stage.plans[0].given_back.diffused == (0,)
     scene = work.scene()
     assert scene is not None
@@ -113,7 +113,7 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(stage: Stage, work: Workspac
     for action, known in ((Turn(20.0, 10.0), True), (Change("look.light_yaw", 3.0), False)):
         work.do(action)
         stage.draw(work, SIZE)
-        assert (stage.diffusing == "") is known
+        assert (stage.ways.told[1] == "") is known
     work.do(Change("display.scattering", "single"))
     finish(stage, work)
     assert not stage.plans[0].given_back
@@ -128,7 +128,7 @@ def test_light_that_cannot_be_solved_for_is_told_once(
     monkeypatch.setattr(stage.renderer.gpu.diffusion, "solve", fail)
     work.do(ChoosePreset("whole_milk"))
     finish(stage, work)
-    assert "since it could not be solved for" in stage.diffusing
+    assert "since it could not be solved for" in stage.ways.told[1]
     assert [message.kind for message in work.messages] == ["error"]
     assert stage.plans[0] is not None
     assert stage.plans[0].given_back.layered == (0,)

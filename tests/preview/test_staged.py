@@ -19,7 +19,7 @@ from translucent.preview import preferences
 from translucent.preview import stage as stages
 from translucent.preview.actions import Change, ChoosePreset, Turn
 from translucent.preview.document import AUTO, Document, Look, Model
-from translucent.preview.orbiting import orbit_of
+from translucent.preview.orbiting import framed, orbit_of
 from translucent.preview.recipes import Shot, command_line, python_code
 from translucent.preview.session import load_session, save_session
 from translucent.preview.stage import Stage
@@ -111,8 +111,8 @@ def test_auto_is_what_render_takes(staged: Workspace) -> None:
         assert stage_name(dataclasses.replace(look, **own), loaded) == "none"
     lit = dataclasses.replace(loaded, scene=dataclasses.replace(loaded.scene, lights=[tl.PointLight((0, 1, 0), 1.0)]))
     assert stage_name(look, lit) == "none"
-    framed = framing(loaded.scene.objects, SIZE, stage=stage_named("studio"))
-    assert staged.document.orbit == orbit_of(framed, loaded.scene.bounds.mean(axis=0))
+    seen = orbit_of(framing(loaded.scene.objects, SIZE, stage=stage_named("studio")), loaded.scene.bounds.mean(axis=0))
+    assert staged.document.orbit == framed(seen, loaded.scene.objects, SIZE), "as F frames it, from where render looks"
 
 
 def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,6 +130,10 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
     assert stage.simpler
     assert stage._moving is not None
     assert stage._moving.shadows.directions == 8
+    assert stage.state.startswith("moving")
+    staged.do(Change("look.rotation", 20.0))  # which takes new maps
+    stage.draw(staged, SIZE)
+    assert stage._moving.shadows.directions == 2
     stage.close()
 
 

@@ -55,6 +55,30 @@ do = "save"
 kind = "save session"
 file = "{session}"
 [[action]]
+do = "key"
+name = "f1"
+[[action]]
+do = "key"
+name = "escape"
+[[action]]
+do = "ask"
+kind = "open"
+[[action]]
+do = "key"
+name = "escape"
+[[action]]
+do = "ask"
+kind = "save session"
+[[action]]
+do = "answer"
+file = "{asked}"
+[[action]]
+do = "save_preset"
+name = "Deep red"
+[[action]]
+do = "preset"
+name = "deep_red"
+[[action]]
 do = "save"
 kind = "png"
 file = "{picture}"
@@ -101,9 +125,10 @@ def test_a_display_that_does_not_answer_is_told() -> None:
 
 
 def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    bad, session, picture = (tmp_path / name for name in ("bad.glb", "session.toml", "picture.png"))
+    names = ("bad.glb", "session.toml", "asked.toml", "picture.png")
+    bad, session, asked, picture = (tmp_path / name for name in names)
     bad.write_bytes(b"")
-    done = preview("leaf", script=SCRIPT.format(bad=bad, session=session, picture=picture))
+    done = preview("leaf", script=SCRIPT.format(bad=bad, session=session, asked=asked, picture=picture))
     assert done.returncode == 2, "a file that is none was opened; the actions after it are done all the same"
     told = json.loads(done.stdout)
     assert told["model"] == "leaf"
@@ -112,6 +137,8 @@ def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  #
     assert "bad.glb" in texts["error"][0]
     assert f"wrote {picture}" in texts["info"]
     assert "color = [" in session.read_text()
+    assert asked.read_text() == session.read_text(), "the built-in browser asks where it is to be written"
+    assert "[deep_red]" in (tmp_path / "translucent" / "presets" / "deep_red.toml").read_text()
     window = np.asarray(Image.open(tmp_path / "window.png").convert("RGB"))
     assert window.shape == (480, 640, 3)
     # Panels are dark, the model's backdrop is bright: both are there. The viewport is a third of this small window, and

@@ -10,7 +10,7 @@ import translucent as tl
 from translucent.arrays import Array
 from translucent.geometry import bvh
 from translucent.geometry.bvh import Hierarchy, build_hierarchy, parents, sah_cost
-from translucent.gpu.hierarchies import STEPS, packed_mesh, packed_nodes, packed_normals
+from translucent.gpu.packed_meshes import STEPS, packed_mesh, packed_nodes, packed_normals
 
 OCTANTS = [tuple(bool(octant >> axis & 1) for axis in range(3)) for octant in range(8)]
 
@@ -100,6 +100,23 @@ def test_hierarchies_of_meshes(leaf_size: int, rng: np.random.Generator) -> None
 def test_hierarchies_of_degenerate_meshes(kind: str, rng: np.random.Generator) -> None:
     corners = degenerate(kind, rng)
     check(tree_of(corners), corners)
+
+
+@pytest.mark.parametrize("block", [1, 7, 200])
+def test_hierarchies_in_blocks_are_hierarchies_and_as_good(
+    block: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    meshes = lumpy(), soup(rng)
+    whole = [sah_cost(tree_of(corners)) for corners in meshes]
+    monkeypatch.setattr(bvh, "BLOCK", block)
+    for corners, cost in zip(meshes, whole, strict=True):
+        tree = tree_of(corners)
+        check(tree, corners)
+        assert sah_cost(tree) < (1.2 if block == 200 else 3.0) * cost
+        way = rng.uniform(-1, 1, 3)
+        origin, octant = corners[0].mean(axis=0) - 0.5 * way, int((way < 0) @ (1, 2, 4))
+        rounded = corners.astype(np.float32).astype(np.float64)
+        assert nearest_by_walk(tree, rounded, octant, origin, way)[0] == distance(rounded, origin, way).min()
 
 
 @pytest.mark.parametrize("kind", ["equal", "one point", "collinear", "growing"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.media.presets import read_presets
+from translucent.media.preset_file import read_presets
 
 ENTRY = """
 [ink]

@@ -27,6 +27,9 @@ DIGITS = 24
 #: this theta the exit belongs to the smooth surface around the point, see `inscribed`.
 SPHERE_CONE = 0.5 * (math.pi - CREASE)
 
+#: Rays that a first sphere comes from: more take longer than the faces that they spare.
+SPHERE_RAYS = 8
+
 #: Distance, as a share of the radius, within which points have the same set: the same point of two charts, rounded
 #: twice.
 SAME_POINT = 2.0**-24
@@ -50,7 +53,7 @@ class Directions:
     def of(cls, settings: BakeSettings) -> Directions:
         """Directions for these settings: one down the normal, or Sobol points in the cone."""
         if settings.mode == "inscribed":
-            points = _sobol(settings.rays, max(1, min(SETS, TABLE // settings.rays)), settings.seed)
+            points = _sobol(min(settings.rays, SPHERE_RAYS), SETS, settings.seed)
             return cls(_in_cone(points, SPHERE_CONE, "uniform"), settings.seed)
         if settings.mode == "normal":
             return cls(np.array([0.0, 0.0, 1.0], np.float32).reshape(3, 1, 1), settings.seed)

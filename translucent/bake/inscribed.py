@@ -1,36 +1,51 @@
 """The largest sphere inside a mesh that touches the surface at a point (mode "inscribed").
 
-The sphere at p has its center c = p - r n on the inward normal, and r is the largest for which no point q of the
-surface is inside:
+The sphere at p has its center p - r n on the inward normal, and is empty: with m = -n and s(q) = m . (q - p),
 
-    2 r(p) = min over q of |q - p|^2 / ((p - q) . n),  (p - q) . n > 0.
+    2 r(p) = min over q of |q - p|^2 / s(q),
 
-Rays give a first radius: where one along w ends at the distance d, 2 r <= d / cos(theta). From there the ball shrinks
-(Ma, Bae and Choi 2012): the point of the surface that is nearest to the center gives the next radius, until none is
-inside. It ends, too, where that point is seen from the center less than the crease angle away from p: then it belongs
-to the smooth surface around p, each edge of whose tessellation would otherwise end the ball.
+over the points q of the surface in the cone of `SPHERE_CONE` around m. Where a sphere touches beyond it, seen from the
+center less than the crease angle away from p, is the smooth surface around p, each edge of whose tessellation would
+otherwise end the sphere.
+
+The quotient is quasi-convex: spheres that touch at p lie within one another. So its minimum in a face is where a sphere
+touches the plane, or the edge of the cone meets it, or, if that is not in the face, on an edge, where it is the root of
+a quadratic equation, moved into the cone. Nothing is iterated, where Ma, Bae and Choi (2012) let a ball shrink until it
+is empty. A few rays give a first radius, and a tree of boxes the faces that such a sphere meets.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from translucent.arrays import Array, Floats, Integers
-from translucent.bake.surface import Points, Surface, blend
-from translucent.bake.texels import closest
-from translucent.geometry.normals import CREASE
+from translucent.arrays import Array, Floats, Integers, Mask
+from translucent.bake.directions import SPHERE_CONE
+from translucent.bake.surface import Points, Surface
+from translucent.geometry.bvh import curve_order
 
-#: Approximate number of points of the surface in the search tree, beyond one for each face, and how many of them are
-#: tried around a center. The center of a round body is as far from all points, so that a search looks at every one.
-TREE_POINTS, TRIED = 20_000, 6
+#: Children of a box, and the largest number of boxes at the top of the tree.
+CHILDREN, TOP = 4, 16
 
-#: Relative error of the distance in searches of larger trees, for the same reason.
-LARGE_TREE, LARGE_TREE_ERROR = 50_000, 0.005
+#: Largest number of pairs of a point and a box that are looked at at a time.
+MOST_PAIRS = 1 << 16
 
-#: Largest number of rounds of shrinking, and the relative change of the radius at convergence.
-ROUNDS, AT_REST = 32, 1e-7
+#: Number of faces of a large mesh, and the share by which its spheres may be too large: round bodies have spheres that
+#: nearly touch all faces.
+LARGE, LARGE_SLACK = 50_000, 0.002
+
+#: Distance from a plane, in radii of the mesh, up to which a point is on it: rounding of float64.
+ON_PLANE = 1e-10
+
+#: Rounding of what rays meet, as a share and in radii.
+LOOSE = 1e-5
+
+_CONE, _CONE_SINE = math.cos(SPHERE_CONE), math.sin(SPHERE_CONE)
+#: Least cosine between m and the normal of a plane that a sphere touches within the cone.
+_FACING = math.cos(2.0 * SPHERE_CONE)
 
 
 class InscribedSpheres:
@@ -42,78 +57,233 @@ class InscribedSpheres:
     """
 
     def __init__(self, surface: Surface) -> None:
-        from scipy.spatial import cKDTree
+        self._planes = surface.planes
+        self._corners = surface.corners
+        self._middles = surface.corners.mean(axis=1)
+        self._tree = _Tree.of(surface)
+        self._slack = LARGE_SLACK if len(surface.corners) > LARGE else 0.0
 
-        self._surface = surface
-        corners, normals = surface.corners, surface.planes[:, :3]
-        across = corners[:, 1] - corners[:, 0]
-        across = across / np.linalg.norm(across, axis=1, keepdims=True)
-        self._axes = np.stack([across, np.cross(normals, across)], axis=1)
-        self._flat = np.stack([_flatten(self._axes, corners[:, i] - corners[:, 0]) for i in range(3)], axis=1)
-        points, self._face = _spread(corners)
-        self._tree = cKDTree(points)
-        self._error = LARGE_TREE_ERROR if len(points) > LARGE_TREE else 0.0
+    def diameters(self, points: Points, radius: Array) -> Array:
+        """(k,): diameters in radii of the mesh; no sphere is larger than with `radius` (k,), its first one."""
+        radius = radius.copy()
+        count = self._tree.levels[0].count
+        pair, node = np.repeat(np.arange(len(points)), count), np.tile(np.arange(count), len(points))
+        self._descend(points, pair, node, 0, radius)
+        return 2.0 * radius
 
-    def diameters(self, points: Points, directions: Floats, distance: Array) -> Array:
-        """(k,): diameters in radii of the mesh, from the `distance` (k, r) of rays along `directions` (3, k, r)."""
+    def _descend(self, points: Points, pair: Integers, node: Integers, level: int, radius: Array) -> None:
+        """Make spheres as small as the faces in boxes of a level allow, in pairs."""
+        if len(pair) > MOST_PAIRS:
+            for begin in range(0, len(pair), MOST_PAIRS):
+                part = slice(begin, begin + MOST_PAIRS)
+                self._descend(points, pair[part], node[part], level, radius)
+            return
+        boxes = self._tree.levels[level]
+        pair, node = boxes.met(pair, node, points, (1.0 - self._slack) * radius)
+        if level + 1 == len(self._tree.levels):
+            self._touch(points, pair, self._tree.order[node], radius)
+            return
+        if level:  # what is within a box makes the sphere smaller, so that fewer boxes are left on the next level
+            self._narrow(points, pair, boxes.sample[node], radius)
+        node = (node[:, None] * CHILDREN + np.arange(CHILDREN)).ravel()
+        there = np.flatnonzero(node < self._tree.levels[level + 1].count)
+        self._descend(points, np.repeat(pair, CHILDREN)[there], node[there], level + 1, radius)
+
+    def _narrow(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
+        """Make spheres as small as the middles of faces that count allow, in pairs."""
+        inward = -points.normal[pair]
+        away = self._middles[face] - points.start[pair]
+        along, square = _dot(away, inward), _dot(away, away)
+        counts = (along * along > _CONE * _CONE * square) & (along > 0) & (face != points.face[pair])
+        np.minimum.at(radius, pair[counts], (1.0 + LOOSE) * 0.5 * square[counts] / along[counts])
+
+    def _touch(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
+        """Make spheres as small as faces allow, in pairs."""
+        other = face != points.face[pair]
+        pair, face = pair[other], face[other]
+        point, inward = points.start[pair], -points.normal[pair]
+        plane = self._planes[face]
+        height, facing = plane[:, 3] - _dot(plane, point), _dot(plane, inward)
+        side = np.where(height < -ON_PLANE, -1.0, 1.0)
+        touching, touch = _on_plane(side[:, None] * plane[:, :3], np.abs(height), side * facing, inward)
+        # Where the sphere that touches the plane is too large, no part of the face is met by a smaller one.
+        kept = np.flatnonzero(touching < radius[pair])
+        pair, face, point, inward = pair[kept], face[kept], point[kept], inward[kept]
+        corners = self._corners[face] - point[:, None]
+        found = _smallest(corners, inward, plane[kept, :3], touching[kept], touch[kept])
+        np.minimum.at(radius, pair, found)
+
+    def first(self, points: Points, directions: Floats, distance: Array, face: npt.NDArray[np.int32]) -> Array:
+        """(k,): radii of spheres that no inscribed one is larger than, from what rays along `directions` (3, k, r) meet
+        at a `distance` (k, r), on faces (k, r); 1 where they meet nothing.
+        """
         n = points.normal[..., None]
-        cosine = -(n[:, 0] * directions[0] + n[:, 1] * directions[1] + n[:, 2] * directions[2])
-        # Rays lie in a cone around the normal, so that no cosine is near 0.
-        radius = np.minimum((0.5 * distance / cosine).min(axis=1), 1.0)
-        live = np.flatnonzero(radius > 0)
-        for _ in range(ROUNDS):
-            if not live.size:
-                break
-            smaller = self._shrunk(points.start[live], points.normal[live], radius[live])
-            shrinks = smaller < radius[live] * (1.0 - AT_REST)
-            radius[live] = smaller
-            live = live[shrinks]
-        return np.asarray(2.0 * radius)
-
-    def _shrunk(self, point: Array, normal: Array, radius: Array) -> Array:
-        """(k,): radii with which the balls touch what of the surface is found in them; as before where nothing is."""
-        to_point = radius[:, None] * normal
-        center = point - to_point
-        _, found = self._tree.query(center, k=min(TRIED, self._tree.n), eps=self._error)
-        touched, away = center, np.full(len(center), np.inf)
-        for column in found.reshape(len(center), -1).T:
-            face = self._face[column]
-            corners = self._surface.corners[face]
-            _, weights = closest(self._flat[face], _flatten(self._axes[face], center - corners[:, 0]))
-            here = blend(corners, weights)
-            square = _dot(here - center, here - center)
-            touched = np.where((square < away)[:, None], here, touched)
-            away = np.minimum(away, square)
-        from_point, from_center = touched - point, touched - center
-        below = -_dot(from_point, normal)
-        beside = _dot(from_center, to_point) > math.cos(CREASE) * np.sqrt(away) * radius
-        inside = (away < radius * radius) & (below > 0) & ~beside
-        ratio = 0.5 * _dot(from_point, from_point) / np.where(inside, below, 1.0)
-        return np.where(inside, np.minimum(radius, ratio), radius)
+        along = -(n[:, 0] * directions[0] + n[:, 1] * directions[1] + n[:, 2] * directions[2])
+        counts = (face >= 0) & (face != points.face[:, None]) & (distance > 0)
+        # Rays lie in the cone around the normal, so that no cosine is near 0.
+        radius = np.where(counts, 0.5 * distance / along, 1.0).min(axis=1)
+        return np.asarray(np.minimum((1.0 + LOOSE) * radius + LOOSE, 1.0))
 
 
-def _flatten(axes: Array, vectors: Array) -> Array:
-    """(k, 2): vectors (k, 3) along two axes (k, 2, 3)."""
-    return np.stack([_dot(axes[:, 0], vectors), _dot(axes[:, 1], vectors)], axis=1)
+@dataclass(frozen=True, eq=False)
+class _Boxes:
+    """Boxes around faces that are neighbors along a curve, and planes before which all of these lie.
+
+    Attributes
+    ----------
+    low, high : (3, n) float64
+    normal : (3, n) float64
+        About that of the faces.
+    offset : (n,) float64
+        Least normal . x in a box.
+    sample : (n,) int64
+        A face in each.
+    """
+
+    low: Array
+    high: Array
+    normal: Array
+    offset: Array
+    sample: Integers
+
+    @classmethod
+    def of(cls, corners: Array, normals: Array, order: Integers, size: int) -> _Boxes:
+        """Boxes of `size` faces each; corners (m, 3, 3) and normals (m, 3) are in this order of the faces."""
+        starts = np.arange(0, len(corners), size)
+        normal = np.add.reduceat(normals, starts)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = normal / np.where(length > 0, length, 1.0)
+        along = (corners * np.repeat(normal, size, axis=0)[: len(corners), None]).sum(axis=2)
+        return cls(
+            np.ascontiguousarray(np.minimum.reduceat(corners.min(axis=1), starts).T),
+            np.ascontiguousarray(np.maximum.reduceat(corners.max(axis=1), starts).T),
+            np.ascontiguousarray(normal.T),
+            np.minimum.reduceat(along.min(axis=1), starts),
+            order[np.minimum(starts + size // 2, len(order) - 1)],
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of boxes."""
+        return len(self.offset)
+
+    def met(self, pair: Integers, node: Integers, points: Points, radius: Array) -> tuple[Integers, Integers]:
+        """Pairs of a point and a box that the sphere of `radius` there may meet."""
+        center = np.ascontiguousarray((points.start - radius[:, None] * points.normal).T)
+        reach = radius.take(pair)
+        away, across = np.zeros(len(node)), -self.offset.take(node)
+        for axis in range(3):
+            here = center[axis].take(pair)
+            across += here * self.normal[axis].take(node)
+            beside = np.maximum(self.low[axis].take(node) - here, here - self.high[axis].take(node))
+            np.maximum(beside, 0.0, out=beside)
+            beside *= beside
+            away += beside
+        near = np.flatnonzero((away < reach * reach) & (across > -reach))
+        return pair[near], node[near]
 
 
-def _spread(corners: Array) -> tuple[Array, Integers]:
-    """Points (n, 3) all over the faces (m, 3, 3), about as dense everywhere, and the face (n,) of each."""
-    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    longest = length.argmax(axis=1)
-    order = (longest[:, None] + np.arange(3)) % 3
-    start, end, tip = np.take_along_axis(corners, order[..., None], axis=1).transpose(1, 0, 2)
-    base = length.max(axis=1)
-    twice_area = np.linalg.norm(np.cross(end - start, tip - start), axis=1)
-    spacing = math.sqrt(float(twice_area.sum()) / TREE_POINTS)
-    along = np.ceil(base / spacing).astype(np.int64)
-    count = along * np.ceil(twice_area / base / spacing).astype(np.int64)
-    face = np.repeat(np.arange(len(corners)), count)
-    number = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
-    u = (number % along[face] + 0.5) / along[face]
-    v = (number // along[face] + 0.5) / (count // along)[face]
-    level = start[face] + u[:, None] * (end - start)[face]
-    return level + v[:, None] * (tip[face] - level), face
+@dataclass(frozen=True, eq=False)
+class _Tree:
+    """Tree of boxes: each has `CHILDREN` of the next level.
+
+    Attributes
+    ----------
+    order : (m,) int64
+        Faces along the curve.
+    levels : tuple of _Boxes
+        Those of single faces are the last.
+    """
+
+    order: Integers
+    levels: tuple[_Boxes, ...]
+
+    @classmethod
+    def of(cls, surface: Surface) -> _Tree:
+        """Tree of the faces of a surface."""
+        corners = surface.corners
+        order = curve_order(*(end.astype(np.float32) for end in (corners.min(axis=1), corners.max(axis=1))))
+        corners, normals = corners[order], surface.planes[order, :3]
+        sizes = [1]
+        while -(-len(order) // sizes[-1]) > TOP:
+            sizes.append(sizes[-1] * CHILDREN)
+        return cls(order, tuple(_Boxes.of(corners, normals, order, size) for size in reversed(sizes)))
+
+
+def _on_plane(normal: Array, height: Array, facing: Array, inward: Array) -> tuple[Array, Array]:
+    """Radii (n,) of the smallest spheres at the origin that touch planes within the cone, inf where none, and where (n,
+    3) they do.
+
+    The planes lie at a `height` along their normals, whose cosines to `inward` are `facing`.
+    """
+    across = np.sqrt(np.maximum(1.0 - facing * facing, 0.0))
+    # Of normals too far from m it is the edge of the cone that meets the plane first.
+    beside = facing < _FACING
+    toward = facing * _CONE + across * _CONE_SINE
+    slope = np.where(beside, 2.0 * _CONE * toward, 1.0 + facing)
+    meets = slope > 1e-9
+    radius = np.where(meets, height / np.where(meets, slope, 1.0), np.inf)
+    finite = np.where(meets, radius, 0.0)
+    aside = (normal - facing[:, None] * inward) / np.maximum(across, 1e-12)[:, None]
+    rim = 2.0 * _CONE * (_CONE * inward + _CONE_SINE * aside)
+    return radius, finite[:, None] * np.where(beside[:, None], rim, inward + normal)
+
+
+def _smallest(corners: Array, inward: Array, normal: Array, touching: Array, touch: Array) -> Array:
+    """(n,): radii of the smallest spheres at the origin that touch triangles (n, 3, 3) within the cone; inf where none.
+
+    Those of radii `touching` (n,) touch the planes, at points (n, 3).
+    """
+    found = np.where(_inside(corners, normal, touch), touching, np.inf)
+    edges = np.flatnonzero(np.isinf(found))
+    corners, inward = corners[edges], inward[edges]
+    least = np.full(len(edges), np.inf)
+    for i in range(3):
+        least = np.minimum(least, _on_edge(corners[:, i], corners[:, (i + 1) % 3] - corners[:, i], inward))
+    found[edges] = least
+    return found
+
+
+def _inside(corners: Array, normal: Array, point: Array) -> Mask:
+    """(n,): whether points of the planes of triangles are inside them."""
+    sides = [_dot(np.cross(corners[:, (i + 1) % 3] - corners[:, i], point - corners[:, i]), normal) for i in range(3)]
+    return ((sides[0] >= 0) & (sides[1] >= 0) & (sides[2] >= 0)) | ((sides[0] <= 0) & (sides[1] <= 0) & (sides[2] <= 0))
+
+
+def _on_edge(start: Array, along: Array, inward: Array) -> Array:
+    """(n,): as `_smallest`, of the edges from `start` to `start + along`.
+
+    At start + t along, s = a + b t and |q|^2 = d + 2 e t + f t^2. Of this quotient the derivative is 0 where
+    s^2 = a^2 + b (d b - 2 a e) / f.
+    """
+    a, b = _dot(start, inward), _dot(along, inward)
+    d, e, f = _dot(start, start), _dot(start, along), _dot(along, along)
+    with np.errstate(all="ignore"):
+        # s at the minimum, as a square.
+        best = np.sqrt(np.maximum(a * a + b * (d * b - 2.0 * e * a) / f, 0.0))
+        t = np.where(a > 0, (d * b - 2.0 * e * a) / (f * (best + a)), (best - a) / b)
+        # Within the cone: (a + b t)^2 >= cos^2 (d + 2 e t + f t^2), a + b t > 0.
+        square = _CONE * _CONE
+        u, v, w = b * b - square * f, a * b - square * e, a * a - square * d
+        root = v * v - u * w
+        low, high = _interval(u, v, w, np.sqrt(np.maximum(root, 0.0)), a, b)
+        t = np.clip(np.clip(t, np.maximum(low, 0.0), np.minimum(high, 1.0)), 0.0, 1.0)
+        s = a + b * t
+        empty = (np.maximum(low, 0.0) > np.minimum(high, 1.0)) | ((root < 0) & (u < 0)) | ~(s > 0)
+        return np.where(empty, np.inf, 0.5 * (d + t * (2.0 * e + f * t)) / np.where(empty, 1.0, s))
+
+
+def _interval(u: Array, v: Array, w: Array, root: Array, a: Array, b: Array) -> tuple[Array, Array]:
+    """Interval of t with u t^2 + 2 v t + w >= 0 and a + b t > 0."""
+    q = -(v + np.where(v < 0, -root, root))
+    one, two = q / u, np.where(q != 0, w / np.where(q != 0, q, 1.0), np.inf)
+    low, high = np.minimum(one, two), np.maximum(one, two)
+    # u < 0: between the roots. u > 0: beyond one of them, on the side where s grows.
+    closed = u < 0
+    return (
+        np.where(closed, low, np.where(b > 0, high, -np.inf)),
+        np.where(closed, high, np.where(b > 0, np.inf, low)),
+    )
 
 
 def _dot(a: Array, b: Array) -> Array:

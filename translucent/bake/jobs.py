@@ -2,21 +2,6 @@
 
 A job holds what JSON can hold, so it can be kept, sent and hashed:
 
-``model``      path of a mesh or glTF file
-``output``     path of the file to write; its record goes beside it
-``unit``       of the model's coordinates (default m)
-``settings``   arguments of `bake_thickness` by name: mode, size, rays, ...; ``max_distance``, ``tolerance`` and
-               ``high_distance`` in metres, or as shares of the mesh's diagonal, such as ``"10%"``
-``medium``     extinction (r, g, b) in 1/m, for mode ``transmittance``
-``high``       path of the mesh that the details come from, and ``cage`` that of a cage around it, in the unit
-``vertices``   True: thickness per vertex instead of a map
-``unwrap``     True: new UVs, whatever the model has
-``normalize``  True: store shares of the largest value; ``invert``: 1 minus them
-``outside``    True: read files that a glTF model links to wherever they are, not only below its folder
-``resume``     True: keep finished parts in ``OUTPUT.resume.npz``, and go on from there
-``threads``    how many (default: all processors); results do not depend on it
-=============  ==========================================================================================
-=======
 ===============  ==========================================================================================
 ``model``        path of a mesh or glTF file
 ``output``       path of the file to write; its record goes beside it

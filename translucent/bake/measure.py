@@ -6,7 +6,6 @@ import threading
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.bake.directions import Directions
@@ -104,6 +103,8 @@ class Measure:
         return Measured(values, errors, *counts)
 
     def _chunk(self, points: Points) -> Measured:
+        if self.spheres is not None:
+            return self._inscribed(points, self.spheres)
         values, errors = np.zeros(len(points)), np.zeros(len(points))
         tolerance = np.inf if self.settings.tolerance is None else self.settings.tolerance / self.unit
         live, begin, end = np.arange(len(points)), 0, min(self.settings.rays, self.directions.most)
@@ -118,7 +119,7 @@ class Measure:
             traced, cast, escaped = traced + more, cast + found.size, escaped + int(np.isinf(found).sum())
             distance = found if begin == 0 else np.concatenate([distance, found], axis=1)
             edges = np.concatenate([edges, block_edges(begin, end, edges.shape[1])])
-            values[live], errors[live] = self._estimate(asked, directions, distance, edges)
+            values[live], errors[live] = self.mean.estimate(distance, edges)
             above = errors[live] > tolerance
             if end == self.directions.most or not above.any():
                 break
@@ -127,10 +128,11 @@ class Measure:
             begin, end = end, min(2 * end, self.directions.most)
         return Measured(values * self.unit, errors * self.unit, traced, cast, escaped, int(above.sum()))
 
-    def _estimate(
-        self, points: Points, directions: npt.NDArray[np.float32], distance: Array, edges: npt.NDArray[np.int64]
-    ) -> tuple[Array, Array]:
-        if self.spheres is None:
-            return self.mean.estimate(distance, edges)
-        diameter = np.minimum(self.spheres.diameters(points, directions, distance), self.rays.reach)
-        return diameter, np.zeros(len(diameter))
+    def _inscribed(self, points: Points, spheres: InscribedSpheres) -> Measured:
+        if self.stop.is_set():
+            raise StoppedError
+        directions = self.directions.at(points, 0, self.directions.most)
+        distance, _, face = self.rays.first(points, directions)
+        diameter = spheres.diameters(points, spheres.first(points, directions, distance, face))
+        values = np.minimum(diameter, self.rays.reach) * self.unit
+        return Measured(values, np.zeros(len(points)), face.size, face.size, int((face < 0).sum()), 0)

@@ -62,7 +62,8 @@ class Rays:
         In radii; infinite where a ray finds no exit. What lies beyond `reach` is some number at least as large.
         """
         rays = directions.shape[2]
-        distance, cosine, face = self._first(points, directions)
+        shaped, cosines, faces = self.first(points, directions)
+        distance, cosine, face = shaped.reshape(-1), cosines.reshape(-1), faces.reshape(-1)
         # NaN, where no face was found, is not above it either.
         doubtful = ~(cosine > GRAZING)
         ray = np.flatnonzero(doubtful if self.gaps == "first-exit" else ~(distance >= self.reach))
@@ -74,8 +75,11 @@ class Rays:
             distance[ray] = walk.length
         return np.maximum(distance, 0.0, out=distance).reshape(-1, rays), traced
 
-    def _first(self, points: Points, directions: Floats) -> tuple[Array, Array, npt.NDArray[np.int32]]:
-        """(k r,): distance to the plane of the first face, cosine at it, above 0 where the ray leaves, and the face."""
+    def first(self, points: Points, directions: Floats) -> tuple[Array, Array, npt.NDArray[np.int32]]:
+        """(k, r): distance to the plane of the first face, cosine at it, above 0 where the ray leaves, and the face.
+
+        NaN and -1 where there is none.
+        """
         count, rays = directions.shape[1:]
         origins = np.empty((3, count, rays), dtype=np.float32)
         origins[:] = self.starts(points).T[:, :, None]
@@ -94,7 +98,7 @@ class Rays:
         cosine[face < 0] = np.nan
         with np.errstate(all="ignore"):
             distance /= cosine
-        return distance.reshape(-1), cosine.reshape(-1), face.reshape(-1)
+        return distance, cosine, face
 
     def starts(self, points: Points) -> Floats:
         """(k, 3): where rays from points (k) begin, a little below the surface."""

@@ -229,7 +229,7 @@ CASES: tuple[Case, ...] = (
         partial(_far, lambda: subdivided("knot", 80_000)),
         quick=False,
     ),
-    Case("emission", "Glowing knot", "one medium that emits light", _emission, "emission", shrink=2),
+    Case("emission", "Glowing knot", "one medium that emits light", _emission, "emission", quick=False, shrink=2),
     Case(
         "two emitters",
         "Two glowing bodies",

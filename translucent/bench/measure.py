@@ -66,6 +66,8 @@ class CaseRun:
         For timing.
     compared : float
         Width and height of the frames that are held against the reference, as a share of what the case wants.
+    patience : float
+        As of `interleaved`.
     """
 
     studio: Studio
@@ -74,6 +76,7 @@ class CaseRun:
     size: Size
     seconds: float
     compared: float = 1.0
+    patience: float = 1.0
     _entries: list[_Entry] = field(default_factory=list)
 
     def measure(self, contenders: Sequence[Contender]) -> CaseRecord:
@@ -155,6 +158,7 @@ class CaseRun:
                     drawings,
                     self.seconds,
                     lambda name, error: failures.update({name: error}),
+                    self.patience,
                 )
                 for entry in ready:
                     if entry.contender.method.peels and entry.row.method in found:

@@ -40,15 +40,18 @@ class Effort:
         Of timing, for each case and for each step of a scaling axis.
     compared : float
         Width and height of the frames that are held against the reference, as a share of what the case wants.
+    patience : float
+        How many times as long a drawing is timed at most where its rounds differ much.
     """
 
     case_seconds: float
     step_seconds: float
     compared: float
+    patience: float = 1.0
 
 
-FULL = Effort(12.0, 2.5, 1.0)
-QUICK = Effort(1.2, 0.25, 0.6)
+FULL = Effort(12.0, 2.5, 1.0, patience=3.0)
+QUICK = Effort(0.6, 0.15, 0.4)
 
 #: Callback with what is being measured, the number of steps done, and their total.
 Progress = Callable[[str, int, int], None]
@@ -79,7 +82,7 @@ def measure_all(
     methods : sequence of str
         Names or families of what to measure, ``"SignedDepth"`` or ``"signed-depth"``; default: all.
     quick : bool
-        Fewer cases, methods and repetitions: one or two minutes instead of a quarter of an hour.
+        Fewer cases, methods and repetitions: a minute instead of a quarter of an hour.
     backend : str, optional
         Of the renderer; default: what works here.
     effort : Effort, optional
@@ -174,7 +177,7 @@ def _measured(
     progress: Progress,
 ) -> Iterator[Report]:
     """The report after each step of it."""
-    scaling, shadows = ScalingRun(studio, effort.step_seconds, quick), ShadowsRun(studio, quick)
+    scaling, shadows = ScalingRun(studio, effort.step_seconds, quick, effort.patience), ShadowsRun(studio, quick)
     steps = {
         "scaling": sum(len(ladder.steps) for ladder in scaling.ladders()),
         "slabs": 1,
@@ -191,7 +194,7 @@ def _measured(
     for case in cases:
         told(f"case {case.name}")
         chosen = contenders(case.effect, quick=quick or case.brief, only=methods)
-        run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared)
+        run = CaseRun(studio, cpu, case, size, effort.case_seconds, effort.compared, effort.patience)
         report = _judged(dataclasses.replace(report, cases=(*report.cases, run.measure(chosen))))
         studio.renderer.gpu.context.drain()
         yield report

@@ -69,12 +69,15 @@ class ScalingRun:
     seconds : float
         For each step.
     quick : bool
-        Every second step, none of the largest.
+        Two steps of each ladder, none of the longest.
+    patience : float
+        As of `interleaved`.
     """
 
     studio: Studio
     seconds: float
     quick: bool
+    patience: float = 1.0
     _points: dict[tuple[Axis, str], list[ScalePoint]] = field(default_factory=dict)
 
     def ladders(self) -> list[Ladder]:
@@ -127,6 +130,7 @@ class ScalingRun:
                 {name: drawn.draw for name, drawn in drawings.items()},
                 self.seconds,
                 lambda name, error: failures.update({name: error}),
+                self.patience,
             )
         finally:
             for drawn in drawings.values():
@@ -169,8 +173,9 @@ def _ladders(software: bool) -> list[Ladder]:
 
 
 def _thinned(ladder: Ladder) -> Ladder:
-    chosen = list(ladder.steps)[: -1 if ladder.axis in ("triangles", "pixels") else None : 2]
-    return dataclasses.replace(ladder, steps={x: ladder.steps[x] for x in chosen})
+    steps = list(ladder.steps)
+    last = {"triangles": 2, "pixels": 2, "layers": 4, "media": 4}[ladder.axis]
+    return dataclasses.replace(ladder, steps={x: ladder.steps[x] for x in (steps[0], steps[last])})
 
 
 def _torus(segments: int, size: Size) -> Callable[[], tuple[Scene, Size]]:

@@ -2,11 +2,13 @@
 
 All is measured in turns, A B C A B C, and the floor before and after each: what slows the machine down for longer than
 a drawing slows both, and their quotient stays. Medians and quartiles are over rounds, so that single hiccups do not
-count either. Slow drawings leave the rounds early, once they have had their share of the time.
+count either. Slow drawings leave the rounds early, once they have had their share of the time; those whose rounds
+differ much stay longer. What takes less than clocks can tell apart is drawn several times for one sample.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -23,6 +25,12 @@ FEWEST, MOST = 3, 60
 #: A drawing of so many seconds needs no more rounds than this: its own noise averages out within it.
 FEWEST_LONG, LONG = 2, 0.3
 FEWEST_LONGEST, LONGEST = 1, 2.0
+
+#: Seconds of a sample, below which a drawing is repeated in it, and the largest number of repetitions.
+SHORTEST, MOST_REPEATED = 4e-3, 16
+
+#: Standard error of the median ratio, as a share of it, from which on more rounds are asked for.
+UNSURE = 0.03
 
 #: Draws of the floor on each side of a sample take this share of the time of the sample, up to `MOST_FLOORS` draws.
 FLOOR_SHARE, MOST_FLOORS = 0.3, 10
@@ -58,6 +66,8 @@ class Samples:
         As `Sample`.
     floor, floor_wall : list of float
         Of the floor around each: `Sample.part` and `Sample.wall`.
+    times, floor_times : int
+        How often the drawing, and the floor, are drawn for a sample.
     """
 
     wall: list[float] = field(default_factory=list)
@@ -67,11 +77,13 @@ class Samples:
     whole: list[float] = field(default_factory=list)
     floor: list[float] = field(default_factory=list)
     floor_wall: list[float] = field(default_factory=list)
+    times: int = 1
+    floor_times: int = 1
 
     @property
     def spent(self) -> float:
         """Total time in seconds so far."""
-        return sum(self.frame) + sum(self.floor_wall)
+        return self.times * sum(self.frame) + self.floor_times * sum(self.floor_wall)
 
     @property
     def of_whole_frames(self) -> Samples:
@@ -95,28 +107,32 @@ def interleaved(
     drawings: Mapping[str, Callable[[], Sample]],
     seconds: float,
     failed: Callable[[str, Exception], None],
+    patience: float = 1.0,
 ) -> dict[str, Samples]:
     """Measure all drawings, in turns, for about as many seconds; each gets an equal share, and at least a few rounds.
 
-    What raises is left out of the other rounds, and `failed` hears of it.
+    One whose ratio to the floor is `UNSURE` gets up to `patience` times its share. What raises is left out of the other
+    rounds, and `failed` hears of it.
     """
     warming = seconds / 8 / max(len(drawings), 1)
     warmed = {name: draw for name, draw in drawings.items() if _warm_up(name, draw, warming, failed)}
     for _ in range(5):
         floor()
+    base, repeated = _Repeated(floor), {name: _Repeated(draw) for name, draw in warmed.items()}
     found = {name: Samples() for name in warmed}
     share = 0.85 * seconds / max(len(warmed), 1)
-    typical = float(np.median([floor().wall for _ in range(5)]))
-    while running := [name for name in warmed if not _enough(found[name], share)]:
-        before = _floor(floor, typical, 0.0)
+    typical = float(np.median([base.sample().wall for _ in range(5)]))
+    while running := [name for name in warmed if not _enough(found[name], share, patience)]:
+        before = _floor(base, typical, 0.0)
         for name in running:
             try:
-                sample = warmed[name]()
+                sample = repeated[name].sample()
             except Exception as error:  # noqa: BLE001 - whatever it is belongs in the row, and the others go on
                 failed(name, error)
                 del warmed[name], found[name]
                 continue
-            after = _floor(floor, typical, sample.wall)
+            after = _floor(base, typical, sample.wall * repeated[name].times / base.times)
+            found[name].times, found[name].floor_times = repeated[name].times, base.times
             found[name].add(sample, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1]))
             before = after
     return found
@@ -135,18 +151,52 @@ def _warm_up(name: str, draw: Callable[[], Sample], seconds: float, failed: Call
     return True
 
 
-def _floor(floor: Callable[[], Sample], typical: float, beside: float) -> tuple[float, float]:
+def _floor(floor: _Repeated, typical: float, beside: float) -> tuple[float, float]:
     """Medians of a few draws of the floor, the longer what is beside it takes the more: by both clocks."""
     count = int(np.clip(round(FLOOR_SHARE * beside / typical), 1, MOST_FLOORS))
-    samples = [floor() for _ in range(count)]
+    samples = [floor.sample() for _ in range(count)]
     return float(np.median([one.part for one in samples])), float(np.median([one.wall for one in samples]))
 
 
-def _enough(samples: Samples, share: float) -> bool:
+class _Repeated:
+    """Drawing that is drawn as often for a sample as it takes to tell it from the noise of clocks.
+
+    Attributes
+    ----------
+    times : int
+    """
+
+    def __init__(self, draw: Callable[[], Sample]) -> None:
+        self._draw, self.times = draw, 0
+
+    def sample(self) -> Sample:
+        """Draw, and return the means of the times; the first sample decides how many they are."""
+        samples = [self._draw()]
+        if not self.times:
+            self.times = math.ceil(min(SHORTEST / max(samples[0].frame, SHORTEST / MOST_REPEATED), MOST_REPEATED))
+        samples += [self._draw() for _ in range(self.times - 1)]
+        return samples[0] if len(samples) == 1 else _mean(samples)
+
+
+def _mean(samples: list[Sample]) -> Sample:
+    """Sample of means."""
+    gpu = [one.gpu for one in samples if one.gpu is not None]
+    wall, frame, part, whole = np.mean([(one.wall, one.frame, one.part, one.whole) for one in samples], axis=0).tolist()
+    return Sample(wall, frame, float(np.mean(gpu)) if gpu else None, part, whole)
+
+
+def _enough(samples: Samples, share: float, patience: float) -> bool:
     rounds = len(samples.wall)
     first = samples.frame[0] if rounds else 0.0
     fewest = FEWEST_LONGEST if first > LONGEST else FEWEST_LONG if first > LONG else FEWEST
-    return rounds >= MOST or (rounds >= fewest and samples.spent >= share)
+    if rounds >= MOST * patience or rounds < fewest or samples.spent < share:
+        return rounds >= MOST * patience
+    return samples.spent >= patience * share or not _unsure(samples)
+
+
+def _unsure(samples: Samples) -> bool:
+    found = ratio(samples.part, samples.floor)
+    return found is not None and found.noise > UNSURE * found.median
 
 
 def timing(seconds: list[float]) -> Timing | None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -16,7 +17,15 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from translucent.frames.frame import Frame
+    from translucent.frames.tiled import Tile
+    from translucent.renderer import Renderer
     from translucent.scene.scene import Scene
+
+#: Pixels from which on a picture is rendered in tiles.
+LARGE = 1 << 23
+
+#: Width and height within which a large picture is looked at as a whole.
+SMALL = 512
 
 
 class Pictures(NamedTuple):
@@ -29,14 +38,21 @@ class Pictures(NamedTuple):
     fps: float
     aov: Path | None
 
-    def check(self) -> None:
-        """Raise before any work is done if they could not be written."""
+    def tiled(self, size: tuple[int, int]) -> bool:
+        """Whether a picture of this size is so large that it is rendered and written in tiles."""
+        return size[0] * size[1] > LARGE and self.turntable is None and self.output.suffix.lower() != ".npz"
+
+    def check(self, size: tuple[int, int]) -> None:
+        """Raise before any work is done if pictures of this size could not be written."""
         from translucent.files.paths import require_folder
         from translucent.frames.animation import check_animation
         from translucent.frames.frame import check_exposure
         from translucent.frames.writing import check_output
 
         check_exposure(self.exposure)
+        if self.aov is not None and self.tiled(size):
+            found = f"{size[0]}x{size[1]} pixels, which are written in tiles"
+            raise InputError(f"--aov {str(self.aov)!r}", found, "write an .exr, which holds these quantities")
         if self.aov is not None:
             require_folder(self.aov, f"--aov {str(self.aov)!r}")
         if self.turntable is None:
@@ -55,6 +71,26 @@ class Pictures(NamedTuple):
         if self.aov is not None:
             frame.save_aovs(self.aov)
         return frame
+
+    def write_tiles(self, scene: Scene, renderer: Renderer, options: dict[str, Any]) -> tuple[Frame, dict[str, Any]]:
+        """Draw and write a large picture; returns a small frame of it, and the statistics of all its pixels."""
+        from translucent.frames.tiled import write_tiles
+        from translucent.tiles import Totals, render_tiles
+
+        totals, (width, height) = Totals(), options["size"]
+
+        def counted() -> Iterator[Tile]:
+            for tile in render_tiles(renderer, scene, **options):
+                totals.add(tile.frame)
+                yield tile
+
+        write_tiles(self.output, (width, height), counted(), self.exposure, self.tone)
+        scale = SMALL / max(width, height)
+        small = max(round(scale * width), 1), max(round(scale * height), 1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # they have been told
+            frame = renderer.render(scene, **{**options, "size": small, "samples": 1})
+        return frame, totals.summary((width, height))
 
     def _write_turntable(self, scene: Scene, draw: Callable[[Scene], Frame], count: int) -> Frame:
         from translucent.frames.animation import write_animation

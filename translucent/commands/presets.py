@@ -12,32 +12,56 @@ import click
 
 from translucent.commands.common import common_options, triple_text
 from translucent.commands.console import echo
+from translucent.errors import InputError
 
 if TYPE_CHECKING:
     from translucent.media.preset import Preset
 
-_LISTED = ("name", "kind", "regime", "colors", "diffuse_color", "source")
+_LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source")
 
 
-@click.group(invoke_without_command=True, epilog="Example: translucent presets show merlot")
+@click.group(invoke_without_command=True, epilog="Example: translucent presets --search wine")
+@click.option("--group", metavar="G", help="List only one group, such as 'stone and resin', or a part of its name.")
+@click.option("--search", metavar="WORDS", help="List only those of which name, note or source have these words.")
 @common_options
 @click.pass_context
-def presets(context: click.Context, as_json: bool) -> None:
+def presets(context: click.Context, group: str | None, search: str | None, as_json: bool) -> None:
     """List the named media: what they do to light, and their colors.
 
     Three are what is left of white light after 1 mm, 1 cm and 10 cm; the next is what a thick slab of a medium that
     scatters looks like in white light. Terminals with colors show slabs of 1, 5 and 20 mm on a white and a black card.
+    Your own, .toml files that the previewer saves, come last.
     """
-    from translucent.media.presets import presets as all_presets
-
     if context.invoked_subcommand is not None:
         return
-    found = list(all_presets().values())
+    found = _listed(group, search)
     if as_json:
         rows = [{key: one.summary()[key] for key in _LISTED} for one in found]
         echo(json.dumps({"presets": rows}))
         return
     echo(_table(found), color=_colorful())
+
+
+def _listed(group: str | None, search: str | None) -> list[Preset]:
+    """Presets of the toolkit and of the user, of a group and with some words."""
+    from translucent.media.own_presets import read_own_presets
+    from translucent.media.presets import grouped, matching
+    from translucent.media.presets import presets as all_presets
+
+    own, wrong = read_own_presets()
+    for error in wrong:
+        echo(f"warning: {error}", err=True)
+    known = own | all_presets()
+    found = {name: known[name] for name in [*all_presets(), *(name for name in own if name not in all_presets())]}
+    if group is not None:
+        groups = grouped(found)
+        chosen = [one for key, members in groups.items() if group.lower() in key for one in members]
+        if not chosen:
+            raise InputError(f"--group {group!r}", "no group is called so", f"use one of {', '.join(groups)}")
+        found = {one.name: one for one in chosen}
+    if search is not None and not (found := matching(found, search)):
+        raise InputError(f"--search {search!r}", "no preset has these words", "use fewer, or see 'translucent presets'")
+    return list(found.values())
 
 
 @presets.command(epilog="Example: translucent presets show merlot")
@@ -87,6 +111,7 @@ def _details(one: Preset) -> str:
     rows = [
         ("name", ", ".join((one.name, *one.aliases))),
         ("kind", one.kind),
+        ("group", one.group),
         ("source", PAPERS.get(one.source, one.source)),
         ("note", one.note),
         ("regime", one.regime),

@@ -95,6 +95,11 @@ from translucent.errors import InputError
 @click.option("--thickness", metavar="D", help="Of the sheets of --method thin-layer: 0.3mm. Default: 1mm.")
 @click.option("--samples", default=16, show_default=True, metavar="N", help="Samples per pixel, for smooth edges.")
 @click.option(
+    "--adaptive/--no-adaptive",
+    default=True,
+    help="Trace rays from smooth interfaces for as many of these as change the picture, or all. Default: --adaptive.",
+)
+@click.option(
     "--opaque-with",
     type=click.Choice(["pyrender"]),
     help="Let another renderer draw the opaque objects of a glTF file.",
@@ -147,6 +152,7 @@ def render(
     environment_shadows: int | None,
     thickness: str | None,
     samples: int,
+    adaptive: bool,
     opaque_with: str | None,
     transparent: bool,
     turntable: int | None,
@@ -181,9 +187,11 @@ def render(
     if photons is not None and opaque_with is not None:
         raise InputError("--caustics", "--opaque-with, which draws what light lands on", "leave out one of the two")
     pictures = Pictures(output, exposure, tone or "none", turntable, fps, aov)
-    pictures.check()
-    refuse_overwriting(output, model, environment, background)
     pixels = read_size(size)
+    pictures.check(pixels)
+    refuse_overwriting(output, model, environment, background)
+    if pictures.tiled(pixels) and opaque_with is not None:
+        raise InputError(f"--size {size}", "--opaque-with, which draws all of it at once", "leave out one of the two")
     medium = read_any_medium(color, distance, preset_name, clamp, scattering_color, mean_free_path)
     roughness = read_roughness(roughness, preset_name)
     method = read_method(method_name, thickness, paths)
@@ -205,6 +213,7 @@ def render(
             size=pixels,
             method=method,
             samples=samples,
+            adaptive=adaptive,
             transparent=transparent,
             interfaces=interfaces,
             scattering=scattering,
@@ -218,17 +227,22 @@ def render(
             draw = partial(
                 render_scene, size=pixels, method=method, samples=samples, renderer=renderer, scattering=scattering
             )
-        frame = pictures.write(scene, draw)
+        tiled = pictures.tiled(pixels)
+        if tiled:
+            frame, summary = pictures.write_tiles(scene, renderer, draw.keywords)
+        else:
+            frame = pictures.write(scene, draw)
+            summary = frame.summary()
     warn_if_black(scene, frame, unit, own=is_own(model))
     media = medium_lines(scene)
     if as_json:
-        echo(json.dumps({"output": str(output), "medium": "; ".join(media), **frame.summary()}))
+        echo(json.dumps({"output": str(output), "medium": "; ".join(media), **summary}))
         return
     drawn_by = [frame.provenance[key] for key in ("backend", "renderer") if key in frame.provenance]
-    echo(f"{output}: {pixels[0]}x{pixels[1]}, {', '.join(drawn_by)}")
+    echo(f"{output}: {pixels[0]}x{pixels[1]}{', in tiles' if tiled else ''}, {', '.join(drawn_by)}")
     if "opaque" in frame.provenance:
         echo(f"opaque objects: {frame.provenance['opaque']}")
     for line in media:
         echo(f"medium: {line}")
     echo(str(frame.plan))
-    echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in frame.seconds.items()))
+    echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in summary["seconds"].items()))

@@ -87,7 +87,9 @@ class Picture:
         points, camera = self.points(band, pixel), self.camera
         across = points[:, :1] * camera.right + points[:, 1:] * camera.up
         row, column = np.divmod(pixel, band.width)
-        backdrop = (np.stack([column, row + band.first_row], axis=-1) + 0.5 + self.offset) / self.size[1]
+        left, top, _, more_rows = camera.beyond(self.size)
+        place = np.stack([column + left, row + band.first_row + top], axis=-1)
+        backdrop = (place + 0.5 + self.offset) / (self.size[1] + more_rows)
         if not self.perspective:
             return Rays(across, np.broadcast_to(camera.forward, across.shape), backdrop)
         directions = across + camera.forward

@@ -3,12 +3,15 @@ file appears complete or not at all is for `translucent.files.paths.write_atomic
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
+
+#: Rows of a large picture that are converted at a time: blocks of the compression are 16 high.
+_ROWS_AT_ONCE = 64
 
 
 def write_png(file: Path | BinaryIO, pixels: npt.NDArray[Any], text: Mapping[str, str] | None = None) -> None:
@@ -56,6 +59,63 @@ def write_exr(path: Path, channels: Mapping[str, npt.NDArray[Any]], header: Mapp
             file.write(str(path))
     except RuntimeError as error:  # what a full disk is to OpenEXR
         raise OSError(str(error).replace(str(path), "the file").rstrip(".")) from error
+
+
+def write_exr_rows(
+    path: Path,
+    size: tuple[int, int],
+    blocks: Iterable[Mapping[str, npt.NDArray[Any]]],
+    header: Mapping[str, str],
+) -> None:
+    """Write float32 channels as `write_exr` does, of which blocks of rows come one after the other.
+
+    Parameters
+    ----------
+    path : Path
+    size : (width, height)
+    blocks : iterable of mapping
+        Channels of some rows, from the top of the picture to its bottom; all have the same.
+    header : mapping
+        Texts beside what every file has.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    import Imath
+    import OpenEXR
+
+    file = None
+    try:
+        for block in blocks:
+            channels = _flat(block)
+            if file is None:
+                float32 = Imath.Channel(Imath.PixelType(Imath.PixelType.FLOAT))
+                compression = Imath.Compression(Imath.Compression.ZIP_COMPRESSION)
+                texts = {name: text.encode() for name, text in header.items()}
+                parts = {"channels": dict.fromkeys(channels, float32), "compression": compression, **texts}
+                file = OpenEXR.OutputFile(str(path), {**OpenEXR.Header(*size), **parts})
+            rows = len(next(iter(channels.values())))
+            for first in range(0, rows, _ROWS_AT_ONCE):
+                part = {name: values[first : first + _ROWS_AT_ONCE] for name, values in channels.items()}
+                count = min(_ROWS_AT_ONCE, rows - first)
+                file.writePixels({name: values.astype(np.float32).tobytes() for name, values in part.items()}, count)
+    except RuntimeError as error:
+        raise OSError(str(error).replace(str(path), "the file").rstrip(".")) from error
+    finally:
+        if file is not None:
+            file.close()
+
+
+def _flat(channels: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """The channels (h, w) one by one, of which some come as ``RGB`` or ``RGBA``."""
+    whole = ("RGB", "RGBA")
+    flat = {name: values for name, values in channels.items() if name not in whole}
+    for name in whole:
+        if name in channels:
+            flat |= {letter: channels[name][..., i] for i, letter in enumerate(name)}
+    return flat
 
 
 def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:

@@ -56,7 +56,7 @@ def write_frame(path: Path, arrays: Arrays, picture: Callable[[], Pixels]) -> No
         write_atomically(path, partial(write_npz, arrays=arrays))
     else:
         header = {"comments": "linear Rec.709; thickness in metres"}
-        write_atomically(path, partial(write_exr, channels=_channels(arrays), header=header))
+        write_atomically(path, partial(write_exr, channels=channels_of(arrays), header=header))
 
 
 def write_pictures(folder: Path, pictures: Iterable[tuple[str, Pixels]]) -> list[Path]:
@@ -77,7 +77,7 @@ def write_pictures(folder: Path, pictures: Iterable[tuple[str, Pixels]]) -> list
     return files
 
 
-def _channels(arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
+def channels_of(arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
     """Channel names of an OpenEXR file."""
     channels = {"RGB": arrays["radiance"]}
     if "normals" in arrays:

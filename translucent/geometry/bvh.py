@@ -41,6 +41,12 @@ LEAST_MERGED = 0.05
 #: Bits of each coordinate along the space-filling curve.
 _CURVE_BITS = 20
 
+#: Boxes along the curve that have a tree of their own, so that building the trees of many takes little memory.
+BLOCK = 1 << 17
+
+#: Boxes whose places along the curve are found at a time.
+_CHUNK = 1 << 15
+
 
 @dataclass(frozen=True, eq=False)
 class Hierarchy:
@@ -83,19 +89,62 @@ def build_hierarchy(low: Floats, high: Floats, leaf_size: int = LEAF_SIZE) -> Hi
         Largest number of boxes in a leaf.
     """
     with np.errstate(under="ignore"):  # areas of the smallest boxes count as 0
-        order = _curve_order(0.5 * low + 0.5 * high)
-        tree = _Tree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
-        return _laid_out(tree, order, leaf_size)
+        order = curve_order(low, high)
+        parts = [_built(low, high, order[begin : begin + BLOCK], leaf_size) for begin in range(0, len(order), BLOCK)]
+        return parts[0] if len(parts) == 1 else _joined(parts)
 
 
-def _curve_order(centers: Floats) -> Integers:
-    """Order of points along a Morton curve through their bounds."""
-    start = centers.min(axis=0)
-    extent = np.maximum(centers.max(axis=0) - start, np.finfo(np.float32).tiny)
-    cells = ((centers - start) / extent * np.float32((1 << _CURVE_BITS) - 1)).astype(np.uint64)
-    return np.argsort(
-        _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2]) << np.uint64(2)
+def _built(low: Floats, high: Floats, order: Integers, leaf_size: int) -> Hierarchy:
+    """Hierarchy of some boxes, in their order along the curve."""
+    tree = _Tree(np.ascontiguousarray(low[order].T), np.ascontiguousarray(high[order].T))
+    return _laid_out(tree, order, leaf_size)
+
+
+def _joined(parts: list[Hierarchy]) -> Hierarchy:
+    """Hierarchy of the boxes of several: one of these, in place of whose leaves they are."""
+    roots = np.stack([part.low[0] for part in parts]), np.stack([part.high[0] for part in parts])
+    top = _built(*roots, np.arange(len(parts)), 1)
+    inner, leaf = np.flatnonzero(top.count == 0), np.flatnonzero(top.count)
+    weight = np.ones(len(top.size), np.int64)
+    weight[leaf] = [len(parts[part].size) for part in top.faces[top.first[leaf]]]
+    places = np.empty((8, len(weight)), np.int32)
+    for place, order in zip(places, top.orders, strict=True):
+        at = np.argsort(order)
+        ends = np.cumsum(weight[at])
+        place[at] = ends - weight[at]
+    last = ends[top.orders[-1][inner] + top.size[inner] - 1]
+    begins = np.cumsum([0, *(len(part.faces) for part in parts)])
+    node = np.empty(len(parts), np.int64)  # that each is in place of
+    node[top.faces[top.first[leaf]]] = leaf
+    firsts = [np.where(part.count > 0, part.first + begin, 0) for part, begin in zip(parts, begins, strict=False)]
+    return Hierarchy(
+        np.concatenate([top.low[inner], *(part.low for part in parts)]),
+        np.concatenate([top.high[inner], *(part.high for part in parts)]),
+        np.concatenate([(last - places[-1][inner]).astype(np.int32), *(part.size for part in parts)]),
+        np.concatenate([np.zeros(len(inner), np.int32), *(first.astype(np.int32) for first in firsts)]),
+        np.concatenate([np.zeros(len(inner), np.int32), *(part.count for part in parts)]),
+        np.concatenate([places[:, inner], *(p.orders + places[:, [i]] for p, i in zip(parts, node, strict=True))], 1),
+        np.concatenate([part.faces for part in parts]),
     )
+
+
+def curve_order(low: Floats, high: Floats) -> Integers:
+    """Order of the centers of boxes along a Morton curve through their bounds."""
+    chunks = [slice(begin, begin + _CHUNK) for begin in range(0, len(low), _CHUNK)]
+    ends = [(found.min(axis=0), found.max(axis=0)) for found in (_centers(low[part], high[part]) for part in chunks)]
+    start = np.min([least for least, _ in ends], axis=0)
+    extent = np.maximum(np.max([most for _, most in ends], axis=0) - start, np.finfo(np.float32).tiny)
+    keys = np.empty(len(low), np.uint64)
+    for part in chunks:
+        cells = (_centers(low[part], high[part]) - start) / extent * np.float32((1 << _CURVE_BITS) - 1)
+        x, y, z = (_spread(cell) for cell in cells.astype(np.uint64).T)
+        keys[part] = x | y << np.uint64(1) | z << np.uint64(2)
+    return np.argsort(keys)
+
+
+def _centers(low: Floats, high: Floats) -> Floats:
+    """(n, 3): centers of boxes."""
+    return 0.5 * low + 0.5 * high
 
 
 def _spread(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:

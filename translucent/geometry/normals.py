@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers
-from translucent.geometry.grouping import equal_rows
-from translucent.geometry.mesh import Mesh
+from translucent.arrays import Array
+from translucent.geometry.grouping import connected, equal_rows, sorted_sides
+from translucent.geometry.mesh import Mesh, unit_normals
 
 #: Smallest angle between the faces of a crease, in radians; modeling tools offer 30 to 60 degrees.
 CREASE = math.radians(40.0)
 
 
+#: Faces that are handled at a time, so that little memory is taken meanwhile.
+BLOCK = 1 << 15
+
+
 def corner_normals(mesh: Mesh) -> Array:
     """(m, 3, 3): a unit normal for each corner of each face, see `smooth_normals`; 0 where a face has no area."""
-    return smooth_normals(mesh.vertices, mesh.faces, mesh.face_normals)
+    return smooth_normals(mesh.vertices, mesh.faces, unit_normals(mesh.vertices, mesh.faces))
 
 
 def smooth_normals(vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> Array:
@@ -35,13 +40,31 @@ def smooth_normals(vertices: Array, faces: npt.NDArray[np.integer], normals: Arr
     normals : (m, 3) float64
         Of the faces, of unit length; 0 of those without area.
     """
-    corner_group = _smooth_groups(equal_rows(vertices).of[faces], normals)
-    weighted = normals[:, None] * corner_angles(vertices[faces])[..., None]
-    smooth = np.empty_like(weighted)
-    for axis in range(3):
-        smooth[..., axis] = np.bincount(corner_group.ravel(), weighted[..., axis].ravel())[corner_group]
-    length = np.linalg.norm(smooth, axis=2, keepdims=True)
-    return np.where(length > 1e-12, smooth / np.where(length > 1e-12, length, 1.0), normals[:, None])
+    found = np.empty((*faces.shape, 3))
+    _fill(found, vertices, faces, normals)
+    return found
+
+
+def _fill(found: npt.NDArray[np.floating], vertices: Array, faces: npt.NDArray[np.integer], normals: Array) -> None:
+    """Write `smooth_normals` into an array of any precision."""
+    group = _smooth_groups(equal_rows(vertices).of.astype(np.int32)[faces], normals)
+    sums = np.zeros((3, int(group.max()) + 1))
+    for block in _blocks(len(faces)):
+        weighted = normals[block, None] * corner_angles(vertices[faces[block]])[..., None]
+        for axis in range(3):
+            np.add.at(sums[axis], group[block].ravel(), weighted[..., axis].ravel())
+    with np.errstate(under="ignore"):
+        for block in _blocks(len(faces)):
+            smooth = np.moveaxis(sums[:, group[block]], 0, -1)
+            length = np.linalg.norm(smooth, axis=2, keepdims=True)
+            found[block] = np.where(
+                length > 1e-12, smooth / np.where(length > 1e-12, length, 1.0), normals[block, None]
+            )
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    """Slices of so many faces, some of them each."""
+    return (slice(begin, begin + BLOCK) for begin in range(0, count, BLOCK))
 
 
 def corner_angles(corners: Array) -> Array:
@@ -57,8 +80,15 @@ _drawn: WeakKeyDictionary[Mesh, npt.NDArray[np.float32]] = WeakKeyDictionary()
 def drawn_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
     """`corner_normals` in the precision of the GPU: made once for each mesh, in a second for a million."""
     if mesh not in _drawn:
-        keep_drawn_normals(mesh, corner_normals(mesh))
+        keep_drawn_normals(mesh, made_normals(mesh))
     return _drawn[mesh]
+
+
+def made_normals(mesh: Mesh) -> npt.NDArray[np.float32]:
+    """`corner_normals` in the precision of the GPU."""
+    found = np.empty((*mesh.faces.shape, 3), np.float32)
+    _fill(found, mesh.vertices, mesh.faces, unit_normals(mesh.vertices, mesh.faces))
+    return found
 
 
 def keep_drawn_normals(mesh: Mesh, normals: npt.NDArray[np.floating]) -> None:
@@ -72,25 +102,29 @@ def has_drawn_normals(mesh: Mesh) -> bool:
     return mesh in _drawn
 
 
-def _smooth_groups(faces: Integers, normals: Array) -> Integers:
+def _smooth_groups(faces: npt.NDArray[np.int32], normals: Array) -> npt.NDArray[np.int32]:
     """(m, 3): number of each corner's group: the corners at its vertex that smooth edges join to it."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(faces)
-    start, end = faces, np.roll(faces, -1, axis=1)
-    low, high = np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
-    order = np.lexsort((high, low))
-    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
-    one, other = order[:-1][same], order[1:][same]  # edges as 3 face + number of their first corner
-    smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) >= math.cos(CREASE)
+    sides = sorted_sides(faces)
+    same = np.flatnonzero(sides.edge[1:] == sides.edge[:-1])
+    sorted_ = sides.number.astype(np.int32)  # edges as 3 face + number of their first corner
+    del sides
+    one, other = sorted_[same], sorted_[same + 1]
+    del same, sorted_
+    smooth = np.empty(len(one), dtype=bool)
+    for block in _blocks(len(one)):
+        cosine = np.einsum("ij,ij->i", normals[one[block] // 3], normals[other[block] // 3])
+        smooth[block] = cosine >= math.cos(CREASE)
     one, other = one[smooth], other[smooth]
-    follows = np.arange(3 * count).reshape(count, 3)
-    following = np.roll(follows, -1, axis=1).ravel()
     # An edge joins its two corners of one face to those of the other at the same vertices.
     corner = faces.ravel()
     alike = corner[one] == corner[other]
-    first = np.concatenate([one, following[one]])
-    second = np.concatenate([np.where(alike, other, following[other]), np.where(alike, following[other], other)])
-    graph = coo_matrix((np.ones(len(first), dtype=bool), (first, second)), shape=(3 * count, 3 * count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64).reshape(count, 3)
+    behind, after = _following(one), _following(other)
+    first = np.concatenate([one, behind])
+    second = np.concatenate([np.where(alike, other, after), np.where(alike, after, other)])
+    del one, other, behind, after, alike
+    return np.asarray(connected(faces.size, first, second), np.int32).reshape(faces.shape)
+
+
+def _following(corner: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """The next corner of the same face, of corners as 3 face + number."""
+    return corner + np.where(corner % 3 == 2, np.int32(-2), np.int32(1))

@@ -105,8 +105,9 @@ def clip_rows(placed: PlacedScene, view: SampleView) -> Array:
         clip[:, 3, 3] = 1.0
     else:
         clip[:, 3] = seen[:, 2]
-    clip[:, 0] -= 2.0 * view.shift[0] / view.size[0] * clip[:, 3]
-    clip[:, 1] += 2.0 * view.shift[1] / view.size[1] * clip[:, 3]
+    aside, above = camera.center(view.size)
+    clip[:, 0] -= (2.0 * view.shift[0] / view.size[0] + aside) * clip[:, 3]
+    clip[:, 1] += (2.0 * view.shift[1] / view.size[1] - above) * clip[:, 3]
     if view.depth_range is not None:
         near, far = view.depth_range
         if camera.fov_y is None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.geometry.mesh import Mesh
+from translucent.geometry.mesh import Mesh, unit_normals
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.ledger import before_making
+
+#: Faces whose corners are written at a time, so that little memory is taken meanwhile.
+_CHUNK = 1 << 18
 
 
 class MeshBuffers:
@@ -68,22 +72,47 @@ class MeshBuffers:
     def _flat_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Unshared vertices of all faces, with flat normals."""
         if self._flat is None:
-            corners = (mesh.vertices - mesh.center)[mesh.faces]
-            normals = np.broadcast_to(mesh.face_normals[:, None], corners.shape)
-            self._flat = self._gl.buffer(np.concatenate([corners, normals], axis=2).astype(np.float32))
+            offsets = mesh.vertices - mesh.center
+
+            def rows(part: slice) -> npt.NDArray[np.float32]:
+                corners = offsets[mesh.faces[part]]
+                normals = np.broadcast_to(unit_normals(mesh.vertices, mesh.faces[part])[:, None], corners.shape)
+                return np.concatenate([corners, normals], axis=2).astype(np.float32)
+
+            self._flat = self._written(len(mesh.faces), rows)
         return self._flat
 
     def _smooth_faces(self, mesh: Mesh) -> moderngl.Buffer:
         """Unshared vertices of all faces, with smooth normals and texture coordinates."""
         if self._smooth is None:
             before_making(self._gl)
-            content = np.zeros((*mesh.faces.shape, 8), dtype=np.float32)
-            content[..., :3] = (mesh.vertices - mesh.center).astype(np.float32)[mesh.faces]
-            content[..., 3:6] = drawn_normals(mesh)
-            if mesh.uv is not None:
-                content[..., 6:] = mesh.uv[mesh.faces]
-            self._smooth = self._gl.buffer(content)
+            normals, offsets = drawn_normals(mesh), (mesh.vertices - mesh.center).astype(np.float32)
+            uv = mesh.uv
+
+            def rows(part: slice) -> npt.NDArray[np.float32]:
+                faces = mesh.faces[part]
+                content = np.zeros((*faces.shape, 8), dtype=np.float32)
+                content[..., :3], content[..., 3:6] = offsets[faces], normals[part]
+                if uv is not None:
+                    content[..., 6:] = uv[faces]
+                return content
+
+            self._smooth = self._written(len(mesh.faces), rows)
         return self._smooth
+
+    def _written(self, faces: int, rows: Callable[[slice], npt.NDArray[np.float32]]) -> moderngl.Buffer:
+        """Buffer with the `rows` of so many faces, some of which are made at a time."""
+        if faces <= _CHUNK:
+            return self._gl.buffer(rows(slice(None)))
+        buffer, offset = None, 0
+        for begin in range(0, faces, _CHUNK):
+            content = rows(slice(begin, begin + _CHUNK))
+            if buffer is None:
+                buffer = self._gl.buffer(reserve=faces * content.nbytes // len(content))
+            buffer.write(content, offset=offset)
+            offset += content.nbytes
+        assert buffer is not None
+        return buffer
 
     def release(self) -> None:
         """Free the OpenGL objects now."""

@@ -75,8 +75,10 @@ def extents(boxes: Array, camera: Camera, size: tuple[int, int]) -> Array:
     flat = camera.fov_y is None
     # Sample points are shifted by less than a pixel: what is four beyond the edge is out of view for all of them.
     wide = half * (1.0 + 8.0 / np.array(size))
-    reach = wide if flat else wide * np.maximum(ahead + slack, 0.0)[..., None]
-    beyond = (across - slack[..., None] > reach).all(axis=1) | (across + slack[..., None] < -reach).all(axis=1)
+    center = np.array(camera.center(size))
+    spread = np.ones_like(ahead)[..., None] if flat else np.maximum(ahead + slack, 0.0)[..., None]
+    most, least = (center * half + wide) * spread, (center * half - wide) * spread
+    beyond = (across - slack[..., None] > most).all(axis=1) | (across + slack[..., None] < least).all(axis=1)
     hidden = beyond.any(axis=1)
     if not flat:  # an orthographic ray is a whole line, whose faces count behind the picture, too
         hidden |= (ahead < -slack).all(axis=1)
@@ -88,7 +90,7 @@ def extents(boxes: Array, camera: Camera, size: tuple[int, int]) -> Array:
     low, high = across - slack[..., None], across + slack[..., None]
     low, high = np.where(low < 0.0, low / near, low / far), np.where(high > 0.0, high / near, high / far)
     limits = np.stack([low.min(axis=1), high.max(axis=1)], axis=1) / half
-    pixels = np.clip((limits + 1.0) * 0.5 * size, -2.0, np.array(size) + 2.0)
+    pixels = np.clip((limits - center + 1.0) * 0.5 * size, -2.0, np.array(size) + 2.0)
     pixels[whole] = [[-2.0, -2.0], [size[0] + 2.0, size[1] + 2.0]]
     pixels[hidden] = 0.0
     return np.asarray(pixels.reshape(count, 4))

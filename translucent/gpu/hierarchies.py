@@ -1,7 +1,6 @@
 """Hierarchies on the GPU: those of the meshes of a scene, and one of its objects, as textures that rays walk through.
 
-One 16-byte texel is a node: six bounds of 16 bits, and a link. Triangles lie in the order of the leaves, three texels
-each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle et al. 2014).
+Meshes come as `gpu.packed_meshes` has them.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ import warnings
 import weakref
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
@@ -19,114 +17,35 @@ import numpy.typing as npt
 from translucent.arrays import Array, Integers
 from translucent.errors import RenderError, TranslucentWarning
 from translucent.files.reading import size_text
-from translucent.geometry.bvh import LEAF_SIZE, Floats, Hierarchy, build_hierarchy
+from translucent.geometry.bvh import BLOCK, LEAF_SIZE, Floats, build_hierarchy
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.normals import drawn_normals
 from translucent.gpu.body_uniforms import bounded_extinction
 from translucent.gpu.constants import HIERARCHY_WIDTH_BITS
 from translucent.gpu.layout import TRACED_BODY
 from translucent.gpu.ledger import before_making
+from translucent.gpu.packed_meshes import FIRST_BITS, Words, frame, has_packed, packed_mesh, packed_nodes
 from translucent.media.medium import VACUUM, Medium
+from translucent.scene.falloff import Falloff
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import SMOOTH
 
-Words = npt.NDArray[np.uint32]
-
-#: Steps of the grid on which bounds lie, between the ends of a hierarchy.
-STEPS = 65535
-
 _WIDTH = 1 << HIERARCHY_WIDTH_BITS
 
-#: Bits of a leaf's link that hold its first triangle; three others hold how many follow it, the highest tells a leaf.
-_FIRST_BITS = 28
-
 #: Rows of texels up to which the numbers of nodes and triangles fit into links.
-_MOST_ROWS = 1 << (_FIRST_BITS - HIERARCHY_WIDTH_BITS)
+_MOST_ROWS = 1 << (FIRST_BITS - HIERARCHY_WIDTH_BITS)
 
 #: Bytes for each triangle that are kept, with the copy in OpenGL, and those that building takes for a while.
 _PACKED_BYTES = 300
 _BUILD_BYTES = 650
 
+#: Bytes that building takes for each triangle beyond the first `BLOCK` of a mesh.
+_BLOCK_BYTES = 100
+
+#: Rows of texels that are written at a time.
+_MOST_WRITTEN = 256
+
 #: Bytes of memory that nobody expects a picture to take.
 MUCH_MEMORY = 4 << 30
-
-
-@dataclass(frozen=True, eq=False)
-class PackedMesh:
-    """Hierarchy of one mesh as texels, in coordinates from -1 to 1 along its longest side.
-
-    Attributes
-    ----------
-    nodes : (8, n, 4) uint32
-        Of `packed_nodes`; triangles count from the first of the mesh.
-    triangles : (3 m, 4) uint32
-    faces : (m,) int32
-        Faces of the mesh in the order of the triangles.
-    center : (3,) float64
-    scale : float
-        Of coordinates of the mesh, less the center.
-    """
-
-    nodes: Words
-    triangles: Words
-    faces: npt.NDArray[np.int32]
-    center: Array
-    scale: float
-
-
-_packed: WeakKeyDictionary[Mesh, PackedMesh] = WeakKeyDictionary()
-
-
-def packed_mesh(mesh: Mesh) -> PackedMesh:
-    """The hierarchy of a mesh as texels, made once for each mesh."""
-    if (found := _packed.get(mesh)) is None:
-        center, scale = _frame(*mesh.bounds)
-        with np.errstate(under="ignore", over="ignore"):  # vertices that no face uses may be anywhere
-            corners = ((mesh.vertices - center) * scale).astype(np.float32)[mesh.faces]
-        tree = build_hierarchy(corners.min(axis=1), corners.max(axis=1))
-        triangles = np.empty((*mesh.faces.shape, 4), np.uint32)
-        triangles[..., :3] = corners[tree.faces].view(np.uint32)
-        triangles[..., 3] = packed_normals(drawn_normals(mesh)[tree.faces])
-        found = _packed[mesh] = PackedMesh(packed_nodes(tree), triangles.reshape(-1, 4), tree.faces, center, scale)
-    return found
-
-
-def _frame(low: Array, high: Array) -> tuple[Array, float]:
-    """Middle of bounds, and the scale by which their longest side reaches from -1 to 1."""
-    return 0.5 * low + 0.5 * high, 1.0 / max(float((high - low).max()) / 2, float(np.finfo(np.float64).tiny))
-
-
-def packed_nodes(tree: Hierarchy) -> Words:
-    """(8, n, 4): nodes of a hierarchy within -1 to 1, in the orders of all octants.
-
-    Bounds are rounded outwards by one to two steps: first those that rays of the octant come to first, x, y and z, then
-    the others. Links count from the first node of their order.
-    """
-    half = STEPS / 2
-    low = np.clip(np.floor((tree.low.astype(np.float64) + 1) * half) - 1, 0, STEPS).astype(np.uint32)
-    high = np.clip(np.ceil((tree.high.astype(np.float64) + 1) * half) + 1, 0, STEPS).astype(np.uint32)
-    leaf = tree.count > 0
-    held = np.uint32(1 << 31) | (tree.count - 1).astype(np.uint32) << _FIRST_BITS | tree.first.astype(np.uint32)
-    nodes = np.empty((8, len(leaf), 4), np.uint32)
-    for octant, (order, found) in enumerate(zip(tree.orders, nodes, strict=True)):
-        turned = (octant >> np.arange(3) & 1).astype(bool)
-        near, far = np.where(turned, high, low).T, np.where(turned, low, high).T
-        bounds = [near[0] | near[1] << 16, near[2] | far[0] << 16, far[1] | far[2] << 16]
-        link = np.where(leaf, held, (order + tree.size).astype(np.uint32))
-        found[order] = np.stack([*bounds, link], axis=1)
-    return nodes
-
-
-def packed_normals(normals: npt.NDArray[np.floating]) -> Words:
-    """(...,): unit vectors (..., 3) as 2 x 16 bits on an octahedron; 6.5e-5 rad off at most.
-
-    Half a step in each coordinate moves a point of the octahedron by sqrt(6) / 65535, at a distance of 1 / sqrt(3).
-    """
-    size = np.abs(normals).sum(axis=-1, keepdims=True)
-    at = normals / np.where(size > 0, size, 1.0)
-    folded = (1 - np.abs(at[..., 1::-1])) * np.where(at[..., :2] >= 0, 1.0, -1.0)
-    steps = np.rint((np.where(at[..., 2:] < 0, folded, at[..., :2]) + 1) * (STEPS / 2)).astype(np.uint32)
-    return np.asarray(steps[..., 0] | steps[..., 1] << 16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,20 +73,20 @@ class SceneHierarchies:
         self._rows = -(-8 * 2 * objects // _WIDTH)
         self._spans: dict[int, _Span] = {}
         packed = [packed_mesh(mesh) for mesh in meshes]
-        nodes = _texels(gl, self._rows * _WIDTH + sum(8 * part.nodes.shape[1] for part in packed))
-        triangles = _texels(gl, sum(len(part.triangles) for part in packed))
         first, triangle = self._rows * _WIDTH, 0
+        nodes, triangles = list[_Piece](), list[_Piece]()
         for mesh, part in zip(meshes, packed, strict=True):
-            count, texels = part.nodes.shape[1], len(part.triangles)
+            count = part.nodes.shape[1]
             self._spans[id(mesh)] = _Span(first, count, triangle)
-            triangles[3 * triangle : 3 * triangle + texels] = part.triangles
-            for order in part.nodes:
-                own = nodes[first : first + count]
-                own[:] = order
-                own[:, 3] += np.where(order[:, 3] >= 1 << 31, triangle, first).astype(np.uint32)
-                first += count
-            triangle += texels // 3
-        self.nodes, self.triangles = _texture(gl, nodes), _texture(gl, triangles)
+            triangles.append(_Piece(3 * triangle, part.triangles))
+            nodes += [
+                _Piece(first + i * count, order, (first + i * count, triangle)) for i, order in enumerate(part.nodes)
+            ]
+            first += 8 * count
+            triangle += len(part.triangles) // 3
+        for texels in (first, 3 * triangle):
+            _check_texels(gl, texels)
+        self.nodes, self.triangles = _texture(gl, first, nodes), _texture(gl, 3 * triangle, triangles)
         self.object_nodes = 0
         self._placed: tuple[Hashable, npt.NDArray[np.float32], tuple[float, float, float, float]] | None = None
 
@@ -195,7 +114,7 @@ class SceneHierarchies:
     ) -> tuple[npt.NDArray[np.float32], tuple[float, float, float, float]]:
         boxes = scene.boxes - center
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-        middle, scale = _frame(low, high)
+        middle, scale = frame(low, high)
         with np.errstate(under="ignore"):
             local: Floats = ((boxes - middle) * scale).astype(np.float32)
         tree = build_hierarchy(local[:, 0], local[:, 1], leaf_size=1)
@@ -259,6 +178,7 @@ class SceneHierarchies:
             "emissive": np.asarray(surface.emissive),
             "metallic": surface.metallic,
             "one_sided": float(not surface.double_sided),
+            "fading": _fading(body, packed.scale) if opaque else (0.0, 0.0, 0.0),
         }
 
     def release(self) -> None:
@@ -301,6 +221,17 @@ def _kind(body: Object, sheet: float | None) -> float:
     return 0.0 if sheet is None else 1.0 if body.has_interface else 4.0
 
 
+def _fading(body: Object, scale: float) -> tuple[float, float, float]:
+    """Radii in coordinates of the hierarchy between which paint loses a share of its color, and this share."""
+    falloff, mesh = body.surface and body.surface.color_texture, body.mesh
+    if not isinstance(falloff, Falloff) or mesh.uv is None:
+        return 0.0, 0.0, 0.0
+    one, other = mesh.faces[0, :2]
+    unit = scale * float(np.linalg.norm(mesh.vertices[one] - mesh.vertices[other]))
+    unit /= float(np.linalg.norm(mesh.uv[one] - mesh.uv[other]))
+    return falloff.start * unit, 0.5 * unit, 1.0 - falloff.far
+
+
 def _decides(scene: Scene, body: Object) -> bool:
     """Whether a body determines the index of refraction of the rays in it."""
     return body.medium is not None and (body.has_interface or scene.overlap == "priority")
@@ -318,8 +249,10 @@ def _require_room(gl: moderngl.Context, meshes: Sequence[Mesh]) -> None:
     least_nodes = sum(8 * (2 * -(-count // LEAF_SIZE) - 1) for count in faces)
     for texels in (least_nodes, 3 * sum(faces)):
         _check_texels(gl, texels)
-    new = [len(mesh.faces) for mesh in meshes if mesh not in _packed]
-    needed = _PACKED_BYTES * sum(faces) + _BUILD_BYTES * max(new, default=0)
+    new = [len(mesh.faces) for mesh in meshes if not has_packed(mesh)]
+    largest = max(new, default=0)
+    building = _BUILD_BYTES * min(largest, BLOCK) + _BLOCK_BYTES * max(largest - BLOCK, 0)
+    needed = _PACKED_BYTES * sum(faces) + building
     if needed > MUCH_MEMORY:
         warnings.warn(
             TranslucentWarning(
@@ -342,19 +275,43 @@ def _check_texels(gl: moderngl.Context, texels: int) -> None:
     raise RenderError("tracing rays through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
 
 
-def _texels(gl: moderngl.Context, count: int) -> Words:
-    """Whole rows of texels, 0 yet, for so many."""
-    _check_texels(gl, count)
-    return np.zeros((-(-count // _WIDTH) * _WIDTH, 4), np.uint32)
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """Texels from a place on; links in them are raised: those of nodes, and those of leaves."""
+
+    first: int
+    texels: Words
+    raised: tuple[int, int] | None = None
 
 
-def _texture(gl: moderngl.Context, texels: Words) -> moderngl.Texture:
+def _rows(pieces: Sequence[_Piece], begin: int, end: int) -> Words:
+    """Texels from one place to another, 0 where there is none of the pieces."""
+    found = np.zeros((end - begin, 4), np.uint32)
+    for piece in pieces:
+        low, high = max(piece.first, begin), min(piece.first + len(piece.texels), end)
+        if low < high:
+            own = found[low - begin : high - begin]
+            own[:] = piece.texels[low - piece.first : high - piece.first]
+            if piece.raised is not None:
+                node, triangle = piece.raised
+                own[:, 3] += np.where(own[:, 3] >= 1 << 31, triangle, node).astype(np.uint32)
+    return found
+
+
+def _texture(gl: moderngl.Context, count: int, pieces: Sequence[_Piece]) -> moderngl.Texture:
+    """Texture with so many texels, in whole rows, which are made some at a time."""
+    rows, step = -(-count // _WIDTH), _MOST_WRITTEN
     try:
-        texture = gl.texture((_WIDTH, len(texels) // _WIDTH), 4, texels, dtype="u4")
+        content = _rows(pieces, 0, rows * _WIDTH) if rows <= step else None
+        texture = gl.texture((_WIDTH, rows), 4, content, dtype="u4")
+        for row in range(0, rows, step) if content is None else ():
+            height = min(step, rows - row)
+            part = _rows(pieces, row * _WIDTH, (row + height) * _WIDTH)
+            texture.write(part, viewport=(0, row, _WIDTH, height))
     except moderngl.Error as error:
         raise RenderError(
             "tracing rays through the meshes",
-            f"OpenGL has no room for {size_text(texels.nbytes)} of them ({error})",
+            f"OpenGL has no room for {size_text(16 * rows * _WIDTH)} of them ({error})",
             "use interfaces=tl.ScreenInterfaces(), or coarser meshes",
         ) from error
     texture.filter = moderngl.NEAREST, moderngl.NEAREST

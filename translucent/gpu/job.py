@@ -75,6 +75,10 @@ class FrameJob(SceneView):
         The frame is a map of shadows.
     path_only : bool
         The accumulator has paths of one medium alone, and counts of those that an opaque surface ends at most.
+    bent_apart : bool
+        Rays are traced from interfaces apart from what else a sample shows.
+    bending : bool
+        Of a sample, that alone is drawn now.
     projected_depth : bool
         The accumulator has a depth buffer of opaque surfaces, against which passes can test.
     covered : Part
@@ -83,7 +87,7 @@ class FrameJob(SceneView):
     """
 
     corner: tuple[int, int] = (0, 0)
-    for_map = path_only = projected_depth = False
+    for_map = path_only = projected_depth = bent_apart = bending = False
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(

@@ -26,6 +26,8 @@ VIEW = UniformBlock(
         ("ray_up", "f4", (4,)),
         ("ray_forward", "f4", (4,)),
         ("opaque_range", "f4", (2,)),  # axial depth of the nearest opaque point, and 1 / that from it to the last
+        # Of a larger picture, pixels left of and above this part of it, and how many more it has across and down.
+        ("beyond", "f4", (4,)),
     ),
 )
 
@@ -113,9 +115,11 @@ SURFACES = UniformBlock(
     "Surfaces",
     8,
     (
-        ("surface_right", "f4", (4,)),  # camera's axes, times half the view's extent (at distance 1); w: perspective
+        # Camera's axes, times half the view's extent (at distance 1); w: whether in perspective, and of the center of
+        # the picture, which may be part of a larger one, how far up it is from the camera's axis, in these units.
+        ("surface_right", "f4", (4,)),
         ("surface_up", "f4", (4,)),
-        ("surface_off_axis", "f4", (4,)),  # from the camera's axis to the center
+        ("surface_off_axis", "f4", (4,)),  # from the camera's axis to the center; w: of the picture's, to the right
         # Metres ahead of the center of axial depth 0, from axial depth 0 to 1, ahead of the eye of the center, and
         # ahead of the center of the wall that a checkerboard is.
         ("surface_ahead", "f4", (4,)),
@@ -267,6 +271,9 @@ TRACED_BODY = PackedTable(
         ("slot", "f4", ()),  # the same for objects of one medium
         ("anisotropy", "f4", ()),
         ("scattering", "f4", (3,)),
+        # Of paint around the middle of the mesh, in coordinates of the hierarchy: where it begins to get darker, where
+        # it ends to, and how much of it is lost there; 0 for none.
+        ("fading", "f4", (3,)),
     ),
 )
 

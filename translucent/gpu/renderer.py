@@ -16,6 +16,7 @@ import numpy.typing as npt
 from translucent.errors import RenderError
 from translucent.formulas.sampling import sample_shifts
 from translucent.frames.frame import Frame
+from translucent.gpu.adaptive import AdaptiveSampling, is_adaptive, read_averages, traced_samples
 from translucent.gpu.backdrop import TextureBackdrop
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import GpuContext, adopt_context, open_context, require_own_process
@@ -28,7 +29,7 @@ from translucent.gpu.passes.present import PresentPass
 from translucent.gpu.resources import Resources
 from translucent.gpu.shadow_atlas import ShadowAtlas
 from translucent.gpu.storage import SHADER_STORAGE
-from translucent.gpu.targets import Targets
+from translucent.gpu.targets import Targets, read_floats
 from translucent.gpu.timer import PassTimer
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import Capabilities, RenderPlan
@@ -76,6 +77,7 @@ class GpuRenderer:
         self._targets: Targets | None = None
         self._passes: dict[type[Pass], Pass] = {}
         self._present: PresentPass | None = None
+        self._adaptive: AdaptiveSampling | None = None
         self._pid = os.getpid()
         self._closed = False
         self._interrupted = False
@@ -113,11 +115,13 @@ class GpuRenderer:
         samples: int,
         backdrop: Backdrop | TextureBackdrop | None = None,
         report: Callable[[float], None] | None = None,
+        *,
+        adaptive: bool = True,
     ) -> Frame:
         """Run a plan of the scene; radiance and transmittance are the mean of `samples` sub-pixel samples.
 
-        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the samples, or of random
-        paths, that is done, now and then.
+        A plan over a backdrop needs it, in the size of the frame. `report` takes the share of the work that is done,
+        now and then. `adaptive`: rays are traced from interfaces as often as it changes the picture.
         """
         with self._alone(), self.context.current():
             job = self.prepare(scene, size, plan, backdrop)
@@ -125,7 +129,9 @@ class GpuRenderer:
             try:
                 self._timer.begin_frame()
                 if samples > 1:
-                    self._average(job, samples)
+                    self._average(job, samples, adaptive=adaptive)
+                    job.averaging, job.averaged, job.sample, job.samples = False, True, 0, 1
+                    job.place((0.0, 0.0))
                 self._run_passes(job, leave_out=_LIGHT if samples > 1 else ())
                 return self.read(job, samples)
             finally:
@@ -213,29 +219,31 @@ class GpuRenderer:
     def read(self, job: FrameJob, samples: int = 1) -> Frame:
         """Read the frame from the job's targets, with radiance and transmittance averaged if sampled."""
         result = job.targets.result()
+        trusted = None
         if samples > 1:
-            averages = job.targets.average()
-            with np.errstate(under="ignore"):
-                radiance, transmittance = (_read_floats(averages, i, 3) / np.float32(samples) for i in range(2))
+            radiance, transmittance, trusted = read_averages(job, samples)
         else:
-            transmittance = _read_floats(result, 1, 3)
-            radiance = _read_floats(job.picture, 0, 3)
+            transmittance = read_floats(result, 1, 3)
+            radiance = read_floats(job.picture, 0, 3)
         radiance, standard_error, lost = _read_paths(job) if job.features.path_traced else (radiance, None, None)
         flags = np.empty(job.targets.size[::-1], dtype=np.uint8)
         result.read_into(flags, components=1, attachment=4, alignment=1)
-        optical_depth, thickness = _read_floats(result, 2, 3), _read_floats(result, 3, 1)
+        optical_depth, thickness = read_floats(result, 2, 3), read_floats(result, 3, 1)
         seconds = self._timer.seconds()
         seconds["total"] = time.perf_counter() - job.started
         sound = np.ones(flags.shape, dtype=bool)
         if job.features.traced:
             # Rays that end inside a body, or in more of them than they can remember, have no right color.
-            picture, whole = (job.targets.average(), samples) if samples > 1 else (job.targets.surfaced(), 1)
-            sound = _read_floats(picture, 1, 4)[..., 3] >= np.float32(whole * (1.0 - MOST_LOST))
+            share = read_floats(job.targets.surfaced(), 1, 4)[..., 3] if trusted is None else trusted
+            sound = share >= np.float32(1.0 - MOST_LOST)
         if lost is not None:
             sound = lost <= MOST_LOST
+        provenance = dict(self.provenance)
+        if job.bent_apart:
+            provenance["traced_samples"] = f"{traced_samples(job):.1f} of {samples}"
         layers = truncated = None
         if job.plan.ordered:
-            counts = _read_floats(job.targets.ordered(), 2, 4)[::-1]
+            counts = read_floats(job.targets.ordered(), 2, 4)[::-1]
             layers = np.rint(counts[..., 0]).astype(np.int32)
             truncated = np.rint(counts[..., 0] - counts[..., 1]).astype(np.int32)
         return Frame(
@@ -247,7 +255,7 @@ class GpuRenderer:
             valid=(flags & 2).astype(bool) & sound,
             plan=job.plan,
             seconds=seconds,
-            provenance=dict(self.provenance),
+            provenance=provenance,
             standard_error=standard_error,
             layers=layers,
             truncated=truncated,
@@ -267,7 +275,7 @@ class GpuRenderer:
                 if self._targets is not None:
                     self._targets.release()
                 self._passes.clear()
-                self._present = None
+                self._present = self._adaptive = None
                 self.context.drain()
         if self._abandoned is not None:
             self._abandoned()
@@ -305,10 +313,14 @@ class GpuRenderer:
             self._passes[kind] = kind(self.context.gl)
         return self._passes[kind]
 
-    def _average(self, job: FrameJob, samples: int) -> None:
+    def _average(self, job: FrameJob, samples: int, *, adaptive: bool) -> None:
         """Add up `samples` shifted renderings in the target for averages."""
-        job.targets.average().clear()
         job.averaging = True
+        if adaptive and is_adaptive(job, samples):
+            self._adaptive = self._adaptive or AdaptiveSampling(self.context.gl)
+            self._adaptive.run(job, samples, lambda leave_out: self._run_passes(job, leave_out=leave_out))
+            return
+        job.targets.average().clear()
         for number, (right, down) in enumerate(sample_shifts(samples)):
             job.sample, job.samples = number, samples
             job.place((right, down))
@@ -316,8 +328,6 @@ class GpuRenderer:
             if not job.features.path_traced:  # of these, the share of paths is told
                 self.context.gl.finish()
                 job.report((number + 1) / samples)
-        job.averaging, job.averaged, job.sample, job.samples = False, True, 0, 1
-        job.place((0.0, 0.0))
 
 
 def _release(gl: moderngl.Context, pid: int) -> None:
@@ -326,20 +336,12 @@ def _release(gl: moderngl.Context, pid: int) -> None:
         gl.release()
 
 
-def _read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components: int) -> npt.NDArray[np.float32]:
-    width, height = framebuffer.size
-    shape = (height, width) if components == 1 else (height, width, components)
-    array = np.empty(shape, dtype=np.float32)
-    framebuffer.read_into(array, components=components, attachment=attachment, alignment=1, dtype="f4")
-    return array
-
-
 def _read_normals(job: FrameJob) -> npt.NDArray[np.float32]:
     """(h, w, 3): normals of the interfaces that the interfaces pass has found, 0 where there is none."""
     width, height = job.targets.size
     normals = np.zeros((height, width, 3), dtype=np.float32)
     if job.covered:
-        found = _read_floats(job.targets.entered(), 0, 4)[::-1]
+        found = read_floats(job.targets.entered(), 0, 4)[::-1]
         np.copyto(normals, found[..., :3], where=found[..., 3:] < float(CONSTANTS["NOTHING"]))
     return normals
 
@@ -348,7 +350,7 @@ def _read_paths(job: FrameJob) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.
     """Radiance (h, w, 3) of random paths, its standard error, and the share (h, w) of them that were lost."""
     count = job.paths_traced
     known = job.targets.paths()
-    mean, squares = _read_floats(known, 0, 4), _read_floats(known, 1, 3)
+    mean, squares = read_floats(known, 0, 4), read_floats(known, 1, 3)
     with np.errstate(under="ignore"):
         error = np.sqrt(squares / np.float32(count * (count - 1.0)))
         return np.ascontiguousarray(mean[..., :3]), error, mean[..., 3] / np.float32(count)

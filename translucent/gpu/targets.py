@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import moderngl
+import numpy as np
+import numpy.typing as npt
 
 from translucent.errors import RenderError
 from translucent.gpu.storage import Storage
@@ -102,6 +104,18 @@ class Targets:
         """RGBA32F radiance and transmittance, summed over the samples of a pixel, with a depth buffer."""
         return self._get("average", (4, 4), with_depth=True)
 
+    def bent(self) -> moderngl.Framebuffer:
+        """RGBA32F light of traced samples of a pixel and their number; squared luminance and trust; depth buffer."""
+        return self._get("bent", (4, 4), with_depth=True)
+
+    def unsettled(self) -> moderngl.Framebuffer:
+        """R8: pixels that need more samples."""
+        return self._get("unsettled", (-1,))
+
+    def opaque_mean(self) -> moderngl.Framebuffer:
+        """RGBA32F radiance of opaque surfaces, the mean of all samples, and the share of the pixel that they fill."""
+        return self._get("opaque_mean", (4,))
+
     def paths(self) -> moderngl.Framebuffer:
         """RGBA32F means of random paths and how many were lost, and sums of squared differences from the means."""
         return self._get("paths", (4, 4))
@@ -189,3 +203,12 @@ class Targets:
             framebuffer.release()
         self._framebuffers.clear()
         self.buffers.release()
+
+
+def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, components: int) -> npt.NDArray[np.float32]:
+    """(h, w) or (h, w, components): what an attachment holds, in the order of its rows."""
+    width, height = framebuffer.size
+    shape = (height, width) if components == 1 else (height, width, components)
+    array = np.empty(shape, dtype=np.float32)
+    framebuffer.read_into(array, components=components, attachment=attachment, alignment=1, dtype="f4")
+    return array

@@ -34,6 +34,7 @@ from translucent.media.medium import VACUUM
 from translucent.planning.limits import MAX_SCATTER_LIGHTS
 from translucent.planning.methods.base import MAX_LIGHT_POINTS
 from translucent.planning.slots import MAX_SLOTS, Slot
+from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Light, Object, Scene
@@ -48,6 +49,7 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
     camera, media, opaque = view.camera, placed.media, placed.opaque
     half_width, half_height = camera.half_extent(view.size)
     perspective = camera.fov_y is not None
+    aside = center_aside(camera, view.size) if perspective else np.zeros(3)
     reach = (0.0, 0.0)
     if opaque is not None:
         reach = ((opaque.near - media.near) / media.length, media.length / opaque.length)
@@ -56,9 +58,16 @@ def view_uniforms(view: SampleView, placed: PlacedScene) -> bytes:
         frame_size=[*view.size, view.shift[0] - view.corner[0], view.shift[1] + view.corner[1]],
         ray_right=[*(camera.right * half_width * perspective), 0.0],
         ray_up=[*(camera.up * half_height * perspective), 0.0],
-        ray_forward=[*camera.forward, 0.0],
+        ray_forward=[*(camera.forward + aside), 0.0],
         opaque_range=reach,
+        beyond=camera.beyond(view.size),
     )
+
+
+def center_aside(camera: Camera, size: tuple[int, int]) -> Array:
+    """(3,): from the camera's axis to the center of the view, at distance 1, or in metres for an orthographic one."""
+    aside = np.array(camera.center(size)) * camera.half_extent(size)
+    return np.asarray(aside[0] * camera.right + aside[1] * camera.up)
 
 
 def media_uniforms(placed: PlacedScene, slots: tuple[Slot, ...]) -> bytes:
@@ -135,7 +144,8 @@ def scatter_uniforms(
     nodes, weights = np.polynomial.legendre.leggauss(points)
     gauss[:points, 0], gauss[:points, 1] = (nodes + 1) / 2, weights / 2
     center = lights.center - camera.eye
-    off_axis = center - (center @ camera.forward) * camera.forward
+    ahead, aside = float(center @ camera.forward), center_aside(camera, size)
+    off_axis = center - ahead * camera.forward - (ahead if camera.fov_y is not None else 1.0) * aside
     return SCATTER.pack(
         scatter_right=[*(camera.right * half_width), 0.0],
         scatter_up=[*(camera.up * half_height), 0.0],
@@ -235,10 +245,12 @@ def surface_uniforms(placed: PlacedScene, size: tuple[int, int]) -> bytes:
     ahead = float(center @ camera.forward)
     ends = scene.bounds - camera.eye
     farthest = float(np.maximum(ends[0] * camera.forward, ends[1] * camera.forward).sum())
+    aside, above = camera.center(size)
+    slant = center_aside(camera, size) if camera.fov_y is not None else np.zeros(3)
     return SURFACES.pack(
         surface_right=[*(camera.right * half_width), float(camera.fov_y is not None)],
-        surface_up=[*(camera.up * half_height), 0.0],
-        surface_off_axis=[*(center - ahead * camera.forward), 0.0],
+        surface_up=[*(camera.up * half_height), above],
+        surface_off_axis=[*(center - ahead * (camera.forward + slant)), aside],
         surface_ahead=[media.near - ahead, media.length, ahead, farthest - ahead],
         surface_reach=scene.diagonal,
         surface_eye_axial_depth=-media.near / media.length,

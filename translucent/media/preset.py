@@ -68,6 +68,8 @@ class Preset:
         Whether only sigma_s' = sigma_s (1 - g) is known: the medium has it as its scattering, with g = 0.
     roughness : float
         Of a typical surface, 0 (polished) to 1, as in `Surface`; 0 also where nothing is said about it.
+    group : str
+        Heading under which it is listed, such as ``stone and resin``; empty if none.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Preset:
     channel_anisotropy: Triple = (0.0, 0.0, 0.0)
     reduced: bool = False
     roughness: float = 0.0
+    group: str = ""
 
     def _repr_html_(self) -> str:
         """Name and swatches, for notebooks: of light that passes, and of slabs on a white and a black card."""
@@ -205,6 +208,7 @@ class Preset:
             "name": self.name,
             "aliases": list(self.aliases),
             "kind": self.kind,
+            "group": self.group,
             "source": self.source,
             "citation": PAPERS.get(self.source, ""),
             "note": self.note,

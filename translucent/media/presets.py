@@ -4,27 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
-from typing import cast
 
-import numpy as np
-
-from translucent.arrays import Array
 from translucent.errors import InputError
-from translucent.files.reading import toml_value
-from translucent.media.medium import Medium
-from translucent.media.preset import Kind, Preset, Triple
+from translucent.media.own_presets import OWN, read_own_presets
+from translucent.media.preset import Preset
+from translucent.media.preset_file import read_presets
 from translucent.suggestions import LEAST_PART, close_names, did_you_mean
-from translucent.units import metres_per_unit, parse_length
 
-_ALWAYS = {"kind", "source", "ior"}
-_OPTIONAL = {"note", "aliases", "roughness"}
-_BY_COLOR = {"color", "distance"}
-_BY_COEFFICIENTS = {"unit", "absorption"}
-_UNREDUCED = {"scattering", "anisotropy"}
-_KNOWN = _ALWAYS | _OPTIONAL | _BY_COLOR | _BY_COEFFICIENTS | _UNREDUCED | {"reduced_scattering"}
 _WELL_KNOWN = ("marble", "skim_milk", "merlot", "honey", "jade")
 
 
@@ -33,14 +21,38 @@ def presets() -> dict[str, Preset]:
     return dict(_all())
 
 
+def grouped(found: Mapping[str, Preset]) -> dict[str, list[Preset]]:
+    """Presets by their groups, those of the toolkit first; what has no group is among the user's own."""
+    order = dict.fromkeys(one.group for one in _all().values())
+    groups: dict[str, list[Preset]] = {group: [] for group in sorted(order)}
+    for one in found.values():
+        groups.setdefault(one.group or OWN, []).append(one)
+    return {group: members for group, members in groups.items() if members}
+
+
+def matching(found: Mapping[str, Preset], words: str) -> dict[str, Preset]:
+    """Presets of which names, aliases, groups, kinds, notes and sources have all of these words, or begin with them."""
+    wanted = re.findall(r"\w+", words.lower().replace("_", " "))
+    return {name: one for name, one in found.items() if all(any(w.startswith(x) for w in _words(one)) for x in wanted)}
+
+
 def preset(name: str) -> Preset:
-    """Preset of this name or alias, in any case and with any separators; raises `InputError` if there is none."""
+    """Preset of this name or alias, in any case and with any separators, or the user's own one of that name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
     known = _names()
     key = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     if key in known:
         return known[key]
+    own, _ = read_own_presets()
+    if key in own:
+        return own[key]
     speaking = [one.name for one in _all().values() if _speaks_of(one, key)]
-    close = close_names(key, _all()) or close_names(key, known) or speaking
+    close = close_names(key, [*_all(), *own]) or close_names(key, known) or speaking
     number = len(_all())
     do = (
         f"{did_you_mean(close)} 'translucent presets' lists all {number}"
@@ -48,160 +60,6 @@ def preset(name: str) -> Preset:
         else f"use one of {', '.join(_WELL_KNOWN)} and {number - len(_WELL_KNOWN)} more, see 'translucent presets'"
     )
     raise InputError(f"preset {name!r}", "not a known preset", do)
-
-
-def read_presets(text: str, file: str = "presets.toml") -> dict[str, Preset]:
-    """Presets of a TOML text; the head of ``presets.toml`` describes the format.
-
-    Parameters
-    ----------
-    text : str
-    file : str
-        What errors call it.
-
-    Raises
-    ------
-    InputError
-        If an entry lacks a key, has an unknown one or a value of the wrong type, or a name is given twice.
-    """
-    try:
-        entries = toml_value(text)
-    except ValueError as error:
-        raise InputError(file, f"no TOML: {error}", "correct the file") from None
-    found = {name: _Entry(file, name, entry).preset() for name, entry in entries.items()}
-    taken = set(found)
-    for one in found.values():
-        for alias in one.aliases:
-            if alias in taken:
-                raise InputError(f"{file}, [{one.name}]", f"alias {alias!r} is a name already", "choose another")
-            taken.add(alias)
-    return found
-
-
-class _Entry:
-    """Reader of one table of the file, key by key."""
-
-    def __init__(self, file: str, name: str, entry: object) -> None:
-        self.where, self.name = f"{file}, [{name}]", name
-        if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
-            raise InputError(self.where, "not a name in lower_snake_case", "write for example skim_milk")
-        if not isinstance(entry, Mapping):
-            raise InputError(self.where, "not a table", f"write [{name}], and its keys below")
-        self.entry: Mapping[str, object] = entry
-        self._check_keys()
-
-    def _check_keys(self) -> None:
-        given = set(self.entry)
-        for key in sorted(given - _KNOWN):
-            close = get_close_matches(key, sorted(_KNOWN), n=1)
-            do = f"did you mean {close[0]!r}?" if close else f"use some of {', '.join(sorted(_KNOWN))}"
-            raise InputError(self.where, f"unknown key {key!r}", do)
-        if given & _BY_COLOR:
-            self._check_by_color(given)
-            return
-        if "reduced_scattering" in given:
-            self._exclude(given & _UNREDUCED, "reduced_scattering")
-        self._require(_ALWAYS | _BY_COEFFICIENTS | ({"scattering"} if "anisotropy" in given else set()), given)
-
-    def _check_by_color(self, given: set[str]) -> None:
-        self._exclude(given & {"absorption"}, "color")
-        for key in sorted(given & _UNREDUCED):
-            do = "give 'reduced_scattering', sigma_s (1 - g), in its place"
-            raise InputError(self.where, f"{key!r} beside 'color'", do)
-        scatters = "reduced_scattering" in given
-        if "unit" in given and not scatters:
-            raise InputError(
-                self.where, "'unit' beside 'color'", "leave it out: 'distance' has its own; only scattering needs one"
-            )
-        self._require(_ALWAYS | _BY_COLOR | ({"unit"} if scatters else set()), given)
-
-    def _exclude(self, keys: set[str], other: str) -> None:
-        for key in sorted(keys):
-            raise InputError(self.where, f"both {key!r} and {other!r}", "give one or the other")
-
-    def _require(self, keys: set[str], given: set[str]) -> None:
-        for key in sorted(keys - given):
-            raise InputError(self.where, f"no key {key!r}", "add it")
-
-    def preset(self) -> Preset:
-        """The preset that the table describes."""
-        kind = self._text("kind")
-        if kind not in ("measured", "estimated"):
-            raise self._wrong("kind", '"measured" or "estimated"')
-        anisotropy = self._triple("anisotropy") if "anisotropy" in self.entry else (0.0, 0.0, 0.0)
-        try:
-            medium = self._medium(anisotropy)
-        except InputError as error:
-            raise InputError(self.where, str(error)) from None
-        return Preset(
-            self.name,
-            medium,
-            cast(Kind, kind),
-            self._text("source"),
-            self._text("note") if "note" in self.entry else "",
-            self._names("aliases") if "aliases" in self.entry else (),
-            anisotropy,
-            "reduced_scattering" in self.entry,
-            self._roughness(),
-        )
-
-    def _medium(self, anisotropy: Triple) -> Medium:
-        ior = self._number("ior", self.entry["ior"])
-        for g in anisotropy:
-            if not -1 < g < 1:
-                raise self._wrong("anisotropy", "between -1 and 1")
-        key = "reduced_scattering" if "reduced_scattering" in self.entry else "scattering"
-        scattering = self._per_metre(key) if key in self.entry else np.zeros(3)
-        with np.errstate(over="ignore", invalid="ignore"):  # a medium refuses what is not finite
-            total = float(scattering.sum())
-            mean = float(scattering @ np.array(anisotropy)) / total if total > 0 else 0.0
-        return Medium(absorption=self._absorption(), scattering=scattering, anisotropy=mean, ior=ior)
-
-    def _absorption(self) -> Array:
-        """sigma_a in 1/m."""
-        if "color" not in self.entry:
-            return self._per_metre("absorption")
-        clear = Medium.from_color(self._triple("color"), parse_length(self._text("distance")))
-        return np.asarray(clear.absorption, dtype=np.float64)
-
-    def _per_metre(self, key: str) -> Array:
-        """Coefficients in 1/m; infinite beyond the numbers there are."""
-        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-            return np.asarray(np.array(self._triple(key)) * (1.0 / metres_per_unit(self._text("unit"))))
-
-    def _roughness(self) -> float:
-        if "roughness" not in self.entry:
-            return 0.0
-        if not 0.0 <= (roughness := self._number("roughness", self.entry["roughness"])) <= 1.0:
-            raise self._wrong("roughness", "0 (polished) to 1")
-        return roughness
-
-    def _text(self, key: str) -> str:
-        value = self.entry[key]
-        if not (isinstance(value, str) and value.strip()):
-            raise self._wrong(key, "a text")
-        return value
-
-    def _names(self, key: str) -> tuple[str, ...]:
-        value = self.entry[key]
-        if not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
-            raise self._wrong(key, "a list of names")
-        return tuple(value)
-
-    def _number(self, key: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._wrong(key, "a number")
-        return float(value)
-
-    def _triple(self, key: str) -> Triple:
-        value = self.entry[key]
-        if not (isinstance(value, list) and len(value) == 3):
-            raise self._wrong(key, "three numbers [r, g, b]")
-        r, g, b = (self._number(key, v) for v in value)
-        return r, g, b
-
-    def _wrong(self, key: str, do: str) -> InputError:
-        return InputError(self.where, f"{key} = {self.entry[key]!r}", f"give {do}")
 
 
 @cache
@@ -212,6 +70,11 @@ def _all() -> dict[str, Preset]:
 @cache
 def _names() -> dict[str, Preset]:
     return {name: one for one in _all().values() for name in (one.name, *one.aliases)}
+
+
+def _words(one: Preset) -> list[str]:
+    parts = (one.name, *one.aliases, one.group, one.kind, one.note, one.source)
+    return re.findall(r"\w+", " ".join(parts).lower().replace("_", " "))
 
 
 def _speaks_of(one: Preset, word: str) -> bool:

@@ -17,7 +17,7 @@ FLAT = 1e-6
 
 
 class Mirror(NamedTuple):
-    """Flat ground with a smooth coat.
+    """Flat ground.
 
     Attributes
     ----------
@@ -43,22 +43,35 @@ class Mirror(NamedTuple):
 
 def mirror_of(scene: Scene) -> Mirror | None:
     """Ground of a scene that mirrors its bodies, if it has one: the first flat shadow catcher with a smooth coat."""
-    for item in scene.objects:
-        surface = item.surface
-        if not item.shadow_catcher or surface is None or surface.ior == 1.0 or surface.metallic > 0:
-            continue
-        if (
-            surface.roughness > MOST_ROUGHNESS
-            or surface.roughness_texture is not None
-            or surface.normal_texture is not None
-        ):
-            continue
-        corners = (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3])[item.mesh.faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-        normal *= -1.0 if item.mirrored else 1.0
-        if not (length := float(np.linalg.norm(normal))) > 0:
-            continue
-        heights = (corners - corners[0, 0]).reshape(-1, 3) @ (normal / length)
-        if np.abs(heights).max() <= FLAT * np.abs(corners - corners[0, 0]).max():
-            return Mirror(item, normal / length, float(corners[0, 0] @ normal / length))
-    return None
+    return next((found for item in scene.objects if _is_smooth(item) and (found := _flat(item))), None)
+
+
+def ground_of(scene: Scene) -> Mirror | None:
+    """Ground of a scene, if it has one: the first flat shadow catcher that is opaque."""
+    return next((found for item in scene.opaque if item.shadow_catcher and (found := _flat(item))), None)
+
+
+def _is_smooth(item: Object) -> bool:
+    surface = item.surface
+    return (
+        item.shadow_catcher
+        and surface is not None
+        and surface.ior != 1.0
+        and surface.metallic == 0
+        and surface.roughness <= MOST_ROUGHNESS
+        and surface.roughness_texture is None
+        and surface.normal_texture is None
+    )
+
+
+def _flat(item: Object) -> Mirror | None:
+    """Plane of an object all of which lies in one."""
+    corners = (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3])[item.mesh.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    normal *= -1.0 if item.mirrored else 1.0
+    if not (length := float(np.linalg.norm(normal))) > 0:
+        return None
+    heights = (corners - corners[0, 0]).reshape(-1, 3) @ (normal / length)
+    if np.abs(heights).max() > FLAT * np.abs(corners - corners[0, 0]).max():
+        return None
+    return Mirror(item, normal / length, float(corners[0, 0] @ normal / length))

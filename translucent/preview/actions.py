@@ -15,7 +15,7 @@ from translucent.media.color_distance import color_at
 from translucent.media.medium import MAX_COEFFICIENT, Medium
 from translucent.media.presets import preset
 from translucent.preview import orbiting
-from translucent.preview.document import Document, Material, Model, Orbit, checked
+from translucent.preview.document import Assigned, Document, Material, Model, Orbit, checked
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,15 @@ class ChoosePreset:
     """Fill the bodies with a named medium."""
 
     name: str
+
+
+@dataclass(frozen=True)
+class Assign:
+    """Give an object a material of its own, or none again. Those of one `drag` are one step of undo."""
+
+    object: int
+    material: Material | None
+    drag: int | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +97,7 @@ class Zoom:
     down: float = 0.0
 
 
-Action = Change | Open | ChoosePreset | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
+Action = Change | Open | ChoosePreset | Assign | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
 
 #: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
 CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
@@ -113,7 +122,9 @@ def apply(document: Document, action: Action) -> Document:
         case Open():
             return _opened(document, action)
         case ChoosePreset():
-            return dataclasses.replace(document, material=_of_preset(document.material, action.name))
+            return dataclasses.replace(document, material=preset_material(document.material, action.name))
+        case Assign():
+            return _assigned(document, action)
         case Adopt():
             return dataclasses.replace(document, material=action.material)
         case Replace():
@@ -141,11 +152,23 @@ def _changed(document: Document, action: Change) -> Document:
     owner = getattr(document, section, None) if section in document.__dataclass_fields__ else None
     if owner is None or name not in owner.__dataclass_fields__ or action.field == "model.path":
         raise InputError(f"field {action.field!r}", "there is none to change", "use for example material.roughness")
+    if isinstance(owner, Material):
+        return dataclasses.replace(document, material=changed_material(owner, name, action.value))
     value = checked(action.field, action.value, getattr(owner, name))
-    changed = dataclasses.replace(owner, **{name: value})
-    if isinstance(changed, Material):
-        changed = _resourced(changed, name)
-    return dataclasses.replace(document, **{section: changed})
+    return dataclasses.replace(document, **{section: dataclasses.replace(owner, **{name: value})})
+
+
+def changed_material(material: Material, name: str, value: Any) -> Material:
+    """Material with another value of a field; raises `InputError` if that is out of its range."""
+    value = checked(f"material.{name}", value, getattr(material, name))
+    return _resourced(dataclasses.replace(material, **{name: value}), name)
+
+
+def _assigned(document: Document, action: Assign) -> Document:
+    others = [one for one in document.assigned if one.object != action.object]
+    if action.material is not None:
+        others.append(Assigned(action.object, action.material))
+    return dataclasses.replace(document, assigned=tuple(sorted(others, key=lambda one: one.object)))
 
 
 def _resourced(material: Material, edited: str) -> Material:
@@ -179,12 +202,14 @@ def _opened(document: Document, action: Open) -> Document:
     # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
     if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
         material = Material()
-    return dataclasses.replace(document, model=model, material=material, orbit=None)
+    return dataclasses.replace(document, model=model, material=material, orbit=None, assigned=())
 
 
-def _of_preset(material: Material, name: str) -> Material:
+def preset_material(material: Material, name: str) -> Material:
+    """Material with the medium of a preset; polished, if it was rough as another preset's surfaces are."""
     found = preset(name)
     medium = found.medium
+    kept = 0.0 if material.source == "preset" else material.roughness
     filled = dataclasses.replace(
         material,
         source="preset",
@@ -194,6 +219,7 @@ def _of_preset(material: Material, name: str) -> Material:
         emission=tuple(np.asarray(medium.emission).tolist()),
         anisotropy=float(medium.anisotropy),
         ior=float(medium.ior),
+        roughness=found.roughness or kept,
     )
     return _stated(filled)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from translucent.errors import InputError
+from translucent.errors import InputError, TranslucentError
 from translucent.gltf.load import SUFFIXES
 from translucent.gltf.write import write_medium
 from translucent.planning.caustics import Caustics
 from translucent.preview.actions import Change
+from translucent.preview.browser import with_recent
 from translucent.preview.desk import Desk
 from translucent.preview.dialogs import QUESTIONS, answer
 from translucent.preview.document import Model
@@ -33,6 +34,7 @@ def take_answers(desk: Desk) -> None:
 def use_file(desk: Desk, kind: str, path: str) -> None:
     """Read or write a file, according to its dialog."""
     work = desk.work
+    desk.folders = with_recent(desk.folders, path)
     match kind:
         case "open":
             work.open(Model(path, desk.get("model.unit")))
@@ -42,6 +44,7 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
             work.save_session(path)
         case "environment" | "background":
             work.do(Change(f"look.{kind}", path))
+            desk.environments.take(path)
         case "save glb":
             _save_medium(desk, path)
         case "map":
@@ -52,6 +55,19 @@ def use_file(desk: Desk, kind: str, path: str) -> None:
         case _:
             found = f"{kind!r} is nothing to read or write"
             work.refuse(InputError(f"file {path!r}", found, f"use {', '.join(QUESTIONS)}"))
+
+
+def save_preset(desk: Desk, words: str) -> bool:
+    """Save the material as an own preset; returns whether it is."""
+    try:
+        path, left_out = desk.work.library.save(words, desk.material)
+    except TranslucentError as error:
+        desk.work.refuse(error)
+        return False
+    desk.work.tell("info", f"saved {path}")
+    if left_out:
+        desk.work.tell("warning", f"no preset keeps: {', '.join(left_out)}")
+    return True
 
 
 def _export(desk: Desk, kind: str, path: str) -> None:
@@ -108,8 +124,15 @@ def _save_medium(desk: Desk, path: str) -> None:
     if Path(source).suffix.lower() not in SUFFIXES:
         do = "copy the medium as glTF, or export the model as .glb first"
         return desk.work.refuse(InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do))
-    medium = medium_of(material)
-    outside = desk.work.allow_outside
-    return desk.work.write(
-        path, lambda to: write_medium(source, to, medium, distance=material.distance, allow_outside=outside)
-    )
+    outside, document = desk.work.allow_outside, desk.work.document
+    named = [(desk.objects[one.object].mesh.name, one.material) for one in document.assigned]
+    whole = [] if named and material.source == "file" else [(None, material)]
+
+    def write(to: str) -> None:
+        begun = source
+        for name, one in (*whole, *named):
+            medium = medium_of(one)
+            write_medium(begun, to, medium, distance=one.distance, object_name=name, allow_outside=outside)
+            begun = to
+
+    return desk.work.write(path, write)

@@ -24,6 +24,9 @@ TITLE = "translucent"
 #: sRGB color behind panels.
 BACKGROUND = (0.135, 0.14, 0.15, 1.0)
 
+#: sRGB color of menus, lists and tooltips, through which nothing is seen.
+POPUP = (0.10, 0.105, 0.115, 1.0)
+
 #: Parts of the width of a window of this many pixels that panels take on its right and left. In wider ones they keep
 #: their widths, and the viewport gets the rest.
 NARROW, RIGHT, LEFT = 1280, 0.27, 0.25
@@ -168,6 +171,7 @@ class _Window:
         params.callbacks.before_exit = self._guarded(self._closed)
         params.callbacks.show_menus = self._guarded(self._menus)
         params.callbacks.show_status = self._guarded(self._status)
+        params.callbacks.show_gui = self._guarded(self._popups)
         params.callbacks.pre_new_frame = self._guarded(self._step)
         params.docking_params = self._docking(min(1.0, NARROW * scale / size[0]))
         return params
@@ -193,6 +197,8 @@ class _Window:
         """Docking layout: panels on both sides, with a share of the width that they have in a narrow window."""
         from imgui_bundle import hello_imgui, imgui
 
+        from translucent.preview.panels.environments import environments_panel
+        from translucent.preview.panels.library import library_panel
         from translucent.preview.panels.look import files_panel, look_panel
         from translucent.preview.panels.material import material_panel
         from translucent.preview.panels.messages import messages_panel
@@ -209,8 +215,10 @@ class _Window:
         panels: list[tuple[str, str, Callable[[Any], None]]] = [
             ("Viewport", "MainDockSpace", viewport_panel),
             ("Material", "Left", material_panel),
+            ("Library", "Left", library_panel),
             ("Method", "Right", method_panel),
             ("Look", "Right", look_panel),
+            ("Environments", "Right", environments_panel),
             ("Files", "Right", files_panel),
             ("Messages", "Below", messages_panel),
         ]
@@ -243,6 +251,8 @@ class _Window:
         style = imgui.get_style()
         for part in (imgui.Col_.window_bg, imgui.Col_.docking_empty_bg, imgui.Col_.child_bg):
             style.set_color_(part, imgui.ImVec4(0.0, 0.0, 0.0, 0.0))
+        style.set_color_(imgui.Col_.popup_bg, imgui.ImVec4(*POPUP))
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard  # Escape closes menus and lists
 
     def _opened(self) -> None:
         from imgui_bundle import implot
@@ -250,7 +260,7 @@ class _Window:
         from translucent.gpu.context import open_context
         from translucent.preview.desk import Desk
         from translucent.preview.dialogs import accept_drops
-        from translucent.preview.preferences import read_recent
+        from translucent.preview.preferences import read_environments, read_folders, read_recent
         from translucent.preview.stage import Stage
 
         implot.create_context()
@@ -258,6 +268,8 @@ class _Window:
         self._drops = accept_drops(self._dropped)
         if self.script is None:
             self.work.recent = read_recent()
+            self.desk.folders = read_folders()
+            self.desk.environments.take(read_environments())
 
     def _dropped(self, path: str) -> None:
         if Path(path).suffix.lower() == ".toml":
@@ -268,8 +280,11 @@ class _Window:
     def _closed(self) -> None:
         from imgui_bundle import implot
 
-        from translucent.preview.preferences import write_recent, write_stage
+        from translucent.preview.preferences import write_environments, write_folders, write_recent, write_stage
 
+        if self.script is None and self.desk is not None:
+            write_folders(self.desk.folders)
+            write_environments(self.desk.environments.path)
         if self.script is None:
             write_recent(self.work.recent)
             write_stage(self.work.document.look.stage)
@@ -298,6 +313,15 @@ class _Window:
 
         if self.desk is not None:
             menus(self.desk)
+
+    def _popups(self) -> None:
+        from translucent.preview.panels.browser import file_browser
+        from translucent.preview.panels.keys import handle_keys, keys_page
+
+        if self.desk is not None:
+            handle_keys(self.desk)
+            file_browser(self.desk)
+            keys_page(self.desk)
 
     def _status(self) -> None:
         from translucent.preview.menus import status

@@ -18,7 +18,7 @@ from translucent.preview.document import Orbit
 from translucent.preview.numbers import length_text
 from translucent.preview.orbiting import camera_of
 from translucent.preview.tasks import Report, Task
-from translucent.preview.worker import in_a_process
+from translucent.preview.worker import Pool, Urgency
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object, Scene
 from translucent.scene.surface import Surface
@@ -60,13 +60,13 @@ class Bake:
         return self._seen[1]
 
 
-def bake_map(task: Task, body: Object, medium: Medium, mode: str, size: int, rays: int) -> Bake:
+def bake_map(task: Task, pool: Pool, body: Object, medium: Medium, mode: str, size: int, rays: int) -> Bake:
     """Bake a map of a body."""
     options: dict[str, Any] = {"mode": mode, "size": size, "rays": rays}
     if mode == "transmittance":
         options["medium"] = medium
     # xatlas holds the interpreter's lock while it makes texture coordinates.
-    baked = in_a_process(task, _bake, body.mesh, options)
+    baked = pool.call(task, _bake, body.mesh, options, urgency=Urgency.LATER)
     _ = baked.mesh.diagnosis, drawn_normals(baked.mesh)  # which the picture needs
     return Bake(baked, mode, painted(dataclasses.replace(body, mesh=baked.mesh), baked))
 

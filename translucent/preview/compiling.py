@@ -13,16 +13,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from translucent.assets import newest_shader
 from translucent.errors import RenderError, TranslucentError
 from translucent.formulas.tone import TONES
 from translucent.geometry.mesh import Mesh
-from translucent.geometry.normals import corner_normals, has_drawn_normals, keep_drawn_normals
+from translucent.geometry.normals import has_drawn_normals, keep_drawn_normals
 from translucent.geometry.solids import Box
 from translucent.gpu.ledger import Ledger, ProgramName
 from translucent.gpu.photon_light import PhotonLight
@@ -32,7 +31,8 @@ from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.scattering.diffusion import LEAST_RESOLUTION, Diffusion
 from translucent.preview.tasks import CancelledError, Lane, Report, Task, problem
-from translucent.preview.worker import Companion
+from translucent.preview.tracing import smoothed
+from translucent.preview.worker import Pool, Urgency
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.scene import Object, Scene
@@ -55,6 +55,8 @@ SHADOWS = 16
 #: Number of nested boxes that stand in for a mesh: rays then cross as many layers as methods can tell apart.
 BOXES = 4
 
+Result = TypeVar("Result")
+
 
 @dataclass(frozen=True)
 class Compiled:
@@ -75,6 +77,10 @@ class Compiled:
 class Compiler:
     """Compiler of shaders and smoother of meshes in a worker process.
 
+    Parameters
+    ----------
+    pool : Pool
+
     Attributes
     ----------
     ledger : Ledger
@@ -85,8 +91,8 @@ class Compiler:
         What the context draws with, as in `GpuContext.renderer`: another one's code would be of no use to it.
     """
 
-    def __init__(self) -> None:
-        self._companion = Companion()
+    def __init__(self, pool: Pool) -> None:
+        self._pool = pool
         self.ledger = Ledger()
         self.lane = Lane("compile")
         self.device = ""
@@ -97,7 +103,7 @@ class Compiler:
         self.ledger.elsewhere |= self.ledger.needed
 
         def work(task: Task) -> Compiled:
-            self._companion.call(task, show_frames, stand_in(scene), plans[0], self.device)
+            self._call(task, show_frames, stand_in(scene), plans[0], self.device)
             return self._make(task, scene, plans)
 
         self.lane.start("", _guarded(work), then)
@@ -118,9 +124,8 @@ class Compiler:
 
     def _make(self, task: Task, scene: Scene, plans: Sequence[RenderPlan]) -> Compiled:
         for mesh in unsmoothed(scene, plans):
-            task.report(None, "normals")
-            keep_drawn_normals(mesh, self._companion.call(task, smoothed, mesh.vertices, mesh.faces))
-        return self._companion.call(task, compile_frames, stand_in(scene), tuple(map(_quick, plans)), self.device)
+            keep_drawn_normals(mesh, self._call(task, smoothed, mesh))
+        return self._call(task, compile_frames, stand_in(scene), tuple(map(_quick, plans)), self.device)
 
     def take(self, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build what is ready, and what was `missing`: if it is not ready, the window tells why."""
@@ -131,9 +136,8 @@ class Compiler:
         if missing is not None:
             self.ledger.elsewhere.add(missing)
 
-    def close(self, patience: float) -> None:
-        """End the worker process."""
-        self._companion.close(patience)
+    def _call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
+        return self._pool.call(task, work, *arguments, urgency=Urgency.PICTURE)
 
 
 def _guarded(work: Callable[[Task], Compiled]) -> Callable[[Task], Compiled]:
@@ -161,13 +165,6 @@ def unsmoothed(scene: Scene, plans: Sequence[RenderPlan]) -> list[Mesh]:
     }
     meshes = (scene.objects[i].mesh for i in sorted(drawn))
     return [mesh for mesh in meshes if len(mesh.faces) > SMOOTHED_AT_ONCE and not has_drawn_normals(mesh)]
-
-
-def smoothed(
-    report: Report, vertices: npt.NDArray[np.float64], faces: npt.NDArray[np.int32]
-) -> npt.NDArray[np.float32]:
-    """`corner_normals` of a mesh."""
-    return corner_normals(Mesh(vertices, faces)).astype(np.float32)
 
 
 def compile_frames(report: Report, scene: Scene, plans: Sequence[RenderPlan], device: str) -> Compiled:

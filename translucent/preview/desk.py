@@ -5,24 +5,36 @@ row.
 from __future__ import annotations
 
 import math
+import os
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from imgui_bundle import hello_imgui, imgui
 
-from translucent.preview.actions import Change
-from translucent.preview.dialogs import open_dialog
-from translucent.preview.document import RANGES
-from translucent.preview.measuring import Crossing, Measured
-from translucent.preview.scenes import method_of
+from translucent.errors import TranslucentError
+from translucent.preview.actions import Assign, Change, ChoosePreset, changed_material, preset_material
+from translucent.preview.browser import Browser
+from translucent.preview.dialogs import browser_for, open_dialog
+from translucent.preview.document import RANGES, Material
+from translucent.preview.environments import EnvironmentFolder
+from translucent.preview.measuring import Crossing, Measured, first_object
+from translucent.preview.picturing import model_key, model_picture
+from translucent.preview.scenes import material_of, method_of
 from translucent.preview.stage import Stage
+from translucent.preview.tips import TIPS
 from translucent.preview.workspace import Workspace
-from translucent.scene.scene import Scene
+from translucent.scene.scene import Object, Scene
+from translucent.scene.showcase import fillable
 
 #: Seconds without movement after which a view counts as still.
 STILL = 0.25
+
+#: Largest number of triangles among which a thread finds the one under the mouse; else a worker process does.
+PICKED_AT_ONCE = 200_000
 
 #: sRGB colors of warnings, errors and secondary lines.
 WARNING, ERROR, FAINT = (1.0, 0.75, 0.35, 1.0), (1.0, 0.45, 0.35, 1.0), (0.62, 0.64, 0.68, 1.0)
@@ -46,6 +58,7 @@ class Desk:
     stage: Stage
     drag: int = 0
     more: bool = True
+    drawn: bool = False
     pressed_at: tuple[float, float] = (0.0, 0.0)
     dragging_split: bool = False
     texts: dict[str, str] = field(default_factory=dict)
@@ -57,25 +70,119 @@ class Desk:
     dialogs: list[tuple[str, Any]] = field(default_factory=list)
     export: dict[str, Any] = field(default_factory=lambda: {"transparent": False, "pictures": 36})
     baking: dict[str, Any] = field(default_factory=lambda: {"mode": "cone", "size": 512, "rays": 64})
+    dragged: str = ""
+    browser: Browser | None = None
+    folders: list[str] = field(default_factory=list)
+    environments: EnvironmentFolder = field(default_factory=EnvironmentFolder)
+    keys_shown: bool = False
+    kept_of: str = ""
+    _textures: dict[str, Any] = field(default_factory=dict)
     _inset: tuple[Any, Any] | None = None
     _measured_for: object = None
     _asked: bool = False
     _still_since: float = 0.0
 
     def change(self, name: str, value: Any, *, step: bool = False) -> None:
-        """Give a field of the document a value; all changes while the mouse is down are one undo step."""
-        self.work.do(Change(name, value, None if step else self.drag))
+        """Give a field a value; all changes while the mouse is down are one undo step.
+
+        Fields of the material are those of the selected object.
+        """
+        section, _, key = name.partition(".")
+        drag = None if step else self.drag
+        if section != "material" or self.target is None:
+            return self.work.do(Change(name, value, drag))
+        return self._assign(self.target, lambda material: changed_material(material, key, value), drag)
 
     def get(self, name: str) -> Any:
-        """Value of a field of the document."""
+        """Value of a field of the document; of the material, that of the selected object."""
         section, _, key = name.partition(".")
-        return getattr(getattr(self.work.document, section), key)
+        return getattr(self.material if section == "material" else getattr(self.work.document, section), key)
+
+    @property
+    def target(self) -> int | None:
+        """Number of the selected object, if there are others beside it; None: panels are about the whole model."""
+        objects = self.objects
+        return self.selected if self.selected is not None and 1 < len(objects) > self.selected else None
+
+    @property
+    def objects(self) -> Sequence[Object]:
+        """Objects of the model."""
+        return () if self.work.loaded is None else self.work.loaded.scene.objects
+
+    @property
+    def target_text(self) -> str:
+        """What a material is assigned to."""
+        return "fills the model" if self.target is None else f"assigns to {self.objects[self.target].mesh.name}"
+
+    @property
+    def material(self) -> Material:
+        """Material of the selected object, or of the model."""
+        return self.material_of(self.target)
+
+    def material_of(self, number: int | None) -> Material:
+        """Material of an object: its own one, or that of the model."""
+        document, loaded = self.work.document, self.work.loaded
+        if number is None or loaded is None:
+            return document.material
+        if (own := document.own_material(number)) is not None:
+            return own
+        filled = any(one is loaded.scene.objects[number] for one in fillable(loaded.scene))
+        own_of_file = document.material.source == "file" or not filled
+        return material_of(loaded.scene, number) if own_of_file else document.material
+
+    def choose_preset(self, name: str, number: int | None = None) -> None:
+        """Fill an object with a preset: this one, the selected one, or the model."""
+        number = self.target if number is None else number
+        if number is None:
+            return self.work.do(ChoosePreset(name))
+        return self._assign(number, lambda material: preset_material(material, name))
+
+    def drop_preset(self, name: str, position: tuple[float, float]) -> None:
+        """Fill the object at a position of the viewport with a preset, as soon as it is known."""
+
+        def give(number: int | None) -> None:
+            if number is None:
+                self.work.tell("warning", f"{name} is not assigned: nothing is there; drop it on an object")
+            else:
+                self.choose_preset(name, number if len(self.objects) > 1 else None)
+
+        self.pick(position, give)
+
+    def pick(self, position: tuple[float, float], then: Callable[[int | None], None]) -> None:
+        """Find the first object at a position, in shares of the viewport, in the background; None: there is none."""
+        scene, size = self.work.scene(), self.stage.viewport.size
+        if scene is None:
+            return
+
+        def take(found: int | None) -> None:
+            then(found if found is not None and found < len(self.objects) else None)
+
+        x, y = (min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
+        if self.work.loaded is not None and self.work.loaded.triangles <= PICKED_AT_ONCE:
+            self.work.lanes["ray"].start("", lambda _: first_object(scene, size, (x, y)), take)
+        else:
+            self.work.cross(scene, size, (x, y), lambda found: take(found.body))
+
+    def select(self, number: int | None) -> None:
+        """Select an object, or none."""
+        self.selected = number
+
+    def _assign(self, number: int, change: Callable[[Material], Material], drag: int | None = None) -> None:
+        try:
+            material = change(self.material_of(number))
+        except TranslucentError as error:
+            return self.work.refuse(error)
+        return self.work.do(Assign(number, material, drag))
 
     def draw(self, pixels: tuple[int, int]) -> bool:
         """Draw a step, and start measurements of a still view; returns whether more steps are to come."""
         self.work.size = pixels
         self.work.update()
         more = self.stage.draw(self.work, pixels)
+        self.drawn = not more
+        self.work.shelf.begin_frame(idle=not more)
+        if self.drawn and self.work.scene() is not None and self.work.lanes["load"].task is None:
+            self._keep_picture()
         scene = self.work.scene()
         wanted = (scene, self.work.document.display.method, self.work.document.display.compare)
         if wanted != self._measured_for:
@@ -92,8 +199,7 @@ class Desk:
             return
         document, size = self.work.document, self.stage.viewport.size
         method = method_of(document.display.method, document.material)
-        if document.display.inset:
-            self.work.measure(scene, method, size, self._take)
+        self.work.measure(scene, method, size, self._take)
         if document.display.compare in ("reference", "error"):
             levels = (1,) if document.display.compare == "error" else None
             self.work.draw_truth(scene, method, size, levels)
@@ -112,13 +218,52 @@ class Desk:
         self.change("look.light_yaw", math.remainder(self.get("look.light_yaw") + right, 360.0))
         self.change("look.light_pitch", min(max(self.get("look.light_pitch") + up, -89.0), 89.0))
 
-    def ask_file(self, kind: str) -> None:
-        """Ask for a file to read or to write, in a dialog of the system."""
-        dialog = open_dialog(kind)
+    def ask_file(self, kind: str, *, system: bool = True) -> None:
+        """Ask for a file to read or to write: in a dialog of the system, or where it has none in the browser."""
+        dialog = open_dialog(kind) if system else None
         if dialog is not None:
             self.dialogs.append((kind, dialog))
         else:
-            self.work.tell("error", "no file dialog here: drop files on the window, or name them when starting")
+            folder = self.environments.path if kind in ("environment", "background") else ""
+            places = [place for place in (folder, *self.folders, *self.places()) if os.path.isdir(place)]
+            self.browser = browser_for(kind, Path(places[0]))
+
+    def places(self) -> list[str]:
+        """Folders to begin with: recent ones, that of the model, the working folder and the user's own."""
+        model = self.get("model.path")
+        own = str(Path(model).resolve().parent) if os.path.isfile(model) else ""
+        return [one for one in dict.fromkeys((*self.folders, own, os.getcwd(), str(Path.home()))) if os.path.isdir(one)]
+
+    def light_with(self, name: str) -> None:
+        """Light the model with an environment."""
+        self.change("look.environment", name, step=True)
+
+    def escape(self) -> None:
+        """Close what is on top: the file browser, the page of keys, or let go of the selected object."""
+        if self.browser is not None:
+            self.browser = None
+        elif self.keys_shown:
+            self.keys_shown = False
+        else:
+            self.select(None)
+
+    def _keep_picture(self) -> None:
+        """Keep a small picture of a model's first resting view, for the list of recent files."""
+        path = self.get("model.path")
+        if self.kept_of == path or not os.path.isfile(path) or not self.work.document.display.pictured:
+            return
+        self.kept_of = path
+        with self.stage.current():
+            seen = self.stage.viewport.pixels()
+        self.work.shelf.put(model_key(path), model_picture(seen))
+
+    def texture(self, key: str, pixels: Any) -> Any:
+        """Texture of a small picture."""
+        if key not in self._textures:
+            height, width = pixels.shape[:2]
+            content = np.ascontiguousarray(pixels[..., :3]).tobytes()
+            self._textures[key] = self.stage.renderer.gpu.context.gl.texture((width, height), 3, content, alignment=1)
+        return self._textures[key]
 
     def inset_texture(self, pixels: Any) -> Any:
         """Texture of the reference's small picture."""
@@ -151,8 +296,7 @@ def row(label: str, tip: str = "") -> None:
     imgui.table_next_column()
     imgui.align_text_to_frame_padding()
     imgui.text(label)
-    if tip and imgui.is_item_hovered():
-        imgui.set_tooltip(tip)
+    tooltip(tip)
     imgui.table_next_column()
     imgui.set_next_item_width(-1.0)
 
@@ -161,9 +305,11 @@ def slider(
     desk: Desk, label: str, name: str, low: float, high: float, form: str = "%.3f", *, log: bool = False, tip: str = ""
 ) -> None:
     """Slider for a number of the document."""
-    row(label, tip)
+    row(label, tip or TIPS.get(name, ""))
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if log else 0)
     changed, value = imgui.slider_float(f"##{name}", float(desk.get(name)), low, high, form, flags)
+    if not imgui.is_item_active():
+        tooltip(tip or TIPS.get(name, ""))
     if imgui.is_item_activated():
         desk.drag += 1
     if changed and math.isfinite(value):
@@ -172,7 +318,7 @@ def slider(
 
 def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", *, tip: str = "") -> None:
     """Fields for three numbers of the document, at least 0, on a line of their own; not in a table."""
-    wide_row(label, tip)
+    wide_row(label, tip or TIPS.get(name, ""))
     value = list(desk.get(name))
     changed, values = imgui.drag_float3(f"##{name}", value, speed, 0.0, min(RANGES[name].high, 1e9), form)
     if imgui.is_item_activated():
@@ -183,7 +329,7 @@ def triple(desk: Desk, label: str, name: str, speed: float, form: str = "%.5g", 
 
 def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: str = "") -> None:
     """Choice of one of some words."""
-    row(label, tip)
+    row(label, tip or TIPS.get(name, ""))
     now = desk.get(name)
     if imgui.begin_combo(f"##{name}", str(now)):
         for word in words:
@@ -192,17 +338,25 @@ def choice(desk: Desk, label: str, name: str, words: tuple[str, ...], *, tip: st
         imgui.end_combo()
 
 
+def tooltip(text: str) -> None:
+    """Draw a wrapped tooltip while the mouse is over the last item."""
+    if text and imgui.is_item_hovered() and imgui.begin_tooltip():
+        imgui.push_text_wrap_pos(em(30.0))
+        imgui.text(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+
+
 def wide_row(label: str, tip: str = "") -> None:
     """Label of a field on the whole line below it, outside a table."""
     imgui.text(label)
-    if tip and imgui.is_item_hovered():
-        imgui.set_tooltip(tip)
+    tooltip(tip)
     imgui.set_next_item_width(-1.0)
 
 
 def check(desk: Desk, label: str, name: str, *, tip: str = "") -> None:
     """Checkbox."""
-    row(label, tip)
+    row(label, tip or TIPS.get(name, ""))
     changed, value = imgui.checkbox(f"##{name}", bool(desk.get(name)))
     if changed:
         desk.change(name, value, step=True)

@@ -6,11 +6,14 @@ import ctypes
 import shutil
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import imgui_bundle
 from imgui_bundle import hello_imgui, portable_file_dialogs
+
+from translucent.preview.browser import Browser
 
 MODELS = ["Models", "*.glb *.gltf *.obj *.stl *.ply *.off", "All files", "*"]
 SESSIONS = ["Sessions", "*.toml", "All files", "*"]
@@ -41,6 +44,12 @@ def open_dialog(kind: str) -> Any | None:
     return portable_file_dialogs.save_file(title, proposed, kinds)
 
 
+def browser_for(kind: str, folder: Path) -> Browser:
+    """Browser of our own for a kind of dialog."""
+    title, proposed, kinds = QUESTIONS[kind]
+    return Browser(kind, title, tuple(kinds[1].split()), proposed is not None, folder, proposed or "")
+
+
 def answer(dialog: Any) -> str | None:
     """Path of the file that the user has chosen; empty if none, None while the dialog is open."""
     if not dialog.ready(0):
@@ -56,11 +65,7 @@ def accept_drops(take: Callable[[str], None]) -> object:
     """Call `take` for each file that is dropped on the window; the returned object has to be kept alive. None: not
     possible.
     """
-    folder = Path(imgui_bundle.__file__).parent
-    # The very file that the window uses: another copy of the library would know no windows.
-    names = ("libglfw.so.3", "libglfw.3.dylib", "glfw3.dll")
-    libraries = [folder / name for name in names if (folder / name).exists()]
-    if not libraries:
+    if (library := _glfw()) is None:
         return None
 
     def dropped(_: int, count: int, paths: Any) -> None:
@@ -68,7 +73,24 @@ def accept_drops(take: Callable[[str], None]) -> object:
             take(paths[i].decode("utf-8", "surrogateescape"))
 
     callback = _Callback(dropped)
-    library = ctypes.CDLL(str(libraries[0]))
-    window: int = getattr(hello_imgui, "get_glfw_window_address")()  # noqa: B009 - its stubs do not know it
-    library.glfwSetDropCallback(ctypes.c_void_p(window), callback)
+    library.glfwSetDropCallback(_window(), callback)
     return callback
+
+
+def move_pointer(x: float, y: float) -> None:
+    """Move the system's pointer to a place of the window, where that is possible: a window in front follows it."""
+    if (library := _glfw()) is not None:
+        library.glfwSetCursorPos(_window(), ctypes.c_double(x), ctypes.c_double(y))
+
+
+@cache
+def _glfw() -> ctypes.CDLL | None:
+    """The very library that the window uses, as another copy would know no windows; None if it is not there."""
+    folder = Path(imgui_bundle.__file__).parent
+    names = ("libglfw.so.3", "libglfw.3.dylib", "glfw3.dll")
+    libraries = [folder / name for name in names if (folder / name).exists()]
+    return ctypes.CDLL(str(libraries[0])) if libraries else None
+
+
+def _window() -> ctypes.c_void_p:
+    return ctypes.c_void_p(getattr(hello_imgui, "get_glfw_window_address")())  # noqa: B009 - its stubs do not know it

@@ -89,6 +89,21 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Assigned:
+    """Material of one object alone.
+
+    Attributes
+    ----------
+    object : int
+        Its number in the model.
+    material : Material
+    """
+
+    object: int
+    material: Material
+
+
+@dataclass(frozen=True)
 class Look:
     """Look: stage, lights, background, exposure and tone curve.
 
@@ -136,7 +151,7 @@ class Display:
     split : float
         Position of the split, 0 to 1 from the left.
     inset : bool
-        Measure against the reference while the view is still, and show that reference in a corner.
+        Show the reference in a corner while the view is still.
     antialias : bool
         Refine the edges while the view is still.
     converge : bool
@@ -153,7 +168,7 @@ class Display:
     mode: Mode = "picture"
     compare: Compare = "off"
     split: float = 0.5
-    inset: bool = True
+    inset: bool = False
     antialias: bool = True
     converge: bool = False
     caustics: bool = False
@@ -203,13 +218,21 @@ class Orbit:
 
 @dataclass(frozen=True)
 class Document:
-    """Document: everything that a session holds. No orbit: the model is to be framed."""
+    """Document: everything that a session holds. No orbit: the model is to be framed.
+
+    Bodies have the material, except those that are assigned one of their own.
+    """
 
     model: Model = field(default_factory=Model)
     material: Material = field(default_factory=Material)
     look: Look = field(default_factory=Look)
     display: Display = field(default_factory=Display)
     orbit: Orbit | None = None
+    assigned: tuple[Assigned, ...] = ()
+
+    def own_material(self, number: int | None) -> Material | None:
+        """Material that is assigned to an object, if any."""
+        return next((one.material for one in self.assigned if one.object == number), None)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from translucent.preview.actions import CAMERA_ACTIONS, Action, Adopt, Change, apply
+from translucent.preview.actions import CAMERA_ACTIONS, Action, Adopt, Assign, Change, apply
 from translucent.preview.document import Document
 
 #: Largest number of steps that can be undone.
@@ -22,7 +22,7 @@ class History:
     past, future : tuple of Document
         The last of `past` is what undo shows, the last of `future` what redo shows.
     drag : tuple of (str, int), optional
-        Field and number of the drag that made the present one.
+        Field, or object, and number of the drag that made the present one.
     """
 
     present: Document = dataclasses.field(default_factory=Document)
@@ -37,7 +37,9 @@ class History:
             return dataclasses.replace(self, present=after)
         if after == self.present:
             return self
-        drag = (action.field, action.drag) if isinstance(action, Change) and action.drag is not None else None
+        drag = None
+        if isinstance(action, (Change, Assign)) and action.drag is not None:
+            drag = action.field if isinstance(action, Change) else f"object {action.object}", action.drag
         if drag is not None and drag == self.drag:
             return dataclasses.replace(self, present=after, future=())
         return History(after, (*self.past, self.present)[-MAX_STEPS:], (), drag)

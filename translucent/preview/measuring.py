@@ -197,6 +197,17 @@ def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
     )
 
 
+def first_object(scene: Scene, size: Size, pixel: Size) -> int | None:
+    """Number of the first object on the ray through a pixel's center; None if there is none."""
+    camera = pixel_camera(scene.camera, size, pixel)
+    nearest, found = math.inf, None
+    for i, item in enumerate(scene.objects):
+        hits = camera_hits(item.mesh, item.matrix, camera, (1, 1))
+        if len(hits.distance) and hits.distance[0] < nearest:
+            nearest, found = float(hits.distance[0]), i
+    return found
+
+
 def pixel_camera(camera: Camera, size: Size, pixel: Size) -> Camera:
     """Camera with one pixel, whose ray is that of a pixel of another camera."""
     half_width, half_height = camera.half_extent(size)

@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from imgui_bundle import hello_imgui, imgui
+from imgui_bundle import ImVec2, hello_imgui, imgui
 
 from translucent.assets import mesh_names
-from translucent.preview.desk import Desk
+from translucent.errors import shortened
+from translucent.preview.desk import Desk, em, tooltip
 from translucent.preview.document import Model
+from translucent.preview.picturing import model_key
 from translucent.units import METRES_PER_UNIT
-
-HELP = (
-    ("drag", "orbit"),
-    ("right drag, Shift drag", "pan"),
-    ("wheel", "zoom to the cursor"),
-    ("F", "frame the model, or what was clicked"),
-    ("O", "orthographic or perspective"),
-    ("C", "converge: path trace the still picture"),
-    ("P", "photons: caustics in the still picture"),
-    ("L drag", "move the light"),
-    ("E drag", "turn the environment, or the stage with its lamps"),
-    ("Ctrl Z, Ctrl Y", "undo, redo"),
-    ("Ctrl O", "open"),
-)
 
 
 def menus(desk: Desk) -> None:
@@ -43,8 +31,8 @@ def menus(desk: Desk) -> None:
             desk.stage.reload(desk.work)
         imgui.end_menu()
     if imgui.begin_menu("Help"):
-        for keys, what in HELP:
-            imgui.text(f"{keys}: {what}")
+        if imgui.menu_item("Mouse and keys", "?", False, True)[0]:
+            desk.keys_shown = True
         imgui.end_menu()
 
 
@@ -54,8 +42,7 @@ def _file(desk: Desk) -> None:
         desk.ask_file("open")
     if imgui.begin_menu("Recent", bool(desk.work.recent)):
         for path in desk.work.recent:
-            if imgui.menu_item(path, "", False, True)[0]:
-                desk.work.open(Model(path, unit))
+            _recent(desk, path, unit)
         imgui.end_menu()
     if imgui.begin_menu("The toolkit's own"):
         for name in mesh_names():
@@ -77,12 +64,28 @@ def _file(desk: Desk) -> None:
         hello_imgui.get_runner_params().app_shall_exit = True
 
 
+def _recent(desk: Desk, path: str, unit: str) -> None:
+    """Draw a recent file, with the picture that it had."""
+    size = ImVec2(em(4.5), em(3.0))
+    picture = desk.work.shelf.picture(model_key(path))
+    if picture is not None:
+        imgui.image(imgui.ImTextureRef(desk.texture(model_key(path), picture).glo), size)
+    else:
+        imgui.dummy(size)
+    imgui.same_line()
+    if imgui.menu_item(f"{Path(path).name}\n{shortened(str(Path(path).parent), 60)}##{path}", "", False, True)[0]:
+        desk.work.open(Model(path, unit))
+    tooltip(path)
+
+
 def status(desk: Desk) -> None:
     """Status line: the model, how it is drawn, and work under way."""
     loaded, stage = desk.work.loaded, desk.stage
     if loaded is not None:
         name = Path(loaded.model.path).name
         imgui.text(f"{name}: {loaded.triangles} triangles, {stage.renderer.provenance['renderer']}")
+        imgui.same_line()
+        imgui.text(f"|  {stage.state}")
     task = next((one for one in desk.work.busy if one.name), None)
     if task is None:
         return

@@ -1,22 +1,16 @@
-"""What one window leaves to the next: recently opened files, and the stage."""
+"""What one window leaves to the next: recently opened files and used folders, and the stage."""
 
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
+from translucent.files.user_folders import config_folder
 from translucent.preview.document import AUTO, STAGE_WORDS
 
 
 def _file(name: str) -> Path:
-    if sys.platform == "win32":
-        base = Path(os.environ.get("APPDATA", Path.home()))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Application Support"
-    else:
-        base = Path(os.environ.get("XDG_CONFIG_HOME", Path.home() / ".config"))
-    return base / "translucent" / name
+    return config_folder() / name
 
 
 def _read(name: str) -> list[str]:
@@ -42,6 +36,26 @@ def read_recent() -> list[str]:
 def write_recent(paths: list[str]) -> None:
     """Write the list, if possible."""
     _write("recent.txt", paths)
+
+
+def read_folders() -> list[str]:
+    """Read the folders in which files were used last; those that are gone are left out."""
+    return [line for line in _read("folders.txt") if os.path.isdir(line)]
+
+
+def write_folders(folders: list[str]) -> None:
+    """Write the list, if possible."""
+    _write("folders.txt", folders)
+
+
+def read_environments() -> str:
+    """Read the folder of environments; empty if there is none."""
+    return next((line for line in _read("environments.txt") if os.path.isdir(line)), "")
+
+
+def write_environments(folder: str) -> None:
+    """Write it, if possible."""
+    _write("environments.txt", [folder])
 
 
 def read_stage() -> str:

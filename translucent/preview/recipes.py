@@ -13,7 +13,7 @@ from translucent.assets import mesh_names
 from translucent.media.medium import Medium
 from translucent.media.presets import preset
 from translucent.planning.caustics import Caustics
-from translucent.preview.document import AUTO, Document
+from translucent.preview.document import AUTO, Document, Material
 from translucent.preview.loaded import Loaded
 from translucent.preview.orbiting import camera_of
 from translucent.preview.scenes import medium_of, method_of, scattering_of, towards_light
@@ -57,6 +57,11 @@ class Shot:
         """Whether the material is the one that ``translucent render`` gives the model by itself."""
         return self.document.material == own_material(self.document.look, self.loaded)
 
+    def object_name(self, number: int) -> str | None:
+        """Name by which a command finds an object; None if others have it, too, or it has none."""
+        names = [item.mesh.name for item in self.loaded.scene.objects]
+        return names[number] if number < len(names) and names[number] and names.count(names[number]) == 1 else None
+
     @property
     def output(self) -> str:
         """Name of the file."""
@@ -97,8 +102,19 @@ def command_line(shot: Shot) -> tuple[str, list[str]]:
 def _medium_options(shot: Shot) -> tuple[list[str], list[str]]:
     """Options for the medium and the finish of the bodies, and what they leave out."""
     material = shot.document.material
-    if shot.kept:
-        return [], []
+    words, left_out = ([], []) if shot.kept else _options_of(material)
+    for one in shot.document.assigned:
+        name = shot.object_name(one.object)
+        told, lost = _options_of(one.material)
+        if name is None:
+            left_out.append(f"the material of object {one.object}")
+        else:
+            words += ["--object", name, *told]
+            left_out += [f"{what} of {name}" for what in lost]
+    return words, left_out
+
+
+def _options_of(material: Material) -> tuple[list[str], list[str]]:
     wanted = medium_of(material)
     if material.source == "preset":
         found, words = preset(material.preset).medium, ["--preset", material.preset]
@@ -143,16 +159,27 @@ def python_code(shot: Shot) -> str:
 
 
 def _material_lines(shot: Shot) -> list[str]:
-    material, medium = shot.document.material, medium_of(shot.document.material)
-    if material.source == "file" and not shot.loaded.bare:
+    lines = _filling_lines(shot, shot.document.material, None)
+    for one in shot.document.assigned:
+        if one.object < len(shot.loaded.scene.objects):
+            lines += _filling_lines(shot, one.material, one.object)
+    return lines
+
+
+def _filling_lines(shot: Shot, material: Material, number: int | None) -> list[str]:
+    """Lines that fill all bodies, or one object."""
+    medium = medium_of(material)
+    if material.source == "file" and not shot.loaded.bare and number is None:
         return []
     triples = (
         f"{name}=({_numbers(np.asarray(getattr(medium, name)), ', ')})"
         for name in ("absorption", "scattering", "emission")
     )
     told = f"{', '.join(triples)}, anisotropy={medium.anisotropy:.12g}, ior={medium.ior:.12g}"
-    lines = [f"scene = filled(scene, tl.Medium({told}))"]
-    if material.source == "file":
+    among = "" if number is None else f", [scene.objects[{number}]]"
+    chosen = "item.medium is not None" if number is None else f"item is scene.objects[{number}]"
+    lines = [f"scene = filled(scene, tl.Medium({told}){among})"]
+    if material.source == "file" and number is None:
         return lines
     finish = ", ".join(f"{name}={getattr(material, name):.12g}" for name in ("roughness", "transmission", "dispersion"))
     return [
@@ -160,7 +187,7 @@ def _material_lines(shot: Shot) -> list[str]:
         f"finish = dict({finish}, opacity=None)",
         "scene = dataclasses.replace(scene, objects=[",
         "    dataclasses.replace(item, surface=dataclasses.replace(item.surface or tl.Surface(), **finish))",
-        "    if item.medium is not None else item",
+        f"    if {chosen} else item",
         "    for item in scene.objects",
         "])",
     ]

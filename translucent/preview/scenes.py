@@ -6,17 +6,15 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.geometry.normals import drawn_normals
 from translucent.media.color_distance import color_at
 from translucent.media.medium import Medium
 from translucent.planning.methods import Method, method_from_name
 from translucent.planning.scattering import SCATTERINGS, Scattering
-from translucent.preview.document import AUTO, Document, Look, Material, Model
+from translucent.preview.document import AUTO, Assigned, Document, Look, Material
 from translucent.preview.loaded import Loaded
 from translucent.preview.orbiting import camera_of
 from translucent.preview.staging import environment_of, stage_name, standing
@@ -28,36 +26,10 @@ from translucent.scene.stages import NO_STAGE
 from translucent.scene.surface import Surface
 
 
-def load(model: Model, allow_outside: bool = False) -> Loaded:
-    """Load a model, and compute everything that would delay its first picture.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
-    from translucent.assets import mesh_names, mesh_path
-    from translucent.gltf.load import SUFFIXES, load_scene
-    from translucent.mesh_files import load_mesh
-    from translucent.scene.showcase import showcase
-
-    if Path(model.path).suffix.lower() in SUFFIXES:
-        scene: Scene = load_scene(model.path, model.unit, allow_outside=allow_outside)
-    elif model.path in mesh_names() and not Path(model.path).exists():
-        scene = showcase(load_mesh(mesh_path(model.path)), stage="none")
-    else:
-        scene = showcase(load_mesh(model.path, unit=model.unit, allow_outside=allow_outside), stage="none")
-    for item in scene.objects:
-        _ = item.mesh.diagnosis, item.bounds  # slow for large meshes, and kept
-        if item.has_interface or item.surface is not None:
-            drawn_normals(item.mesh)
-    return Loaded(model, scene, material_of(scene))
-
-
-def material_of(scene: Scene) -> Material:
-    """Material of the first body; for an opaque model, the one that it would be filled with."""
+def material_of(scene: Scene, number: int | None = None) -> Material:
+    """Material of an object, by default of the first body; if it is opaque, the one that it would be filled with."""
     diagonal = scene.diagonal or 1.0
-    body = fillable(scene)[0]
+    body = fillable(scene)[0] if number is None else scene.objects[number]
     if body.medium is None or body.covers:
         return Material(color=DEFAULT_COLOR, distance=DEFAULT_REACH * diagonal, thickness=0.1 * diagonal)
     medium, surface = body.medium or Medium(), body.surface or Surface()
@@ -102,7 +74,7 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         raise InputError("a picture", "nobody has framed the model", "frame it first")
     scene, look = loaded.scene, document.look
     light = _light(look.light_yaw, look.light_pitch, look.light_irradiance) if look.light else None
-    objects, camera = _objects(document.material, scene), camera_of(document.orbit)
+    objects, camera = _objects(document.material, document.assigned, scene), camera_of(document.orbit)
     if (name := stage_name(look, loaded)) != NO_STAGE and document.display.pictured:
         on = standing(loaded, name, look.environment, look.background, look.rotation)
         ground = tuple(item for item in on.objects if item.shadow_catcher)
@@ -119,8 +91,18 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
 
 
 @lru_cache(maxsize=2)
-def _objects(material: Material, scene: Scene) -> tuple[Object, ...]:
-    """Objects of the scene with the material in its bodies; cached, so that turning the camera makes none anew."""
+def _objects(material: Material, assigned: tuple[Assigned, ...], scene: Scene) -> tuple[Object, ...]:
+    """Objects of the scene with their materials; cached, so that turning the camera makes none anew."""
+    objects = list(_objects_alike(material, scene))
+    for one in assigned:
+        if one.object < len(objects):
+            objects[one.object] = _filled(objects[one.object], one.material, medium_of(one.material))
+    return tuple(objects)
+
+
+@lru_cache(maxsize=2)
+def _objects_alike(material: Material, scene: Scene) -> tuple[Object, ...]:
+    """Objects of the scene with one material in all bodies."""
     if material.source == "file" and scene.bodies:
         return tuple(scene.objects) if hasattr(scene, "has_camera") else tuple(_bent(scene.objects, material.ior))
     medium, chosen = medium_of(material), set(map(id, fillable(scene)))

@@ -2,10 +2,13 @@
 
 Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, value), ``open`` (model, unit), ``preset``
 (name), ``turn`` (right, up: degrees), ``pan`` (right, down: heights of the picture), ``zoom`` (factor, right, down),
-``undo``, ``redo``, ``frame``. Of the window: ``probe`` (x, y: shares of the viewport), ``select`` (panel), ``wait``
-(seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file),
-``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``, ``release`` (button), ``wheel``
-(steps).
+``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: shares of the viewport),
+``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own browser, and
+``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of objects: ``pick`` (x,
+y: shares of the viewport), ``object`` (number; -1: none). Of the window: ``probe`` (x, y: shares of the viewport),
+``select`` (panel), ``wait`` (seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size,
+rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``,
+``release`` (button), ``wheel`` (steps).
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from translucent.errors import InputError
-from translucent.preview.actions import Change, ChoosePreset, Pan, Turn, Zoom
+from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.document import Model
 from translucent.preview.session import read_toml
 
@@ -28,8 +31,14 @@ if TYPE_CHECKING:
 #: Seconds after which a script continues, whatever work is under way.
 PATIENCE = 120.0
 
+#: Seconds between frames of a script that waits for other processes, which need the time more.
+PAUSE = 0.03
+
 #: Frames between two actions, so that changes are drawn before the next one.
 FRAMES = 2
+
+#: Names of panels.
+PANELS = ("Material", "Library", "Method", "Look", "Environments", "Files", "Messages")
 
 _WORDS: dict[str, dict[str, Any]] = {
     "change": {"field": str, "value": object},
@@ -38,6 +47,16 @@ _WORDS: dict[str, dict[str, Any]] = {
     "turn": {"right": 0.0, "up": 0.0},
     "pan": {"right": 0.0, "down": 0.0},
     "zoom": {"factor": 1.0, "right": 0.0, "down": 0.0},
+    "library": {"search": ""},
+    "pick": {"x": 0.5, "y": 0.5},
+    "object": {"number": -1},
+    "drop": {"preset": str, "x": 0.5, "y": 0.5},
+    "save_preset": {"name": str},
+    "ask": {"kind": str},
+    "answer": {"file": str},
+    "environments": {"folder": str},
+    "key": {"name": str},
+    "type": {"text": str},
     "undo": {},
     "redo": {},
     "frame": {},
@@ -110,9 +129,11 @@ class Script:
     def _rested(self, desk: Desk) -> bool:
         assert self._waiting is not None
         passed = time.monotonic() - self._waiting
+        if desk.drawn:
+            time.sleep(PAUSE)
         if self._until >= 0:
             return passed >= self._until
-        return passed > 0.5 and (not desk.more or passed > PATIENCE)
+        return passed > 0.5 and (not (desk.more or desk.work.shelf.busy) or passed > PATIENCE)
 
 
 def read_script(path: str | Path) -> Script:
@@ -159,9 +180,19 @@ def perform(desk: Desk, step: Step) -> None:
     """Do one action."""
     work, v = desk.work, step.values
     verbs: dict[str, Callable[[], object]] = {
-        "change": lambda: work.do(Change(v["field"], v["value"])),
+        "change": lambda: desk.change(v["field"], v["value"], step=True),
         "open": lambda: work.open(Model(v["model"], v["unit"])),
-        "preset": lambda: work.do(ChoosePreset(v["name"])),
+        "preset": lambda: desk.choose_preset(v["name"]),
+        "library": lambda: setattr(work.library, "search", v["search"]),
+        "pick": lambda: desk.pick((v["x"], v["y"]), desk.select),
+        "object": lambda: desk.select(None if v["number"] < 0 else v["number"]),
+        "drop": lambda: desk.drop_preset(v["preset"], (v["x"], v["y"])),
+        "save_preset": lambda: _save_preset(desk, v["name"]),
+        "ask": lambda: _ask(desk, v["kind"]),
+        "answer": lambda: _answer(desk, v["file"]),
+        "environments": lambda: desk.environments.take(v["folder"]),
+        "key": lambda: _press(v["name"]),
+        "type": lambda: _io().add_input_characters_utf8(v["text"]),
         "turn": lambda: work.do(Turn(v["right"], v["up"])),
         "pan": lambda: work.do(Pan(v["right"], v["down"])),
         "zoom": lambda: work.do(Zoom(v["factor"], v["right"], v["down"])),
@@ -188,11 +219,52 @@ def _use_file(desk: Desk, kind: str, path: str) -> None:
     use_file(desk, kind, path)
 
 
+def _ask(desk: Desk, kind: str) -> None:
+    from translucent.preview.dialogs import QUESTIONS
+
+    if kind not in QUESTIONS:
+        raise InputError(f"ask {kind!r}", "there is no such question", f"use one of {', '.join(QUESTIONS)}")
+    desk.ask_file(kind, system=False)
+
+
+def _answer(desk: Desk, path: str) -> None:
+    from translucent.preview.panels.browser import answer
+
+    if desk.browser is None:
+        raise InputError(f"answer {path!r}", "nothing is asked", "ask first")
+    desk.browser.text = path
+    answer(desk)
+
+
+def _press(name: str) -> None:
+    """Press and release a key, with modifiers before a plus sign, such as ``ctrl+z``."""
+    from imgui_bundle import imgui
+
+    words = name.lower().split("+")
+    modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift, "alt": imgui.Key.mod_alt}
+    keys = [modifiers.get(word) or getattr(imgui.Key, word, None) for word in words]
+    if None in keys:
+        raise InputError(f"key {name!r}", "there is none of that name", "write for example escape, f1 or ctrl+z")
+    for down in (True, False):  # one after the other, in as many frames
+        for key in keys:
+            _io().add_key_event(key, down)
+
+
+def _save_preset(desk: Desk, name: str) -> None:
+    from translucent.preview.answers import save_preset
+
+    save_preset(desk, name)
+
+
 def hold_pointer(desk: Desk) -> None:
     """Keep the mouse where the script has put it, whatever the system reports."""
     if desk.pointer is not None:
+        from translucent.preview.dialogs import move_pointer
+
         size = _io().display_size
-        _io().add_mouse_pos_event(desk.pointer[0] * size.x, desk.pointer[1] * size.y)
+        place = desk.pointer[0] * size.x, desk.pointer[1] * size.y
+        move_pointer(*place)
+        _io().add_mouse_pos_event(*place)
 
 
 def _io() -> Any:
@@ -206,5 +278,7 @@ def _select(panel: str) -> None:
 
     window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(panel)
     if window is None:
-        raise InputError(f"panel {panel!r}", "there is none", "use Material, Method, Look, Files or Messages")
+        raise InputError(
+            f"panel {panel!r}", "there is none", "use Material, Library, Method, Look, Environments, Files or Messages"
+        )
     window.focus_window_at_next_frame = True

@@ -10,7 +10,7 @@ from translucent.errors import InputError
 from translucent.extras import require_package
 from translucent.files.paths import write_atomically
 from translucent.files.reading import read_text, toml_value
-from translucent.preview.document import Document, Orbit, checked
+from translucent.preview.document import Assigned, Document, Material, Orbit, checked
 
 #: Version of the format, raised by changes that older readers cannot read.
 VERSION = 1
@@ -28,9 +28,15 @@ def to_table(document: Document) -> dict[str, Any]:
     for section in _SECTIONS:
         value = getattr(document, section)
         if value is not None:
-            fields = dataclasses.asdict(value)
-            table[section] = {key: list(v) if isinstance(v, tuple) else v for key, v in fields.items()}
+            table[section] = _listed(value)
+    if document.assigned:
+        table["assigned"] = [{"object": one.object, "material": _listed(one.material)} for one in document.assigned]
     return table
+
+
+def _listed(value: Any) -> dict[str, Any]:
+    fields = dataclasses.asdict(value)
+    return {key: list(v) if isinstance(v, tuple) else v for key, v in fields.items()}
 
 
 def from_table(table: dict[str, Any], where: str) -> Document:
@@ -44,14 +50,27 @@ def from_table(table: dict[str, Any], where: str) -> Document:
     if table.get("version") != VERSION:
         raise InputError(where, f"version {table.get('version')!r}", f"use a session of version {VERSION}")
     sections: dict[str, Any] = {}
+    if not isinstance(table.get("assigned", []), list):
+        raise InputError(where, "assigned is no list", "write [[assigned]]")
     for section, fields in table.items():
         if section == "version":
+            continue
+        if section == "assigned":
+            sections[section] = tuple(_assigned(entry, where) for entry in fields)
             continue
         if section not in _SECTIONS or not isinstance(fields, dict):
             raise InputError(where, f"an unknown [{section}]", f"use {', '.join(_SECTIONS)}")
         default = Orbit() if section == "orbit" else getattr(Document(), section)
         sections[section] = dataclasses.replace(default, **_fields(section, default, fields, where))
     return Document(**sections)
+
+
+def _assigned(entry: Any, where: str) -> Assigned:
+    number = entry.get("object") if isinstance(entry, dict) else None
+    fields = entry.get("material") if isinstance(entry, dict) else None
+    if type(number) is not int or number < 0 or not isinstance(fields, dict) or len(entry) != 2:
+        raise InputError(f"{where}, [[assigned]]", "no object and material", "give object = 0, and [assigned.material]")
+    return Assigned(number, dataclasses.replace(Material(), **_fields("material", Material(), fields, where)))
 
 
 def _fields(section: str, default: Any, fields: dict[str, Any], where: str) -> dict[str, Any]:

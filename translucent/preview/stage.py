@@ -14,21 +14,18 @@ from translucent.gpu.context import open_context
 from translucent.gpu.ledger import PostponedError, ProgramName
 from translucent.gpu.strides import STRIDES
 from translucent.gpu.viewport import Probe, Viewport
-from translucent.planning.interfaces import ScreenInterfaces
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
-from translucent.planning.scattering import Scattering
-from translucent.planning.shadow_maps import ShadowMaps
 from translucent.preview.compiling import FRAME, Compiled, Compiler, unsmoothed
 from translucent.preview.converging import Converging
-from translucent.preview.diffusing import Diffusing
 from translucent.preview.photons import Photons
 from translucent.preview.presenting import Presenting
-from translucent.preview.scenes import method_of, scattering_of
+from translucent.preview.scenes import method_of
 from translucent.preview.staging import tone_of
 from translucent.preview.tasks import Lane, Task
 from translucent.preview.timing import Pace, Timing
+from translucent.preview.ways import SCREEN, Ways
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
 from translucent.scene.scene import Scene
@@ -42,9 +39,6 @@ FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
 #: Largest such factor for traced interfaces: beyond it, those of the screen show more of what moves.
 COARSEST_TRACED = 3.0
-
-#: Shadows of a picture that moves: those of a few directions of the environment.
-QUICK_SHADOWS = ShadowMaps(directions=8)
 
 #: Seconds between checks of the shader files.
 WATCH = 0.5
@@ -69,10 +63,14 @@ class Stage:
         Why the picture is not what it should be, or nothing.
     shader_problem : str
         The compiler's message, while the last good shaders go on.
+    ways : Ways
+        In which light that is scattered and interfaces are shown.
     converging : Converging
         Paths of the still picture.
     photons : Photons
         That light it, unless it is made of paths.
+    state : str
+        Which picture is on show: one that moves, one that becomes sharp, or the full one.
     simpler : str
         What is drawn more simply while the picture moves, and why, or nothing.
     drawing : float
@@ -93,7 +91,7 @@ class Stage:
             compiler.device = self.renderer.gpu.context.renderer
         self.plans: list[RenderPlan | None] = [None, None]
         self.timings = [Timing(), Timing()]
-        self.problem = self.shader_problem = self.simpler = ""
+        self.problem = self.shader_problem = self.simpler = self.state = ""
         self.drawing, self._begun = 0.0, False
         self._moving: RenderPlan | None = None
         self._shown: tuple[object, ...] = ()
@@ -102,8 +100,8 @@ class Stage:
         self._presenting = Presenting()
         self._pace = Pace()
         self._strides = [4, 4]
-        self._scattering: Scattering | None = None
-        self._diffusing, self.converging, self.photons = Diffusing(), Converging(), Photons()
+        self.ways = Ways(traced_at_once=compiler is None)
+        self.converging, self.photons = Converging(), Photons()
         self._watched, self._newest = time.monotonic(), newest_shader()
 
     def current(self) -> AbstractContextManager[Any]:
@@ -146,8 +144,10 @@ class Stage:
             return False
         material, both = workspace.document.material, display.compare == "method"
         methods = [method_of(display.method, material), method_of(display.method_b, material)]
-        scattering = self._scattering = self._known_scattering(workspace, scene, methods[0])
-        wanted = (scene, methods[0], methods[1] if both else None, scattering, self.viewport.size, self.renderer)
+        self.ways.choose(workspace, scene, methods[0], self.renderer)
+        scattering, interfaces = self.ways.scattering, self.ways.interfaces
+        second = methods[1] if both else None
+        wanted = (scene, methods[0], second, scattering, interfaces, self.viewport.size, self.renderer)
         if self._compiler is not None and self._compiler.lane.task is not None and wanted == self._postponed:
             return True
         if (not display.converges or wanted != self._shown) and self.converging.stop():
@@ -160,8 +160,8 @@ class Stage:
             self.watch(workspace)
         else:
             self.plans = [
-                self.renderer.plan(scene, methods[0], scattering=scattering),
-                self.renderer.plan(scene, methods[1], scattering=scattering) if both else None,
+                self.renderer.plan(scene, methods[0], interfaces=interfaces, scattering=scattering),
+                self.renderer.plan(scene, methods[1], interfaces=interfaces, scattering=scattering) if both else None,
             ]
             self._shown = wanted
             self.viewport.restart()
@@ -176,8 +176,10 @@ class Stage:
         # One side at a time, the one that is behind: two would take twice as long.
         sides = sorted((0, 1), key=self.viewport.steps) if both else [0]
         lit = display.follows_photons and self.viewport.steps(0) >= self._strides[0] ** 2
+        still = (display.converges or display.follows_photons) and self.ways.traceable(workspace, scene)
+        lit = lit and still
         more = drawn = not lit and any(self._step(side, scene, display.antialias) for side in sides)
-        if display.converges and not drawn:
+        if display.converges and still and not drawn:
             more, drawn = self.converging.step(scene, self.renderer, self.viewport, BUDGET)
         if lit:
             more, drawn = self._light_by_photons(scene, methods[0], display.antialias, workspace.lanes["diffuse"])
@@ -188,12 +190,14 @@ class Stage:
 
     def _draw_at_once(self, scene: Scene, method: Method | None, workspace: Workspace) -> bool:
         """Draw the picture alone, while things move."""
-        look, scattering, interfaces = workspace.document.look, self._scattering, None
-        shadows = QUICK_SHADOWS if scene.environment_shadows else None
+        look, scattering, interfaces = workspace.document.look, self.ways.scattering, self.ways.interfaces
+        shadows = self.ways.quick_shadows(scene)
         if shadows is not None:
-            self._moving = self.renderer.plan(scene, method, scattering=scattering, shadows=shadows)
+            self._moving = self.renderer.plan(
+                scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
+            )
         if self._traces_slowly(self.plans[0]) or self._traces_slowly(self._moving):
-            interfaces = ScreenInterfaces()
+            interfaces = SCREEN
             self._moving = self.renderer.plan(
                 scene, method, interfaces=interfaces, scattering=scattering, shadows=shadows
             )
@@ -215,24 +219,13 @@ class Stage:
                 self._shown = ()  # the same again: what has been made is for pictures of this size
             raise
         self._finish(0, plan, factor, begun)
-        if interfaces is not None:
+        self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
+        if interfaces is not self.ways.interfaces:
             self.simpler = "interfaces in screen space while the picture moves, since tracing them takes long"
         elif shadows is not None:
             self.simpler = f"shadows from {shadows.directions} directions of the environment while the picture moves"
         self._presenting.shown = ()
         return True
-
-    def _known_scattering(self, workspace: Workspace, scene: Scene, method: Method | None) -> Scattering | None:
-        """Scattering to draw with: that asked for, or layers until the light that diffuses in the scene is known."""
-        asked = scattering_of(workspace.document.display.scattering)
-        back = self.renderer.plan(scene, method, scattering=asked).given_back
-        cache, lane = self.renderer.gpu.diffusion, workspace.lanes["diffuse"]
-        return self._diffusing.scattering(scene, asked, back, cache, lane)
-
-    @property
-    def diffusing(self) -> str:
-        """Remark on how diffused light is shown while it is not known; empty if it is known."""
-        return self._diffusing.told
 
     def _traces_slowly(self, plan: RenderPlan | None) -> bool:
         """Whether tracing interfaces is known to take too long for a picture that moves."""
@@ -244,7 +237,9 @@ class Stage:
         """Draw the next sample of a side, if there is one left to draw."""
         stride, plan = self._strides[side], self.plans[side]
         samples = self._samples(stride, antialias)
-        if plan is None or self.viewport.steps(side) >= stride * stride * (1 + samples):
+        drawn, whole = self.viewport.steps(side), stride * stride
+        self.state = "sharpening" if drawn + 1 < whole else f"full picture, {max(drawn // whole, 1)} samples"
+        if plan is None or drawn >= whole * (1 + samples):
             return False
         self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, scene, plan, stride, max(samples, 1))
@@ -258,7 +253,8 @@ class Stage:
         """Follow photons, or draw a step of the picture with their light; whether more is to come, and it changed."""
         photons = self.photons
         expected = 0.0 if self.plans[0] is None else self._pace.known(self.plans[0])
-        if not photons.ready(scene, self.renderer, self.viewport, method, self._scattering, lane, BUDGET, expected):
+        scattering = self.ways.scattering
+        if not photons.ready(scene, self.renderer, self.viewport, method, scattering, lane, BUDGET, expected):
             if (plan := photons.show_media(self.viewport)) is not None:
                 self.plans[0], self._strides[0] = plan, self._pace.factor(plan, STRIDES, BUDGET)
             return False, False
@@ -361,7 +357,7 @@ class Stage:
         scene = workspace.scene()
         with self.current():
             fresh = Renderer(context=self._gl)
-            anew, viewport = partial(fresh.plan, scattering=self._scattering), None
+            anew, viewport = partial(fresh.plan, scattering=self.ways.scattering), None
             try:
                 viewport = Viewport(fresh.gpu)
                 viewport.resize(FRAME)

@@ -7,7 +7,8 @@ import math
 from functools import lru_cache
 from pathlib import Path
 
-from translucent.preview.document import AUTO, Document, Look, Material
+from translucent.preview import orbiting
+from translucent.preview.document import AUTO, Document, Look, Material, Orbit
 from translucent.preview.loaded import Loaded
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
@@ -83,6 +84,17 @@ def turn_from(document: Document, loaded: Loaded, camera: Camera) -> float:
     from_, to = (view_axes(one)[2] for one in (camera, shown_from(loaded, stage_name(document.look, loaded))))
     turn = math.degrees(math.atan2(to[0], to[2]) - math.atan2(from_[0], from_[2]))
     return math.remainder(turn + document.look.rotation, 360.0)
+
+
+def first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
+    """First orbit of a model: that of the file's own camera, or from where `render` sees it, close as F frames it."""
+    scene = loaded.scene
+    if getattr(scene, "has_camera", False):
+        return orbiting.orbit_of(scene.camera, scene.bounds.mean(axis=0))
+    if stage == NO_STAGE:
+        return orbiting.framed(None, scene.objects, size)
+    seen = orbiting.orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
+    return orbiting.framed(seen, scene.objects, size)
 
 
 def prepare_stage(name: str, environment: str, background: str) -> None:

@@ -1,19 +1,23 @@
-"""Work in worker processes, as libraries that hold the interpreter lock for seconds would freeze the window."""
+"""One pool of worker processes, as libraries that hold the interpreter lock for seconds would freeze the window.
+
+Processes start when there is work for them, and end when others are idle, too. Work that somebody waits for goes first.
+Large values are in files that all processes map: see `preview.sharing`.
+"""
 
 from __future__ import annotations
 
-import io
 import itertools
 import multiprocessing
 import os
-import pickle
 import signal
 import sys
 import threading
 import time
 import warnings
+from bisect import insort
 from collections.abc import Callable
 from contextlib import suppress
+from enum import IntEnum
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
@@ -22,6 +26,7 @@ from weakref import WeakKeyDictionary
 from translucent.errors import RenderError, TranslucentWarning
 from translucent.geometry.mesh import Mesh
 from translucent.media.density import DensityGrid
+from translucent.preview.sharing import Channel, Parcel
 from translucent.preview.tasks import CancelledError, Task
 from translucent.scene.environment_map import EnvironmentMap
 from translucent.scene.texture import Texture
@@ -29,11 +34,14 @@ from translucent.scene.texture import Texture
 #: Seconds between checks whether the result is still wanted.
 PATIENCE = 0.1
 
-#: Niceness of worker processes, so that the window comes first.
-NICENESS = 10
+#: Niceness of processes whose work the picture waits for, and of the others, so that the window comes first.
+URGENT_NICENESS, NICENESS = 4, 10
 
 #: Seconds that canceled work has to end, before its process is ended.
 PARTING = 5.0
+
+#: Largest number of processes, the last of which is for `Urgency.PICTURE`; and of those that stay without work.
+MOST, MOST_IDLE = 5, 2
 
 #: Types of large immutable values: sent once, and cached for as long as they live here.
 KEPT = (Mesh, EnvironmentMap, Texture, DensityGrid)
@@ -41,24 +49,29 @@ KEPT = (Mesh, EnvironmentMap, Texture, DensityGrid)
 Result = TypeVar("Result")
 
 
-def in_a_process(task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
-    """Result of `Companion.call` in a worker process of its own."""
-    companion = Companion()
-    try:
-        return companion.call(task, work, *arguments)
-    finally:
-        companion.close()
+class Urgency(IntEnum):
+    """Urgency of work: what the picture waits for, what the user waits for, and what is for later."""
+
+    PICTURE = 0
+    ANSWER = 1
+    LATER = 2
 
 
-class Companion:
-    """Worker process that runs tasks one after the other; it starts with the first, and again if it had to end."""
+class Pool:
+    """Pool of worker processes for the work of several threads."""
 
     def __init__(self) -> None:
-        self._running: _Running | None = None
-        self._turn = threading.Lock()
+        self._changed = threading.Condition()
+        self._idle: list[_Worker] = []
+        self._busy: list[_Worker] = []
+        self._waiting: list[tuple[Urgency, int]] = []
+        self._numbers = itertools.count(1)
+        self._kept = _Kept()
         self._closed = False
 
-    def call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
+    def call(
+        self, task: Task, work: Callable[..., Result], *arguments: Any, urgency: Urgency = Urgency.ANSWER
+    ) -> Result:
         """Run `work(report, *arguments)` and return its result, which calls ``report(share, detail)``; its warnings are
         given here.
 
@@ -71,6 +84,7 @@ class Companion:
             A function of a module: the process finds it by its name.
         *arguments
             What pickle can send.
+        urgency : Urgency
 
         Raises
         ------
@@ -81,93 +95,184 @@ class Companion:
         Exception
             What `work` raises.
         """
-        while not self._turn.acquire(timeout=PATIENCE):
-            task.report(task.share, task.detail)
+        worker = self._taken(task, work, urgency)
         try:
-            return self._call(task, work, *arguments)
-        finally:
-            self._turn.release()
-
-    def _call(self, task: Task, work: Callable[..., Result], *arguments: Any) -> Result:
-        running = self._running
-        if running is None and not self._closed:
-            running = self._running = _Running()
-        if running is None or self._closed:
-            self._end()
-            raise CancelledError
-        try:
-            running.ask(work, arguments)
-            failed, content = running.answer(task)
+            worker.ask(work, arguments)
+            failed, content = worker.answer(task)
         except (EOFError, ConnectionError):
-            status = running.status()
-            self._end()
+            status = worker.status()
+            self._end(worker)
+            if self._closed:
+                raise CancelledError from None
             raise RenderError(
                 task.name,
                 f"its process ended with status {status}, as when the memory is full",
                 "close other programs, or ask for less",
             ) from None
         except CancelledError:
-            if not running.stop():
-                self._end()
+            self._give_back(worker) if worker.stop() else self._end(worker)
             raise
         except BaseException:
-            self._end()
+            self._end(worker)
             raise
+        self._give_back(worker)
         if failed:
             raise content
         return content  # type: ignore[no-any-return]
 
     def close(self, patience: float = PARTING) -> None:
-        """End the worker process for good, whatever it is doing; it has `patience` seconds to clean up."""
-        self._closed = True
-        self._end(patience)
+        """End all processes for good, whatever they are doing; they have `patience` seconds to clean up."""
+        with self._changed:
+            self._closed = True
+            idle, self._idle = self._idle, []
+            running = [*idle, *self._busy]
+        for worker in running:
+            worker.terminate()
+        end = time.monotonic() + patience
+        for worker in running:
+            worker.close(max(end - time.monotonic(), 0.0))
 
-    def _end(self, patience: float = PARTING) -> None:
-        running, self._running = self._running, None
-        if running is not None:
-            running.close(patience)
+    def _taken(self, task: Task, work: Callable[..., Any], urgency: Urgency) -> _Worker:
+        """Worker for some work: one that has done such before, or is idle, or a new one."""
+        ticket = urgency, next(self._numbers)
+        with self._changed:
+            insort(self._waiting, ticket)
+            try:
+                most = MOST - (urgency > Urgency.PICTURE)
+                while not self._closed and (self._waiting[0] != ticket or len(self._busy) >= most):
+                    self._changed.wait(PATIENCE)
+                    task.report(task.share, task.detail)
+                if self._closed:
+                    raise CancelledError
+            finally:
+                self._waiting.remove(ticket)
+                self._changed.notify_all()
+            nice = URGENT_NICENESS if urgency == Urgency.PICTURE else NICENESS
+            self._idle = [worker for worker in self._idle if worker.alive]
+            able = [worker for worker in self._idle if worker.nice == nice]  # no process can become less nice
+            known = [worker for worker in able if work.__module__ in worker.modules]
+            worker = (known or able)[-1] if able else _Worker(self._kept, nice)
+            if able:
+                self._idle.remove(worker)
+            self._busy.append(worker)
+            return worker
+
+    def _give_back(self, worker: _Worker) -> None:
+        with self._changed:
+            self._busy.remove(worker)
+            self._idle.append(worker)
+            surplus = [self._idle.pop(0) for _ in range(len(self._idle) - MOST_IDLE)]
+            with suppress(ConnectionError):  # whoever has died is told by its next work
+                for idle in self._idle:
+                    idle.forget()
+            self._changed.notify_all()
+        for worker in surplus:
+            worker.close(PARTING)
+
+    def _end(self, worker: _Worker) -> None:
+        worker.close(PARTING)
+        with self._changed:
+            self._busy.remove(worker)
+            self._changed.notify_all()
 
 
-class _Running:
-    """Running worker process, with the record of values sent to it."""
+class _Kept:
+    """Tokens of large values, and what they were packed into, for as long as they live here."""
 
     def __init__(self) -> None:
+        self._numbers = itertools.count(1)
+        self._packed: WeakKeyDictionary[object, tuple[int, Parcel]] = WeakKeyDictionary()
+        self._lock = threading.RLock()
+
+    def packed(self, value: object) -> tuple[int, Parcel]:
+        """Token and parcel of a value; from then on its arrays, too, are those of the file."""
+        with self._lock:
+            if (found := self._packed.get(value)) is None:
+                found = self.take(value, Parcel.of(value))
+                if found[1].file is not None:
+                    vars(value).update(vars(found[1].open()))
+            return found
+
+    def take(self, value: object, parcel: Parcel) -> tuple[int, Parcel]:
+        """Token of a value that came in a parcel."""
+        with self._lock:
+            found = self._packed[value] = next(self._numbers), parcel
+            return found
+
+    @property
+    def tokens(self) -> set[int]:
+        """Tokens of all values that are still alive."""
+        with self._lock:
+            return {token for token, _ in self._packed.values()}
+
+
+class _Worker:
+    """Running worker process, with the record of values sent to it.
+
+    Attributes
+    ----------
+    nice : int
+    modules : set of str
+        That it has done work of, and has made ready what that needs.
+    """
+
+    def __init__(self, kept: _Kept, nice: int) -> None:
         # Spawned, not forked: OpenGL and threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_run, args=(theirs, NICENESS), daemon=True)
+        pipe, theirs = context.Pipe()
+        self._process: BaseProcess = context.Process(target=_run, args=(theirs, nice), daemon=True)
         self._process.start()
         theirs.close()
-        self._numbers = itertools.count(1)
-        self._tokens: WeakKeyDictionary[object, int] = WeakKeyDictionary()
-        self._sent: set[int] = set()
-        self._at = 0
+        assert self._process.pid is not None
+        self._channel = Channel(pipe, self._process.pid)
+        self._kept, self._sent = kept, set[int]()
+        self._known: dict[int, object] = {}
+        self._number = 0
+        self.modules: set[str] = set()
+        self.nice = nice
 
     def ask(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         """Send work, preceded by the values that it needs and that were not sent before."""
-        stream = io.BytesIO()
-        pickler = _Pickler(stream, self._token)
-        pickler.dump((work, arguments))
-        gone = self._sent - set(self._tokens.values())
-        self._sent -= gone
-        self._pipe.send(("drop", gone))
-        for token, thing in pickler.found.items():
-            if token not in self._sent:
-                self._pipe.send(("keep", (token, thing)))
-                self._sent.add(token)
-        self._at = next(self._numbers)
-        self._pipe.send(("work", (self._at, stream.getvalue())))
+        found: dict[int, Parcel] = {}
+        self._known = {}
+
+        def token(value: object) -> int | None:
+            if not isinstance(value, KEPT):
+                return None
+            number, parcel = self._kept.packed(value)
+            found[number], self._known[number] = parcel, value
+            return number
+
+        asked = Parcel.of((work, arguments), token)
+        self.forget()
+        for number in found.keys() - self._sent:
+            self._channel.send("keep", number, found[number])
+            self._sent.add(number)
+        self._number += 1
+        self._channel.send("work", self._number, asked)
+        self.modules.add(work.__module__)
+
+    def forget(self) -> None:
+        """Have it drop what nobody here holds any more."""
+        for number in self._sent - self._kept.tokens:
+            self._channel.send("drop", number, Parcel(b""))
+            self._sent.discard(number)
 
     def answer(self, task: Task) -> tuple[bool, Any]:
         """Answer of the work: whether it failed, and its result or error."""
         while True:
-            if not self._pipe.poll(PATIENCE):
+            if not self._channel.pipe.poll(PATIENCE):
                 task.report(task.share, task.detail)
                 continue
-            kind, content = self._pipe.recv()
+            kind, number, parcel = self._channel.receive()
+            content = parcel.open(self._known.__getitem__)
             if kind in ("done", "failed"):
+                self._known = {}
                 return kind == "failed", content
-            if kind == "warning":
+            if kind == "made":
+                self._known[number] = content
+                self._kept.take(content, parcel)
+            elif kind == "warning":
                 warnings.warn(content, TranslucentWarning, stacklevel=4)
             else:
                 task.report(*content)
@@ -176,18 +281,27 @@ class _Running:
         """Stop the work at its next report; returns whether it did so in time."""
         end = time.monotonic() + PARTING
         try:
-            self._pipe.send(("stop", self._at))
-            while self._pipe.poll(max(end - time.monotonic(), 0.0)):
-                if self._pipe.recv()[0] in ("done", "failed"):
+            self._channel.send("stop", self._number, Parcel(b""))
+            while self._channel.pipe.poll(max(end - time.monotonic(), 0.0)):
+                if self._channel.receive()[0] in ("done", "failed"):
                     return True
         except (EOFError, ConnectionError):
             pass
         return False
 
+    @property
+    def alive(self) -> bool:
+        """Whether the worker process is there."""
+        return self._process.is_alive()
+
     def status(self) -> int | None:
         """Exit status of the worker process."""
-        self._process.join()
+        self._process.join(PARTING)
         return self._process.exitcode
+
+    def terminate(self) -> None:
+        """Ask the worker process to end."""
+        self._process.terminate()
 
     def close(self, patience: float) -> None:
         """End the worker process; it has some seconds to remove unfinished files."""
@@ -195,75 +309,66 @@ class _Running:
         self._process.join(patience)
         self._process.kill()
         self._process.join()  # only then it lets go of the file that it has half written
-        self._pipe.close()
-
-    def _token(self, thing: object) -> int:
-        return self._tokens.setdefault(thing, next(self._numbers))
-
-
-class _Pickler(pickle.Pickler):
-    """Pickler that writes tokens for cached values; `found` has the values themselves."""
-
-    def __init__(self, stream: io.BytesIO, token: Callable[[object], int]) -> None:
-        super().__init__(stream, protocol=pickle.HIGHEST_PROTOCOL)
-        self._token = token
-        self.found: dict[int, object] = {}
-
-    def persistent_id(self, thing: object) -> int | None:
-        if not isinstance(thing, KEPT):
-            return None
-        token = self._token(thing)
-        self.found[token] = thing
-        return token
-
-
-class _Unpickler(pickle.Unpickler):
-    """Unpickler for the output of `_Pickler`."""
-
-    def __init__(self, stream: io.BytesIO, kept: dict[int, object]) -> None:
-        super().__init__(stream)
-        self._kept = kept
-
-    def persistent_load(self, token: Any) -> object:
-        return self._kept[token]
+        self._channel.pipe.close()
 
 
 def _run(pipe: Connection, niceness: int) -> None:
     """Main loop of the worker process, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window answers Ctrl-C, and ends this process
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # not at once: files are removed that are half written
-    warnings.showwarning = lambda message, *_, **__: pipe.send(("warning", str(message)))
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    channel = Channel(pipe, os.getppid())
+    warnings.showwarning = lambda message, *_, **__: channel.send("warning", 0, Parcel.of(str(message)))
     if hasattr(os, "nice"):
         os.nice(niceness)
     kept: dict[int, object] = {}
     while True:
         try:
-            kind, content = pipe.recv()
+            kind, number, parcel = channel.receive()
         except (EOFError, OSError):
             return
         if kind == "keep":
-            token, kept[token] = content
+            kept[number] = parcel.open()
         elif kind == "drop":
-            for token in content:
-                del kept[token]
+            del kept[number]
         elif kind == "work":
-            _work(pipe, kept, *content)
+            _work(channel, kept, number, parcel)
 
 
-def _work(pipe: Connection, kept: dict[int, object], number: int, content: bytes) -> None:
+def _follow_parent() -> None:
+    """End this process when the window is gone, which work that does not report would not hear of."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(PARTING)
+    os._exit(1)
+
+
+def _work(channel: Channel, kept: dict[int, object], number: int, parcel: Parcel) -> None:
     def report(share: float | None, detail: str = "") -> None:
-        while pipe.poll():
-            if pipe.recv() == ("stop", number):
+        while channel.pipe.poll():
+            if channel.receive()[:2] == ("stop", number):
                 raise CancelledError
-        pipe.send(("report", (share, detail)))
+        channel.send("report", number, Parcel.of((share, detail)))
 
-    answer: tuple[str, object]
+    numbers = {id(value): one for one, value in kept.items()}
+    made = list[object]()
+
+    def token(value: object) -> int | None:
+        if not isinstance(value, KEPT):
+            return None
+        if id(value) not in numbers:
+            made.append(value)
+            numbers[id(value)] = -len(made)
+            channel.send("made", -len(made), Parcel.of(value))
+        return numbers[id(value)]
+
+    kind = "done"
     try:
-        work, arguments = _Unpickler(io.BytesIO(content), kept).load()
-        result = work(report, *arguments)
+        work, arguments = parcel.open(kept.__getitem__)
+        answer = Parcel.of(work(report, *arguments), token)
     except Exception as error:  # noqa: BLE001 - raised where the result is waited for
-        answer = "failed", error
-    else:
-        answer = "done", result
+        kind, answer = "failed", Parcel.of(error)
     with suppress(OSError):  # nobody is there any more
-        pipe.send(answer)
+        channel.send(kind, number, answer)

@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,20 +19,22 @@ from translucent.preview import orbiting
 from translucent.preview.actions import Action, Adopt, Open, Replace, SetOrbit
 from translucent.preview.baking import Bake, bake_map
 from translucent.preview.compiling import Compiler
-from translucent.preview.document import Display, Document, Model, Orbit
+from translucent.preview.document import Display, Document, Model
 from translucent.preview.exports import check_export
 from translucent.preview.history import History
+from translucent.preview.library import Library
 from translucent.preview.lighting import Lighting, prepare
 from translucent.preview.loaded import Loaded
+from translucent.preview.loading import load_with
 from translucent.preview.measuring import Crossing, Measured, Truth, crossing, measure, truth_frame, truth_plan
-from translucent.preview.scenes import load, medium_of, scene_of
+from translucent.preview.scenes import medium_of, scene_of
 from translucent.preview.session import load_session, save_session
-from translucent.preview.staging import own_material, stage_name
+from translucent.preview.shelf import Shelf
+from translucent.preview.staging import first_orbit, own_material, stage_name
 from translucent.preview.tasks import Lane, Task, problem
-from translucent.preview.worker import PARTING, Companion, in_a_process
+from translucent.preview.worker import Pool, Urgency
 from translucent.scene.scene import Scene
-from translucent.scene.showcase import fillable, framing
-from translucent.scene.stages import NO_STAGE, stage_named
+from translucent.scene.showcase import fillable
 
 #: Largest number of messages that the window keeps.
 MAX_MESSAGES = 50
@@ -40,7 +43,10 @@ MAX_MESSAGES = 50
 KEPT_MODELS = 2
 
 #: Seconds for which a closed window waits for work, so that files are complete and no processes are left behind.
-PATIENCE = {"write": 60.0, "bake": 2.5 * PARTING}
+PATIENCE = {"write": 60.0, "bake": 12.0}
+
+#: Kinds of background work, of which each does one thing at a time.
+LANES = ("load", "draw", "diffuse", "trace", "truth", "bake", "ray", "light", "write", "shelf")
 
 #: Largest number of recently opened files.
 MAX_RECENT = 8
@@ -77,6 +83,12 @@ class Workspace:
         The reference of the whole picture, if the split shows it.
     bake : Bake, optional
         The last map.
+    shelf : Shelf
+        Small pictures of media, environments and models.
+    library : Library
+        Presets of the toolkit and of the user.
+    pool : Pool
+        Worker processes.
     compiler : Compiler
         Compiles shaders in the background, for a stage that waits for them.
     """
@@ -93,20 +105,11 @@ class Workspace:
         self.truth: Truth | None = None
         self.bake: Bake | None = None
         self.show_bake = True
-        self.compiler = Compiler()
-        #: Worker processes for work that takes a moment, and for work that takes long.
-        self._measuring, self._reference = Companion(), Companion()
-        self.lanes = {
-            "load": Lane("load"),
-            "draw": Lane("draw"),
-            "diffuse": Lane("diffuse"),
-            "truth": Lane("truth"),
-            "bake": Lane("bake"),
-            "ray": Lane("ray"),
-            "light": Lane("light"),
-            "write": Lane("write"),
-            "compile": self.compiler.lane,
-        }
+        self.pool = Pool()
+        self.compiler = Compiler(self.pool)
+        self.lanes = {name: Lane(name) for name in LANES} | {"compile": self.compiler.lane}
+        self.shelf = Shelf(self.lanes["shelf"], partial(self.pool.call, urgency=Urgency.LATER))
+        self.library = Library(self.refuse)
         self._lighting = Lighting(self.lanes["light"])
         self._models: list[Loaded] = []
         self._refused: Model | None = None
@@ -200,7 +203,7 @@ class Workspace:
             return bake.seen_from(self.document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
-            same = all(getattr(known, name) == getattr(document, name) for name in ("material", "orbit"))
+            same = all(getattr(known, name) == getattr(document, name) for name in ("material", "assigned", "orbit"))
             if same and model is loaded and _lit_alike(known, document):
                 return scene
         scene = scene_of(document, loaded)
@@ -224,7 +227,7 @@ class Workspace:
     def busy(self) -> list[Task]:
         """Tasks under way that the user may want to see or to cancel."""
         tasks = [lane.task for lane in self.lanes.values() if lane.task is not None]
-        return [task for task in tasks if task.name or task is not self.compiler.lane.task]
+        return [task for task in tasks if task.name or task not in (self.compiler.lane.task, self.shelf.lane.task)]
 
     def prepare(self) -> None:
         """Prepare later pictures, now that the first is there."""
@@ -238,7 +241,7 @@ class Workspace:
         """Compare a small picture with the reference, in the background."""
 
         def work(task: Task) -> Measured:
-            found = self._measuring.call(task, measure, scene, method, size)
+            found = self.pool.call(task, measure, scene, method, size)
             return Measured(**vars(found), scene=scene, method=method)
 
         self.lanes["draw"].start("measuring", work, then)
@@ -247,7 +250,7 @@ class Workspace:
         self, scene: Scene, size: tuple[int, int], pixel: tuple[int, int], then: Callable[[Crossing], None]
     ) -> None:
         """Follow the ray of a pixel in the reference, in the background."""
-        self.lanes["ray"].start("", lambda task: self._measuring.call(task, crossing, scene, size, pixel), then)
+        self.lanes["ray"].start("", lambda task: self.pool.call(task, crossing, scene, size, pixel), then)
 
     def draw_truth(
         self, scene: Scene, method: Method | None, size: tuple[int, int], levels: tuple[int, ...] | None
@@ -259,7 +262,7 @@ class Workspace:
             for number, level in enumerate(shares):
                 task.report(number / len(shares), f"at 1/{level}")
                 small = max(size[0] // level, 1), max(size[1] // level, 1)
-                frame = self._reference.call(task, truth_frame, seen, method, small)
+                frame = self.pool.call(task, truth_frame, seen, method, small, urgency=Urgency.LATER)
                 self.truth = Truth(scene, method, frame, level, straight=levels is not None)
 
         self.lanes["truth"].start("float64 reference", work, lambda _: None)
@@ -274,7 +277,10 @@ class Workspace:
         def show(bake: Bake) -> None:
             self.bake, self.show_bake = bake, True
 
-        self.lanes["bake"].start(f"baking {mode}", lambda task: bake_map(task, body, medium, mode, size, rays), show)
+        def work(task: Task) -> Bake:
+            return bake_map(task, self.pool, body, medium, mode, size, rays)
+
+        self.lanes["bake"].start(f"baking {mode}", work, show)
 
     def export(self, path: str, work: Callable[..., None], *arguments: Any) -> None:
         """Have another process draw a file by ``work(report, path, *arguments)``."""
@@ -285,7 +291,7 @@ class Workspace:
 
         def write(task: Task) -> None:
             try:
-                in_a_process(task, work, path, *arguments)
+                self.pool.call(task, work, path, *arguments, urgency=Urgency.LATER)
             except Exception:
                 remove_partial(Path(path))  # of a process that had to be killed
                 raise
@@ -319,8 +325,7 @@ class Workspace:
         for lane in self.lanes.values():
             if lane.task is not None:
                 lane.task.cancel()
-        for companion in (self._measuring, self._reference, self.compiler):
-            companion.close(0.5)  # nobody will see what they are at
+        self.pool.close(0.5)  # nobody will see what it is at
         for name, lane in self.lanes.items():
             lane.close(PATIENCE.get(name, 0.5))
 
@@ -357,7 +362,7 @@ class Workspace:
         def work(task: Task) -> Loaded:
             task.report(None, f"reading {Path(model.path).name}")
             try:
-                return load(model, self.allow_outside)
+                return load_with(task, self.pool, model, self.allow_outside)
             except InputError:
                 self._refused = model
                 raise
@@ -379,19 +384,7 @@ class Workspace:
             self.history = self.history.done(Adopt(own))
         if present.orbit is None:
             stage = stage_name(present.look, self.loaded)
-            self.history = self.history.done(SetOrbit(_first_orbit(self.loaded, self.size, stage)))
-
-
-def _first_orbit(loaded: Loaded, size: tuple[int, int], stage: str) -> Orbit:
-    """First orbit of a model: that of the file's own camera, or a framed view, on a stage with room for shadows."""
-    from translucent.gltf.load import GltfScene
-
-    scene = loaded.scene
-    if stage != NO_STAGE and not getattr(scene, "has_camera", False):
-        return orbiting.orbit_of(framing(scene.objects, size, stage=stage_named(stage)), scene.bounds.mean(axis=0))
-    if isinstance(scene, GltfScene):
-        return orbiting.orbit_of(scene.camera, scene.bounds.mean(axis=0))
-    return orbiting.framed(None, scene.objects, size)
+            self.history = self.history.done(SetOrbit(first_orbit(self.loaded, self.size, stage)))
 
 
 def _lit_alike(first: Document, second: Document) -> bool:

@@ -105,7 +105,8 @@ class PictureGrid:
     def of(cls, camera: Camera, size: tuple[int, int]) -> PictureGrid:
         """The grid of a picture of this size."""
         extent = np.array(camera.half_extent(size)) * (2.0, -2.0)
-        return cls((np.array(size) - 1) / 2, extent / size)
+        aside, above = camera.center(size)
+        return cls((np.array(size) - 1 - np.array(size) * (aside, -above)) / 2, extent / size)
 
     def points(self, row: Integers, column: Integers) -> Array:
         """(k, 2): right and up."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from translucent.arrays import Array, Mask
@@ -57,6 +59,7 @@ class RayEnds:
         points = rays.origins + path[:, None] * rays.directions
         depth = points @ camera.forward if camera.fov_y is not None else np.ones(len(points))
         ahead &= depth > 0
-        heights = 2.0 * camera.half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
+        heights = 2.0 * replace(camera, window=None).half_extent((1, 1))[1] * np.where(ahead, depth, 1.0)
         across = np.stack([points @ camera.right, -(points @ camera.up)], axis=1) / heights[:, None]
-        return across + (0.5 * self.aspect, 0.5), ahead
+        aspect = self.aspect if camera.window is None else camera.window.whole[0] / camera.window.whole[1]
+        return across + (0.5 * aspect, 0.5), ahead

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,7 +49,8 @@ def pixel_rays(camera: Camera, size: tuple[int, int], offset: tuple[float, float
     """
     at_origin = camera.pose.copy()
     at_origin[:3, 3] = 0.0
-    origins, directions = Camera(at_origin, camera.fov_y, camera.height).rays(size, offset)
+    origins, directions = replace(camera, pose=at_origin).rays(size, offset)
     row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
-    backdrop = (np.stack([column, row], axis=-1) + 0.5 + offset) / size[1]
+    left, top, _, more_rows = camera.beyond(size)
+    backdrop = (np.stack([column + left, row + top], axis=-1) + 0.5 + offset) / (size[1] + more_rows)
     return Rays(origins.reshape(-1, 3), directions.reshape(-1, 3), backdrop)

@@ -18,6 +18,23 @@ FRAMING_MARGIN = 1.12
 MAX_COORDINATE = 1e18
 
 
+@dataclass(frozen=True)
+class Window:
+    """Place of a picture in a larger one of the same camera, in pixels.
+
+    Attributes
+    ----------
+    left, top : int
+        Of its first pixel, from that of the whole picture.
+    whole : (int, int)
+        Width and height of the whole picture.
+    """
+
+    left: int
+    top: int
+    whole: tuple[int, int]
+
+
 @dataclass(frozen=True, eq=False)
 class Camera(Frozen):
     """Camera with a perspective or orthographic view.
@@ -30,11 +47,14 @@ class Camera(Frozen):
         Full vertical angle of view in degrees, between 0 and 180: a perspective camera.
     height : float, optional
         Height of the view in metres: an orthographic camera.
+    window : Window, optional
+        What is rendered is this part of a larger picture, to which `fov_y` and `height` belong.
     """
 
     pose: Array
     fov_y: float | None = 45.0
     height: float | None = None
+    window: Window | None = None
 
     def __post_init__(self) -> None:
         pose = np.array(self.pose, dtype=np.float64)
@@ -140,7 +160,25 @@ class Camera(Frozen):
     def half_extent(self, size: tuple[int, int]) -> tuple[float, float]:
         """Half width and half height of the view: at distance 1 for a perspective camera, in metres for the other."""
         half_height = np.tan(np.radians(self.fov_y) / 2) if self.fov_y is not None else (self.height or 0.0) / 2
+        if self.window is not None:
+            half_height *= size[1] / self.window.whole[1]
         return float(half_height * size[0] / size[1]), float(half_height)
+
+    def center(self, size: tuple[int, int]) -> tuple[float, float]:
+        """Center of the view, right and up from the camera's axis, in half widths and half heights of it.
+
+        It is 0 but for a part of a larger picture.
+        """
+        if (window := self.window) is None:
+            return 0.0, 0.0
+        width, height = window.whole
+        return (2 * window.left + size[0] - width) / size[0], (height - 2 * window.top - size[1]) / size[1]
+
+    def beyond(self, size: tuple[int, int]) -> tuple[int, int, int, int]:
+        """Pixels of the whole picture to the left of and above the view, and how many more it has across and down."""
+        if (window := self.window) is None:
+            return 0, 0, 0, 0
+        return window.left, window.top, window.whole[0] - size[0], window.whole[1] - size[1]
 
     def rays(self, size: tuple[int, int], offset: tuple[float, float] = (0.0, 0.0)) -> tuple[Array, Array]:
         """Rays through the pixel centers.
@@ -158,8 +196,9 @@ class Camera(Frozen):
             Directions have unit length; all origins of a perspective camera are the eye.
         """
         half_width, half_height = self.half_extent(size)
-        x = ((np.arange(size[0]) + 0.5 + offset[0]) / size[0] * 2 - 1) * half_width
-        y = (1 - (np.arange(size[1]) + 0.5 + offset[1]) / size[1] * 2) * half_height
+        aside, above = self.center(size)
+        x = ((np.arange(size[0]) + 0.5 + offset[0]) / size[0] * 2 - 1 + aside) * half_width
+        y = (1 - (np.arange(size[1]) + 0.5 + offset[1]) / size[1] * 2 + above) * half_height
         across = x[None, :, None] * self.right + y[:, None, None] * self.up
         if self.fov_y is None:
             return self.eye + across, np.broadcast_to(self.forward, across.shape).copy()

@@ -16,11 +16,11 @@ from translucent.geometry.grouping import used_vertices
 from translucent.geometry.mesh import Mesh
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
+from translucent.scene.falloff import Falloff
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.stages import DEFAULT_STAGE, KeyLight, Stage, stage_named
 from translucent.scene.surface import Surface
-from translucent.scene.texture import Texture
 
 #: Air between model and ground, as a share of the model's diagonal: rays tell surfaces apart that are so far apart.
 GAP = 1e-3
@@ -28,8 +28,8 @@ GAP = 1e-3
 #: How far the ground reaches, in diagonals of the model.
 REACH = 60.0
 
-#: How far from the model the ground gets darker, and how far it goes on to, in the same; texels of that, each way.
-BRIGHT, DARK, FALLOFF_SIZE = 0.8, 9.0, 64
+#: How far from the model the ground gets darker, and how far it goes on to, in the same.
+BRIGHT, DARK = 0.8, 9.0
 
 #: Directions of the environment that throw shadows onto the ground.
 ENVIRONMENT_SHADOWS = 128
@@ -134,13 +134,9 @@ def _finish(stage: Stage) -> Surface:
 
 
 @lru_cache(maxsize=8)
-def _falloff(far: float) -> Texture:
+def _falloff(far: float) -> Falloff:
     """Share of the paint over the texture coordinates of `ground_mesh`: 1 in the middle, `far` at the edges."""
-    center = (np.arange(FALLOFF_SIZE) + 0.5) / FALLOFF_SIZE * 2.0 - 1.0
-    radius = np.hypot(center[:, None], center[None, :]) * DARK
-    share = np.clip((radius - BRIGHT) / (DARK - BRIGHT), 0.0, 1.0)
-    values = 1.0 + (far - 1.0) * share * share * (3.0 - 2.0 * share)
-    return Texture(np.repeat(values[..., None], 3, axis=-1), wrap=("clamp", "clamp"))
+    return Falloff.around(0.5 * BRIGHT / DARK, far)
 
 
 def _light(key: KeyLight, axes: Array) -> DirectionalLight:

@@ -50,11 +50,12 @@ class NoInterface:
             texture.use(_UNITS[name])
         background = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": seen.kind == "image"}
         job.gl.enable_only(blending)
-        rest = self._variants.program(REST=True, ONE_INTERFACE=False, **background)
+        rest = self._variants.program(REST=True, ONE_INTERFACE=False, APART=False, **background)
         self._variants.draw_rest(job, rest, framebuffer, top_first=True)
         if job.covered:
             job.gl.enable_only(blending | moderngl.DEPTH_TEST)
             job.gl.depth_func = "1"
-            plain = self._variants.program(REST=False, ONE_INTERFACE=job.features.one_interface, **background)
+            switches = {"ONE_INTERFACE": job.features.one_interface, "APART": job.bent_apart}
+            plain = self._variants.program(REST=False, **switches, **background)
             self._variants.draw_covered(job, plain, framebuffer, top_first=True)
             job.gl.depth_func = "<"

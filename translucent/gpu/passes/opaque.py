@@ -32,6 +32,11 @@ class OpaquePass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
+        if job.bending:
+            ends = job.targets.opaque_ends()
+            ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
+            self.draw_depth(job, spec.objects, ends)
+            return
         framebuffer = job.targets.opaque()
         framebuffer.use()
         _clear(framebuffer)
@@ -128,6 +133,8 @@ class FinishMaps:
 def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
     """Axial depth and radiance of the opaque objects; the latter with its blurs, if a rough body may show them."""
     axial_depth, radiance = job.targets.opaque().color_attachments
+    if job.bending:
+        (radiance,) = job.targets.opaque_mean().color_attachments
     if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
         radiance.build_mipmaps()
         radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR

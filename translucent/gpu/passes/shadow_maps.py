@@ -42,6 +42,9 @@ from translucent.scene.lights import DirectionalLight
 from translucent.scene.scene import Light, Object, Scene
 from translucent.scene.shadow_directions import shadow_directions
 
+#: Most shares of the directions of the environment where one sample of a pixel may have to do.
+_FEW_SHARES = 16
+
 #: Optical depth across a body whose light photons carry.
 _DENSE = 1e4
 
@@ -124,6 +127,9 @@ class ShadowMapsPass:
         atlas, scene, count = job.resources.shadows, job.scene, job.scene.environment_shadows
         # Of several samples of a pixel, each looks into its share of the directions.
         first, step = job.sample % job.samples, job.samples
+        if job.bending:  # few of them may stand for all
+            step = min(step, _FEW_SHARES)
+            first %= step
         most = job.plan.shadows.directions
         if few := most is not None and most * step < count:
             step = -(-count // most)
@@ -140,7 +146,7 @@ class ShadowMapsPass:
         assert atlas.views is not None
         center = media_center(scene)
         extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
-        turns = first, -step if few else step
+        turns = first, -step if few or job.bending else step
         if job.averaged:
             turns = 0, max(len(atlas.views.sky), 1)  # no picture is read of what is drawn now
         job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))

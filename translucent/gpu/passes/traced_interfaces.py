@@ -19,7 +19,7 @@ from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center
 from translucent.media.given_back import LayeredMedium
-from translucent.planning.mirrors import Mirror, mirror_of
+from translucent.planning.mirrors import Mirror, ground_of, mirror_of
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Scene
 
@@ -65,6 +65,9 @@ class TracedInterfacesPass:
         self._variants = Variants(gl, "geometry/fullscreen.vert", "transport/traced_interfaces.frag", **_UNITS)
         self._reflectance = reflectance_table(gl)
         self._no_interface = NoInterface(gl)
+        self._where_unsettled = Variants(
+            gl, "geometry/fullscreen.vert", "transport/where_unsettled.frag", entered=0, unsettled=1
+        )
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Shade the frame; for a job of several samples, add a sample's radiance and transmittance instead."""
@@ -72,14 +75,20 @@ class TracedInterfacesPass:
         require_interfaces(gl.info)
         sums = job.sums_after(spec.name)
         framebuffer = job.targets.average() if sums else job.targets.surfaced()
+        if job.bending:
+            framebuffer = job.targets.bent()
         blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
         record = record_at_eye(job)
         gl.enable_only(blending)
+        mirror = mirror_of(job.scene) if job.features.has_opaque and not job.bending else None
         if not any(record):
-            self._no_interface.draw(job, framebuffer, blending)
-            if not job.covered:
+            if job.bending:
+                self._mark_unsettled(job, framebuffer)
+            else:
+                self._no_interface.draw(job, framebuffer, blending)
+            if not job.covered or (job.bent_apart and not job.bending and mirror is None):
                 return
         hierarchies = job.resources.hierarchies.of(job.scene)
         rows, frame = hierarchies.place(job.scene, media_center(job.scene), job.features.sheets)
@@ -102,14 +111,25 @@ class TracedInterfacesPass:
             "object_nodes": hierarchies.object_nodes,
             "objects_frame": frame,
             "bodies_radius": bodies_radius(job.scene),
+            **_ground(job.scene),
         }
         _set(program, values)
-        self._variants.draw_covered(job, program, framebuffer, top_first=True)
-        if job.features.has_opaque and (mirror := mirror_of(job.scene)) is not None:
+        if job.bending or not job.bent_apart:
+            self._variants.draw_covered(job, program, framebuffer, top_first=True)
+        if mirror is not None:
             self._draw_mirrored(job, mirror, framebuffer, values)
         gl.enable_only(blending)
         for table in tables:
             table.release()
+
+    def _mark_unsettled(self, job: FrameJob, framebuffer: moderngl.Framebuffer) -> None:
+        """Leave a depth test that passes where an interface is seen in a pixel that needs more samples."""
+        job.targets.entered().color_attachments[0].use(0)
+        job.targets.unsettled().color_attachments[0].use(1)
+        job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+        job.gl.depth_func = "1"
+        self._where_unsettled.draw_covered(job, self._where_unsettled.program(), framebuffer, top_first=True)
+        job.gl.depth_func = "<"
 
     def _draw_mirrored(
         self, job: FrameJob, mirror: Mirror, framebuffer: moderngl.Framebuffer, values: dict[str, Any]
@@ -145,6 +165,7 @@ class TracedInterfacesPass:
             DIFFUSED=job.diffused_light is not None,
             MICROFACETS=mirror or any(surface.roughness > 0 for surface in surfaces),
             MIRROR=mirror,
+            ADAPTIVE=job.bending,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
             OPAQUE=job.features.has_opaque,
             **interface_shadow_switches(job),
@@ -185,6 +206,14 @@ class TracedInterfacesPass:
             textures["seen_map"] = environments.sharp(environment.seen)
         for name, texture in textures.items():
             texture.use(_UNITS[name])
+
+
+def _ground(scene: Scene) -> dict[str, Any]:
+    """Number and plane of the ground, which rays see that are not followed on; -1 for none."""
+    if (ground := ground_of(scene)) is None:
+        return {"ground_object": -1}
+    height = ground.height - float(ground.normal @ media_center(scene))
+    return {"ground_object": scene.objects.index(ground.ground), "ground_plane": (*ground.normal, height)}
 
 
 def _set(program: moderngl.Program, values: dict[str, Any]) -> None:

@@ -156,11 +156,12 @@ class RecordedTexture:
     def write(self, data: Any, viewport: tuple[int, int, int, int] | None = None) -> None:
         """Replace the content, or some of its rows."""
         new = _array(data, self.dtype, self.size if viewport is None else viewport[2:], self.components)
-        if viewport is None or self.content is None:
+        if viewport is None or (self.content is None and viewport[2:] == self.size):
             self.content = new
             return
         x, y, width, height = viewport
-        self.content = self.content.copy()
+        known = np.zeros((*self.size[::-1], *new.shape[2:]), new.dtype) if self.content is None else self.content
+        self.content = known.copy()
         self.content[y : y + height, x : x + width] = new
 
     def build_mipmaps(self) -> None:

@@ -9,15 +9,8 @@ from translucent.preview.actions import Change, SetOrbit
 from translucent.preview.answers import recipe
 from translucent.preview.desk import FAINT, Desk, begin_rows, check, choice, fact, row, slider, wrapped
 from translucent.preview.document import AUTO, STAGE_WORDS
-
-ENVIRONMENTS = ("", "light-table", "studio", "checkerboard", "#ffffff", "#404040")
-
-STAGE_TIP = (
-    "A ground that catches shadows, lamps and soft boxes, as --stage of translucent render; auto: studio, unless the\n"
-    "model brings a camera, lights or a ground, or an environment is chosen. Quantities and the reference go without."
-)
-ROTATION_TIP = "Of the environment; of a stage with its lamps. Or drag with E held."
-TONE_TIP = "auto: neutral on a stage, where light sources are brighter than white, else none."
+from translucent.preview.environments import BUILT_IN
+from translucent.preview.tips import TIPS
 
 RECIPES = (
     ("Copy command", "command", "translucent render with options for this picture, its stage and caustics"),
@@ -41,31 +34,31 @@ def look_panel(desk: Desk) -> None:
         desk.work.reframe()
     imgui.separator_text("Stage and environment")
     if begin_rows("environment"):
-        choice(desk, "stage", "look.stage", STAGE_WORDS, tip=STAGE_TIP)
+        choice(desk, "stage", "look.stage", STAGE_WORDS)
         _environment(desk, "lights with", "look.environment", "the stage's, or the model's own")
         _environment(desk, "background", "look.background", "the same")
-        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg", tip=ROTATION_TIP)
+        slider(desk, "rotation", "look.rotation", -180.0, 180.0, "%.0f deg")
         imgui.end_table()
     imgui.separator_text("Light")
     if begin_rows("light"):
-        check(desk, "directional light", "look.light", tip="Seen in media that scatter, and on opaque objects.")
+        check(desk, "directional light", "look.light")
         if desk.get("look.light"):
-            slider(desk, "from around", "look.light_yaw", -180.0, 180.0, "%.0f deg", tip="Or drag with L held.")
+            slider(desk, "from around", "look.light_yaw", -180.0, 180.0, "%.0f deg")
             slider(desk, "from above", "look.light_pitch", -89.0, 89.0, "%.0f deg")
             slider(desk, "irradiance", "look.light_irradiance", 0.0, 50.0, "%.2f W/m2")
         imgui.end_table()
     imgui.separator_text("Picture")
     if begin_rows("picture"):
         slider(desk, "exposure", "look.exposure", -6.0, 6.0, "%.2f stops")
-        choice(desk, "tone curve", "look.tone", (AUTO, *TONES), tip=TONE_TIP)
+        choice(desk, "tone curve", "look.tone", (AUTO, *TONES))
         imgui.end_table()
 
 
 def _environment(desk: Desk, label: str, name: str, empty: str) -> None:
-    row(label)
+    row(label, TIPS[name])
     now = desk.get(name)
     if imgui.begin_combo(f"##{name}", now or empty):
-        for word in ENVIRONMENTS:
+        for word in BUILT_IN:
             if imgui.selectable(word or empty, word == now)[0]:
                 desk.work.do(Change(name, word))
         if imgui.selectable("a file ...", False)[0]:

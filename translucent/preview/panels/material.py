@@ -14,9 +14,9 @@ from translucent.formulas.color import to_hex
 from translucent.materials import TITLES, text_block
 from translucent.media.colors import parse_color
 from translucent.media.medium import Medium
-from translucent.media.presets import presets
+from translucent.media.presets import grouped, presets
 from translucent.preview import numbers
-from translucent.preview.actions import Change, ChoosePreset
+from translucent.preview.actions import Assign, Change
 from translucent.preview.desk import (
     FAINT,
     WARNING,
@@ -26,11 +26,14 @@ from translucent.preview.desk import (
     fact,
     row,
     slider,
+    tooltip,
     triple,
     wrapped,
 )
 from translucent.preview.document import SHOWN_UNITS, Material
+from translucent.preview.panels.library import told
 from translucent.preview.scenes import medium_of
+from translucent.preview.tips import TIPS
 from translucent.units import metres_per_unit
 
 #: Colors of curves: red, green and blue that are told apart on a dark background.
@@ -43,7 +46,7 @@ swatches = lru_cache(maxsize=4)(numbers.swatches)
 
 def material_panel(desk: Desk) -> None:
     """Draw the panel."""
-    material = desk.work.document.material
+    material = desk.material
     _source(desk, material)
     imgui.separator_text("Volume")
     if begin_rows("volume"):
@@ -51,16 +54,16 @@ def material_panel(desk: Desk) -> None:
         imgui.end_table()
     _distance(desk, material)
     if begin_rows("thickness"):
-        slider(desk, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True, tip=THICKNESS_TIP)
+        slider(desk, "thickness", "material.thickness", 1e-5, 10.0, "%.5f m", log=True)
         imgui.end_table()
     _swatches(desk, material)
     _curves(desk, material)
     imgui.separator_text("Surface")
     if begin_rows("surface"):
-        slider(desk, "ior", "material.ior", 1.0, 2.5, "%.3f", tip="Index of refraction; 1: light goes straight on.")
+        slider(desk, "ior", "material.ior", 1.0, 2.5, "%.3f")
         slider(desk, "roughness", "material.roughness", 0.0, 1.0)
         slider(desk, "transmission", "material.transmission", 0.0, 1.0)
-        slider(desk, "dispersion", "material.dispersion", 0.0, 10.0, tip="20 / Abbe number.")
+        slider(desk, "dispersion", "material.dispersion", 0.0, 10.0)
         imgui.end_table()
     imgui.separator_text("Scattering and emission")
     triple(desk, "absorption, 1/m", "material.absorption", 0.5)
@@ -75,18 +78,18 @@ def material_panel(desk: Desk) -> None:
     _copies(desk, material)
 
 
-THICKNESS_TIP = "thicknessFactor: written to files, and the sheet of thin layers. The picture uses the mesh's own."
-
-
 def _source(desk: Desk, material: Material) -> None:
     if begin_rows("source"):
-        row("preset")
+        if len(desk.objects) > 1:
+            _object(desk)
+        row("preset", "A named medium; the Library has them as pictures.")
         if imgui.begin_combo("##preset", material.preset or "none"):
-            for name, found in presets().items():
-                if imgui.selectable(f"{name}  ({found.kind})", name == material.preset)[0]:
-                    desk.work.do(ChoosePreset(name))
-                if imgui.is_item_hovered():
-                    imgui.set_tooltip("\n".join(x for x in (found.source, found.note, found.regime) if x))
+            for group, members in grouped(presets()).items():
+                imgui.text_colored(FAINT, group)
+                for each in members:
+                    if imgui.selectable(f"{each.name}  ({each.kind})", each.name == material.preset)[0]:
+                        desk.choose_preset(each.name)
+                    tooltip(told(each))
             imgui.end_combo()
         words = {
             "file": "the model's own",
@@ -96,15 +99,36 @@ def _source(desk: Desk, material: Material) -> None:
         }
         fact("medium from", words[material.source])
         imgui.end_table()
-    if material.source == "preset":
-        found = presets()[material.preset]
+    if material.source == "preset" and (found := desk.work.library.find(material.preset)) is not None:
         wrapped(f"{found.kind}: {found.source}", FAINT)
         if found.warning:
             wrapped(found.warning, WARNING)
 
 
+def _object(desk: Desk) -> None:
+    """Draw the choice of the object that the panel is about."""
+    row("object", "Click one in the picture, or choose it here. Changes are then of its own material.")
+    every = "all without their own"
+    if imgui.begin_combo("##object", every if desk.target is None else _object_name(desk, desk.target)):
+        if imgui.selectable(every, desk.target is None)[0]:
+            desk.select(None)
+        for number in range(len(desk.objects)):
+            if imgui.selectable(f"{_object_name(desk, number)}##{number}", number == desk.target)[0]:
+                desk.select(number)
+        imgui.end_combo()
+    if desk.target is not None and desk.work.document.own_material(desk.target) is not None:
+        row("")
+        if imgui.button("No material of its own"):
+            desk.work.do(Assign(desk.target, None))
+
+
+def _object_name(desk: Desk, number: int) -> str:
+    own = " *" if desk.work.document.own_material(number) is not None else ""
+    return f"{desk.objects[number].mesh.name or f'object {number}'}{own}"
+
+
 def _color(desk: Desk, material: Material) -> None:
-    row("attenuationColor", "Linear color that is left of white light after attenuationDistance.")
+    row("attenuationColor", TIPS["material.color"])
     shown = list(numbers.to_display(material.color))
     flags = imgui.ColorEditFlags_.display_hex | imgui.ColorEditFlags_.picker_hue_wheel
     changed, encoded = imgui.color_edit3("##color", shown, flags)
@@ -138,6 +162,7 @@ def _distance(desk: Desk, material: Material) -> None:
     unit = desk.get("display.unit")
     scale = metres_per_unit(unit)
     imgui.text("attenuationDistance")
+    tooltip(TIPS["material.distance"])
     imgui.set_next_item_width(-em(4.2))
     flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
     changed, value = imgui.slider_float(

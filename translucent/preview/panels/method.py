@@ -12,15 +12,6 @@ from translucent.preview.document import AUTO, METHOD_NAMES
 from translucent.preview.timing import Timing
 
 SCATTERING_NAMES = (AUTO, *SCATTERINGS)
-SCATTERING_TIP = "Light scattered many times: it diffuses in the body, leaves as from a flat layer, or is left out."
-
-CONVERGE_TIP = "Path trace the picture while nothing changes: all light, with less noise the longer it goes on."
-
-CAUSTICS_TIP = (
-    "Photons carry the light of lamps through interfaces onto opaque objects while nothing changes: --caustics of\n"
-    "translucent render, more and more of them. The picture that moves has none, and neither has one that converges."
-)
-
 #: Advice about invalid pixels, by a word in the plan's limits or the diagnosis.
 CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
 
@@ -29,20 +20,18 @@ def method_panel(desk: Desk) -> None:
     """Draw the panel."""
     display = desk.work.document.display
     if begin_rows("method"):
-        choice(
-            desk, "method", "display.method", METHOD_NAMES, tip="auto: the cheapest one that is exact for the scene."
-        )
-        choice(desk, "scattering", "display.scattering", SCATTERING_NAMES, tip=SCATTERING_TIP)
+        choice(desk, "method", "display.method", METHOD_NAMES)
+        choice(desk, "scattering", "display.scattering", SCATTERING_NAMES)
         choice(desk, "show", "display.mode", ("picture", "thickness", "transmittance", "validity"))
         choice(desk, "right of split", "display.compare", ("off", "method", "reference", "error"))
         if display.compare == "method":
             choice(desk, "method there", "display.method_b", METHOD_NAMES)
         if display.compare != "off":
             slider(desk, "split", "display.split", 0.0, 1.0, "%.2f")
-        check(desk, "reference inset", "display.inset", tip="The reference in a corner, while the view is still.")
-        check(desk, "smooth edges", "display.antialias", tip="More samples while the view is still.")
-        check(desk, "caustics (P)", "display.caustics", tip=CAUSTICS_TIP)
-        check(desk, "converge (C)", "display.converge", tip=CONVERGE_TIP)
+        check(desk, "reference inset", "display.inset")
+        check(desk, "smooth edges", "display.antialias")
+        check(desk, "caustics (P)", "display.caustics")
+        check(desk, "converge (C)", "display.converge")
         imgui.end_table()
     for side, (plan, timing) in enumerate(zip(desk.stage.plans, desk.stage.timings, strict=True)):
         if plan is not None:
@@ -72,9 +61,6 @@ def _plan(plan: RenderPlan, timing: Timing) -> None:
 
 def _errors(desk: Desk) -> None:
     measured, unit = desk.work.measured, desk.get("display.unit")
-    if not desk.get("display.inset"):
-        wrapped("Tick 'reference inset' to measure.", FAINT)
-        return
     if measured is None or measured.scene is not desk.work.scene():
         wrapped("measured as soon as the view is still", FAINT)
     if measured is None:

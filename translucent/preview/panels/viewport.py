@@ -7,16 +7,23 @@ import math
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from translucent.arrays import Array
 from translucent.frames.aovs import false_colors, marks
 from translucent.preview import numbers
 from translucent.preview.actions import Pan, Turn, Zoom
 from translucent.preview.desk import Desk, Probed, em
 from translucent.preview.measuring import Crossing
+from translucent.preview.orbiting import camera_of
+from translucent.preview.panels.library import PRESET
 from translucent.preview.scales import thickest, worst
+from translucent.scene.camera import Camera
 from translucent.units import metres_per_unit
 
 #: Degrees of orbit for the width of the viewport, and factor of a step of the wheel.
 DEGREES, WHEEL = 270.0, 1.15
+
+#: sRGB colors of the largest differences, as in ``present/compare.frag``.
+THINNER, THICKER = (0.13, 0.40, 0.80), (0.80, 0.15, 0.18)
 
 WHITE, BLACK, SHADE = 0xFFFFFFFF, 0xFF000000, 0xB0181818
 
@@ -37,16 +44,27 @@ def viewport_panel(desk: Desk) -> None:
         imgui.set_cursor_screen_pos(corner)
     buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
     imgui.invisible_button("##viewport", room, buttons | imgui.ButtonFlags_.mouse_button_middle)
+    _take_dragged(desk, corner, room)
     _mouse(desk, corner, room)
-    _keys(desk)
     over = imgui.get_window_draw_list()
     over.push_clip_rect(corner, ImVec2(corner.x + room.x, corner.y + room.y), True)
+    _selected(desk, over, corner, room)
     _split(desk, over, corner, room)
     _scale(desk, over, corner, room)
     _inset(desk, over, corner, room)
     _probe(desk, over, corner, room)
     _status(desk, over, corner, room)
     over.pop_clip_rect()
+
+
+def _take_dragged(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
+    """Take a preset that is dragged from the library."""
+    if not imgui.begin_drag_drop_target():
+        return
+    if imgui.accept_drag_drop_payload_py_id(PRESET) is not None:
+        place = imgui.get_io().mouse_pos
+        desk.drop_preset(desk.dragged, ((place.x - corner.x) / room.x, (place.y - corner.y) / room.y))
+    imgui.end_drag_drop_target()
 
 
 def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
@@ -77,31 +95,43 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
         at = io.mouse_pos.x - corner.x - 0.5 * room.x, io.mouse_pos.y - corner.y - 0.5 * room.y
         desk.work.do(Zoom(WHEEL**io.mouse_wheel, at[0] / room.y, at[1] / room.y))
     moved = math.hypot(io.mouse_pos.x - desk.pressed_at[0], io.mouse_pos.y - desk.pressed_at[1])
-    if imgui.is_item_deactivated() and moved < em(0.3) and desk.probed is not None and desk.probed.crossing is not None:
-        desk.selected = desk.probed.crossing.body
+    if imgui.is_item_deactivated() and moved < em(0.3):
+        desk.pick(((io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y), desk.select)
     desk.hovered = None
     if imgui.is_item_hovered() and not imgui.is_any_mouse_down():
         desk.hovered = (io.mouse_pos.x - corner.x) / room.x, (io.mouse_pos.y - corner.y) / room.y
 
 
-def _keys(desk: Desk) -> None:
-    io = imgui.get_io()
-    if io.want_text_input:
+def _selected(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
+    """Draw the corners of the selected object's box, and its name."""
+    orbit = desk.work.document.orbit
+    if desk.target is None or orbit is None:
         return
-    if imgui.is_key_pressed(imgui.Key.f):
-        desk.frame()
-    if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
-        desk.change("display.converge", not desk.get("display.converge"), step=True)
-    if imgui.is_key_pressed(imgui.Key.p):
-        desk.change("display.caustics", not desk.get("display.caustics"), step=True)
-    if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
-        (desk.work.redo if io.key_shift else desk.work.undo)()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
-        desk.work.redo()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o):
-        desk.ask_file("open")
-    elif imgui.is_key_pressed(imgui.Key.o) and desk.work.document.orbit is not None:
-        desk.change("orbit.orthographic", not desk.get("orbit.orthographic"), step=True)
+    item, camera = desk.objects[desk.target], camera_of(orbit)
+    places = on_screen(camera, item.bounds, (room.x, room.y))
+    if places is None:
+        return
+    low, high = places.min(axis=0), places.max(axis=0)
+    side = em(0.9)
+    for x, right in ((low[0], 1.0), (high[0], -1.0)):
+        for y, down in ((low[1], 1.0), (high[1], -1.0)):
+            at = ImVec2(corner.x + x, corner.y + y)
+            for color, wide in ((BLACK, 0.25), (WHITE, 0.1)):
+                over.add_line(at, ImVec2(at.x + right * side, at.y), color, em(wide))
+                over.add_line(at, ImVec2(at.x, at.y + down * side), color, em(wide))
+    _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), item.mesh.name or f"object {desk.target}")
+
+
+def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array | None:
+    """Places (8, 2) of a box's corners in a picture, right and down in pixels; None if one is behind the camera."""
+    corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    local = (corners - camera.eye) @ np.stack([camera.right, camera.up, camera.forward], axis=1)
+    half = np.array(camera.half_extent((max(int(size[0]), 1), max(int(size[1]), 1))))
+    if camera.fov_y is not None:
+        if local[:, 2].min() <= 0.0:
+            return None
+        half = half * local[:, 2:]
+    return np.asarray((local[:, :2] / half * (1.0, -1.0) + 1.0) / 2.0 * size)
 
 
 def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
@@ -109,8 +139,9 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
     if display.compare == "off":
         return
     x = corner.x + display.split * room.x
-    over.add_line(ImVec2(x, corner.y), ImVec2(x, corner.y + room.y), WHITE, em(0.1))
-    over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45), WHITE)
+    for color, wide in ((BLACK, 0.12), (WHITE, 0.0)):  # seen on every background
+        over.add_line(ImVec2(x, corner.y), ImVec2(x, corner.y + room.y), color, em(0.1 + wide))
+        over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45 + 0.5 * wide), color)
     plans = desk.stage.plans
     left = type(plans[0].method).__name__ if plans[0] is not None else display.method
     right = {"method": display.method_b, "reference": "float64 reference", "error": "thickness less the reference"}
@@ -125,18 +156,39 @@ def _split(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> 
             name += f", 1/{truth.level} so far"
     top = corner.y + em(0.4)
     width = imgui.calc_text_size(left).x
-    _label(over, ImVec2(max(x - width - em(0.8), corner.x + em(0.3)), top), left)
-    _label(over, ImVec2(min(x + em(0.8), corner.x + room.x - imgui.calc_text_size(name).x - em(0.5)), top), name)
+    if x - corner.x > width + em(1.2):  # a side that is too narrow for its name has none
+        _label(over, ImVec2(x - width - em(0.8), top), left)
+    if corner.x + room.x - x > imgui.calc_text_size(name).x + em(1.2):
+        _label(over, ImVec2(x + em(0.8), top), name)
     if display.compare == "error" and desk.stage.has_truth():
-        most = worst(desk.work) / metres_per_unit(display.unit)
-        lines = (
-            f"blue: {most:.2g} {display.unit} thinner",
-            f"red: {most:.2g} {display.unit} thicker",
-            "orange: not valid",
-        )
-        for i, line in enumerate(lines, 1):
-            rightmost = corner.x + room.x - imgui.calc_text_size(line).x - em(0.5)
-            _label(over, ImVec2(min(x + em(0.8), rightmost), top + em(1.6) * i), line)
+        _error_scale(desk, over, ImVec2(corner.x + room.x, corner.y + room.y))
+
+
+def _error_scale(desk: Desk, over: imgui.ImDrawList, end: ImVec2) -> None:
+    """Draw the scale of differences of thickness in the lower right corner."""
+    unit = desk.get("display.unit")
+    most = worst(desk.work) / metres_per_unit(unit)
+    width, height, line = em(18.0), em(0.8), imgui.get_text_line_height()
+    left, top = end.x - width - em(1.4), end.y - em(1.6) - height - line
+    over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
+    over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: not valid")
+    parts = 48
+    for i in range(parts):
+        red, green, blue = (int(255 * v) for v in error_color(2.0 * (i + 0.5) / parts - 1.0))
+        begin, stop = left + width * i / parts, left + width * (i + 1) / parts
+        color = 0xFF000000 | blue << 16 | green << 8 | red
+        over.add_rect_filled(ImVec2(begin, top), ImVec2(stop + 1.0, top + height), color)
+    for share, text in ((0.0, f"-{most:.2g}"), (0.5, "0"), (1.0, f"+{most:.2g}")):
+        wide = imgui.calc_text_size(text).x
+        over.add_text(ImVec2(left + share * (width - wide), top + height), WHITE, text)
+
+
+def error_color(share: float) -> tuple[float, float, float]:
+    """sRGB color of a difference of thickness, -1 to 1 of the largest, as ``present/compare.frag`` shows it."""
+    end = THINNER if share < 0.0 else THICKER
+    mixed = math.sqrt(min(abs(share), 1.0))
+    red, green, blue = (0.95 + mixed * (channel - 0.95) for channel in end)
+    return red, green, blue
 
 
 def _scale(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
@@ -265,7 +317,7 @@ def _status(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) ->
     """Draw the status: why the picture is incomplete or simpler, and work under way."""
     y = corner.y + em(0.4) + (em(1.8) if desk.get("display.compare") != "off" else 0.0)
     stage = desk.stage
-    known = stage.simpler, stage.diffusing, stage.converging.told, stage.photons.told
+    known = stage.simpler, *stage.ways.told, stage.converging.told, stage.photons.told
     lines = [text for text in (stage.problem, stage.shader_problem, *known) if text]
     slow = [task for task in desk.work.busy if task.name and task.seconds > 1.0]
     lines += [f"{task.name} {task.detail} {task.seconds:.0f} s" for task in slow]

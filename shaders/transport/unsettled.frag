@@ -1,0 +1,48 @@
+// Pixels whose light from interfaces needs more samples; the others are discarded. After one sample those are whose light differs
+// within 5 x 5 pixels; after several those where the standard error of the mean is large within 3 x 3. Pixels with the edge
+// of an interface take all samples, as every error of their mean shows. Row 0 is the top row.
+
+#include <constants>
+#include <View>
+#include "lib/color.glsl"
+
+uniform sampler2D bent_light;      // sum over the samples that met an interface; alpha: how many of them there are so far
+uniform sampler2D bent_spread;     // r: sum of squared luminance
+uniform sampler2D average_light;   // alpha: how many samples met no interface, of all
+uniform float samples;             // of a pixel
+uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a share of its mean
+uniform float error;               // largest standard error that is as good as none, likewise
+uniform int first;                 // 1: there is one sample so far
+
+layout(location = 0) out float unsettled;
+
+void main() {
+    ivec2 here = ivec2(gl_FragCoord.xy), last = ivec2(frame_size.xy) - 1;
+    float met = samples - texelFetch(average_light, here, 0).a, taken = texelFetch(bent_light, here, 0).a;
+    if (taken >= met) { discard; }
+    unsettled = 1.0;
+    if (taken == 0.0 || met < samples) { return; }
+    int reach = first == 1 ? 2 : 1;
+    vec3 low = vec3(NOTHING), high = vec3(0.0);
+    float sum = 0.0, count = 0.0, worst = 0.0;
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
+            ivec2 at = clamp(here + ivec2(x, y), ivec2(0), last);
+            vec4 light = texelFetch(bent_light, at, 0);
+            if (light.a == 0.0) { continue; }
+            vec3 mean = light.rgb / light.a;
+            low = min(low, mean);
+            high = max(high, mean);
+            float level = luminance(mean);
+            sum += level;
+            count += 1.0;
+            if (light.a > 1.0) {
+                float variance = max(texelFetch(bent_spread, at, 0).r / light.a - level * level, 0.0);
+                worst = max(worst, variance / (light.a - 1.0));
+            }
+        }
+    }
+    vec3 range = high - low;
+    bool settled = first == 1 ? max(range.r, max(range.g, range.b)) <= contrast * sum / count : sqrt(worst) <= error * sum / count;
+    if (settled) { discard; }
+}

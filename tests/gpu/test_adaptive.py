@@ -1,0 +1,92 @@
+"""Adaptive sampling: the picture of all samples, from rays traced for those that matter."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from translucent.geometry.solids import Box, Sphere
+
+SIZE = (40, 32)
+CAMERA = tl.Camera.look_at((0.3, 0.4, 5.0), (0, 0, 0), fov_y=30.0)
+SKY = tl.Environment.gradient((0.1, 0.2, 0.4), (1.0, 0.9, 0.7))
+GLASS = tl.Medium(absorption=(0.2, 0.5, 0.9), ior=1.5)
+
+
+def ball(**rest: object) -> tl.Scene:
+    return tl.Scene([tl.Object(Sphere().tessellate(24), GLASS, **rest)], CAMERA, environment=SKY)  # type: ignore[arg-type]
+
+
+def traced(frame: tl.Frame) -> float:
+    return float(frame.provenance["traced_samples"].split()[0])
+
+
+def on_a_floor() -> tl.Scene:
+    floor = tl.Object(Box((-4.0, -1.3, -4.0), (4.0, -1.2, 4.0)).tessellate(1), None, color=(0.6, 0.4, 0.3))
+    return dataclasses.replace(ball(), objects=[*ball().objects, floor])
+
+
+@pytest.mark.parametrize("scene", [ball(), on_a_floor()], ids=["alone", "on a floor"])
+def test_the_picture_is_that_of_all_samples(renderer: tl.Renderer, scene: tl.Scene) -> None:
+    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
+    assert traced(few) < 13.0
+    for name in ("transmittance", "optical_depth", "thickness", "coverage", "valid", "normals"):
+        np.testing.assert_array_equal(few.arrays[name], every.arrays[name], err_msg=name)
+    mean = every.radiance[every.coverage].mean()
+    off = (few.radiance - every.radiance)[every.coverage]
+    # The standard error that ends sampling is 1 % in the worst pixel of 3 x 3.
+    assert np.sqrt(np.square(off, dtype=np.float64).mean()) < 0.005 * mean
+    assert abs(off.mean(dtype=np.float64)) < 0.002 * mean  # in pixels as coarse as these
+    assert np.abs(off).max() < 0.1 * mean
+    np.testing.assert_allclose(few.radiance[~every.coverage], every.radiance[~every.coverage], atol=1e-6)
+
+
+def test_a_smooth_interior_is_traced_once(renderer: tl.Renderer) -> None:
+    """The window is flat, and larger than the picture: no edge is in it."""
+    window = tl.Object(Box((-9.0, -9.0, -0.2), (9.0, 9.0, 0.2)).tessellate(1), GLASS)
+    scene = tl.Scene([window], tl.Camera.look_at((0, 0, 5), (0, 0, 0), fov_y=20.0), environment=SKY)
+    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
+    assert few.provenance["traced_samples"] == "1.0 of 16"
+    np.testing.assert_allclose(few.radiance, every.radiance, rtol=5e-3)
+
+
+def test_the_edge_of_a_body_takes_all_samples(renderer: tl.Renderer) -> None:
+    """Where some samples meet the body, the mean is that of every one of them, up to the order of the sum."""
+    few, every = (renderer.render(ball(), SIZE, samples=8, adaptive=adaptive) for adaptive in (True, False))
+    alone = [renderer.render(dataclasses.replace(ball(), camera=moved), SIZE).coverage for moved in around(CAMERA)]
+    edge = np.any(alone, axis=0) & ~np.all(alone, axis=0)
+    assert 20 < edge.sum() < 300
+    some = edge & (np.abs(every.transmittance - 1.0).max(axis=-1) > 0.0)
+    np.testing.assert_allclose(few.radiance[some], every.radiance[some], rtol=2e-2)
+    assert np.median(np.abs(few.radiance - every.radiance)[some]) < 1e-6
+
+
+def around(camera: tl.Camera) -> list[tl.Camera]:
+    """The camera turned so that the picture moves by less than half a pixel."""
+    step = 0.45 * 2.0 * np.tan(np.radians(15.0)) / SIZE[1] * 5.0
+    eye, target = camera.eye, camera.eye + 5.0 * camera.forward
+    ends = [target + x * step * camera.right + y * step * camera.up for x in (-1, 1) for y in (-1, 1)]
+    return [tl.Camera.look_at(eye, end, fov_y=30.0) for end in ends]
+
+
+def test_the_same_scene_makes_the_same_picture(renderer: tl.Renderer) -> None:
+    one, other = (renderer.render(ball(), SIZE, samples=8) for _ in range(2))
+    np.testing.assert_array_equal(one.radiance, other.radiance)
+
+
+@pytest.mark.parametrize(
+    ("scene", "samples"),
+    [
+        (ball(surface=tl.Surface(roughness=0.3)), 8),
+        (dataclasses.replace(ball(), camera=tl.Camera.look_at((0, 0, 0), (0, 0, -1))), 8),
+        (ball(), 2),
+    ],
+    ids=["rough", "from inside", "two samples"],
+)
+def test_what_is_noisy_or_starts_inside_takes_all_samples(renderer: tl.Renderer, scene: tl.Scene, samples: int) -> None:
+    few, every = (renderer.render(scene, SIZE, samples=samples, adaptive=adaptive) for adaptive in (True, False))
+    assert "traced_samples" not in few.provenance
+    np.testing.assert_array_equal(few.radiance, every.radiance)

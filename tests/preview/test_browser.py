@@ -1,0 +1,209 @@
+"""Files without the system's dialogs, environments of a folder, and what is told about knobs. No window."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.preview.waiting import wait
+from translucent.assets import shader_path
+from translucent.preview import preferences
+from translucent.preview.browser import Browser, with_recent
+from translucent.preview.document import Display, Look, Material, Orbit
+from translucent.preview.environments import EnvironmentFolder, title
+from translucent.preview.orbiting import camera_of
+from translucent.preview.picturing import model_key, model_picture
+from translucent.preview.tips import TIPS
+from translucent.preview.workspace import Workspace
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("b.GLB", "a.glb", "c.txt", ".hidden.glb"):
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / "Models").mkdir()
+    return tmp_path
+
+
+@pytest.fixture
+def desk(work: Workspace) -> Any:
+    desks = pytest.importorskip("translucent.preview.desk", reason="the extra 'ui' is not installed")
+    return desks.Desk(work, None)
+
+
+def browser(folder: Path, *, saves: bool = False) -> Browser:
+    return Browser("open", "Open", ("*.glb", "*.obj"), saves, folder)
+
+
+def test_a_folder_lists_folders_first_and_files_of_the_kinds(folder: Path) -> None:
+    shown = browser(folder)
+    assert [one.name for one in shown.entries()] == ["Models", "a.glb", "b.GLB"]
+    shown.every = True
+    assert [one.name for one in shown.entries()] == ["Models", "a.glb", "b.GLB", "c.txt"]
+    (folder / "d.obj").write_bytes(b"")
+    os.utime(folder, (1, 1))
+    assert "d.obj" in [one.name for one in shown.entries()], "a file that comes is listed"
+
+
+def test_a_path_opens_a_file_or_shows_a_folder(folder: Path) -> None:
+    shown = browser(folder)
+    shown.text = "Models"
+    assert shown.accept() is None
+    assert shown.folder == folder / "Models"
+    shown.text = "../a.glb"
+    assert shown.accept() == str(folder / "a.glb")
+    shown.text = str(folder / "none.glb")
+    assert shown.accept() is None
+    assert shown.problem == "none.glb: no such file"
+    shown.enter("/no/such/place")
+    assert "no such folder" in shown.problem
+    assert shown.folder == folder / "Models"
+    shown.text = "a\0b"
+    assert shown.accept() is None
+
+
+def test_a_file_is_written_over_only_if_that_is_confirmed(folder: Path) -> None:
+    shown = browser(folder, saves=True)
+    shown.text = "new"
+    assert shown.accept() == str(folder / "new.glb"), "the suffix is added"
+    shown.text = "a.glb"
+    assert (shown.accept(), shown.button) == (None, "Replace")
+    assert shown.accept() == str(folder / "a.glb")
+    shown.text = "b.GLB"
+    assert shown.button == "Save"
+    assert shown.accept() is None, "another file is another question"
+    shown.text = "nowhere/b.glb"
+    assert shown.accept() is None
+    assert "no such folder" in shown.problem
+
+
+def test_a_folder_that_is_gone_is_told(folder: Path) -> None:
+    shown = browser(folder / "gone")
+    assert shown.entries() == []
+    assert "No such file" in shown.problem
+
+
+def test_where_there_is_no_dialog_the_browser_asks(desk: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from translucent.preview import dialogs
+    from translucent.preview.panels.browser import answer
+
+    monkeypatch.setattr(dialogs.shutil, "which", lambda _: None)
+    monkeypatch.setattr(dialogs.sys, "platform", "linux")
+    desk.folders = [str(folder)]
+    desk.ask_file("save session")
+    assert (desk.browser.folder, desk.browser.text, desk.browser.saves) == (folder, "session.toml", True)
+    answer(desk)
+    assert desk.browser is None
+    assert (folder / "session.toml").is_file()
+    desk.ask_file("environment")
+    desk.escape()
+    assert desk.browser is None
+    desk.keys_shown, desk.selected = True, 0
+    desk.escape()
+    assert (desk.keys_shown, desk.selected) == (False, 0), "one at a time, what is on top first"
+    desk.escape()
+    assert desk.selected is None
+
+
+def test_environments_of_a_folder(tmp_path: Path, desk: Any) -> None:
+    for name in ("b.exr", "a.HDR", "c.png", "notes.txt"):
+        (tmp_path / name).write_bytes(b"")
+    shown = EnvironmentFolder()
+    assert shown.files() == []
+    shown.take(str(tmp_path / "b.exr"))
+    assert [Path(path).name for path in shown.files()] == ["a.HDR", "b.exr"]
+    (tmp_path / "empty").mkdir()
+    shown.take(str(tmp_path / "empty"))
+    assert shown.files() == []
+    assert "no .hdr, .exr, .pic is here" in shown.problem
+    shown.take(str(tmp_path / "gone"))
+    assert (shown.files(), "No such file" in shown.problem) == ([], True)
+    assert (title(""), title("studio"), title(str(tmp_path / "a.HDR"))) == ("own", "studio", "a")
+    desk.light_with("studio")
+    assert desk.get("look.environment") == "studio"
+    desk.work.undo()
+    assert desk.get("look.environment") == ""
+
+
+def test_folders_are_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert (preferences.read_folders(), preferences.read_environments()) == ([], "")
+    found = with_recent(["/usr"], tmp_path / "a.glb")
+    assert found == [os.path.realpath(tmp_path), "/usr"]
+    assert with_recent(found, "/usr/a.glb")[0] == os.path.realpath("/usr")
+    preferences.write_folders([*found, str(tmp_path / "gone")])
+    preferences.write_environments(str(tmp_path))
+    assert preferences.read_folders() == found
+    assert preferences.read_environments() == str(tmp_path)
+
+
+def test_a_model_leaves_a_small_picture(desk: Any, folder: Path) -> None:
+    class Pictured:
+        read = 0
+
+        def current(self) -> Any:
+            from contextlib import nullcontext
+
+            return nullcontext()
+
+        @property
+        def viewport(self) -> Any:
+            return self
+
+        def pixels(self) -> np.ndarray:
+            self.read += 1
+            return np.full((200, 300, 3), 99, dtype=np.uint8)
+
+    desk.stage = Pictured()
+    desk.work.shelf.folder = folder / "pictures"
+    desk._keep_picture()
+    assert desk.stage.read == 0, "the toolkit's own are in no list"
+    model = dataclasses.replace(desk.work.document.model, path=str(folder / "a.glb"))
+    desk.work.history = dataclasses.replace(
+        desk.work.history, present=dataclasses.replace(desk.work.document, model=model)
+    )
+    for _ in range(3):
+        desk._keep_picture()
+    assert desk.stage.read == 1
+    kept = desk.work.shelf.picture(model_key(str(folder / "a.glb")))
+    assert kept.shape == (80, 120, 3)
+    assert (folder / "pictures" / f"{model_key(str(folder / 'a.glb'))}.png").is_file()
+    assert model_picture(np.zeros((8, 900, 3), dtype=np.uint8)).shape == (80, 120, 3)
+    wait(desk.work, lambda: True)
+
+
+def test_every_knob_is_explained() -> None:
+    silent = {"material.source", "material.preset", "orbit.target", "orbit.yaw", "orbit.pitch", "orbit.distance"}
+    sections = {"material": Material, "look": Look, "display": Display, "orbit": Orbit}
+    fields = {f"{section}.{one.name}" for section, kind in sections.items() for one in dataclasses.fields(kind)}
+    assert set(TIPS) == (fields - silent) | {"model.unit"}
+    for name in ("ior", "roughness", "transmission", "dispersion", "color", "distance", "thickness"):
+        assert "glTF" in TIPS[f"material.{name}"]
+        if name != "color":
+            assert "Typical" in TIPS[f"material.{name}"]
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_the_selected_object_is_marked_where_it_is_seen(orthographic: bool) -> None:
+    viewport = pytest.importorskip("translucent.preview.panels.viewport", reason="the extra 'ui' is not installed")
+    camera = camera_of(Orbit((0.0, 0.0, 0.0), 0.0, 0.0, 2.0, 90.0, orthographic))
+    box = np.array([[-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]])  # at a distance of 2, where the picture is 4 high
+    places = viewport.on_screen(camera, box, (400.0, 200.0))
+    np.testing.assert_allclose(places.min(axis=0), (175.0, 50.0), atol=1e-9)
+    np.testing.assert_allclose(places.max(axis=0), (225.0, 100.0), atol=1e-9)
+    if not orthographic:
+        assert viewport.on_screen(camera, box + [0.0, 0.0, 3.0], (400.0, 200.0)) is None
+
+
+def test_the_scale_of_errors_has_the_colors_of_the_picture() -> None:
+    viewport = pytest.importorskip("translucent.preview.panels.viewport", reason="the extra 'ui' is not installed")
+    text = shader_path("present/compare.frag").read_text()
+    for color in (viewport.THINNER, viewport.THICKER):
+        assert f"vec3({', '.join(f'{channel:.2f}' for channel in color)})" in text
+    assert viewport.error_color(-1.0) == viewport.THINNER
+    assert viewport.error_color(0.0) == (0.95, 0.95, 0.95)

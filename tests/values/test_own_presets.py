@@ -1,0 +1,86 @@
+"""The user's own presets: read from a folder, what is wrong told with its line, and saved such that they come back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import translucent as tl
+from tests.command_line import Run
+from translucent.media.own_presets import preset_name, read_own_presets, save_own_preset
+from translucent.media.preset import Preset
+from translucent.media.preset_file import preset_text, read_presets
+from translucent.media.presets import grouped, matching
+
+GOOD = '[mint]\nkind = "estimated"\nsource = "by eye"\ncolor = [0.4, 0.9, 0.7]\ndistance = "1cm"\nior = 1.4\n'
+BAD = f'{GOOD}\n[tea]\nkind = "estimated"\nsource = "by eye"\ncolour = [0.8, 0.4, 0.1]\ndistance = "1cm"\nior = 1.33\n'
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    found = tmp_path / "translucent" / "presets"
+    found.mkdir(parents=True)
+    return found
+
+
+def test_every_preset_comes_back_from_its_text() -> None:
+    for name, one in tl.presets().items():
+        again = read_presets(preset_text(one))[name]
+        np.testing.assert_allclose(again.medium.extinction, one.medium.extinction, rtol=1e-15)
+        assert again.medium.anisotropy == pytest.approx(one.medium.anisotropy, rel=1e-14)
+        told = [(p.kind, p.group, p.source, p.note, p.aliases, p.roughness, p.reduced) for p in (again, one)]
+        assert told[0] == told[1]
+
+
+def test_a_medium_that_shines_is_kept() -> None:
+    lava = Preset("lava", tl.Medium((1, 2, 3), emission=(5, 1, 0)), "estimated", 'a "hot" one \\ here')
+    assert read_presets(preset_text(lava))["lava"].medium == lava.medium
+
+
+def test_what_is_wrong_is_told_with_its_line_and_the_others_are_read(folder: Path) -> None:
+    (folder / "a.toml").write_text(BAD)
+    (folder / "b.toml").write_text("[x\n")
+    (folder / "c.toml").write_text(GOOD.replace("mint", "basil"))
+    (folder / "d.toml").write_text(GOOD)
+    (folder / "e.toml").write_bytes(b"\xff\xfe\x00")
+    (folder / "notes.txt").write_text("no preset")
+    found, wrong = read_own_presets()
+    assert sorted(found) == ["basil", "mint"]
+    tea, broken, twice, binary = map(str, wrong)
+    assert "a.toml', line 11, [tea]; unknown key 'colour'; did you mean 'color'?" in tea
+    assert "b.toml" in broken
+    assert "line 1" in broken
+    assert "d.toml'; [mint] is in another file, too" in twice
+    assert "not UTF-8" in binary
+    assert read_own_presets(folder / "none") == ({}, [])
+
+
+def test_own_presets_are_found_by_name_and_listed(folder: Path, run: Run) -> None:
+    with pytest.raises(tl.InputError, match="not a known preset"):
+        tl.preset("Green mint")
+    mint = read_presets(GOOD)["mint"]
+    save_own_preset(Preset(preset_name("Green mint!"), mint.medium, "estimated", "by eye", group="own"))
+    assert tl.preset("green mint").medium == mint.medium
+    (folder / "bad.toml").write_text("[x\n")
+    result = run("presets", "--group", "own")
+    assert [line.split()[0] for line in result.out.splitlines()] == ["name", "green_mint"]
+    assert "bad.toml" in result.err
+    assert run("presets", "--search", "red wine").out.splitlines()[1].startswith("merlot ")
+    assert run("presets", "--group", "paper").code == run("presets", "--search", "paper bag").code == 2
+
+
+@pytest.mark.parametrize("words", ["", "  ", "3 eggs", "§"])
+def test_a_name_begins_with_a_letter(words: str) -> None:
+    with pytest.raises(tl.InputError, match="begin with a letter"):
+        preset_name(words)
+
+
+def test_every_preset_has_a_group_and_a_search_finds_it() -> None:
+    groups = grouped(tl.presets())
+    assert set(groups) == {"food", "glass and liquids", "milk and coffee", "skin", "stone and resin", "wax and soap"}
+    assert sum(map(len, groups.values())) == len(tl.presets())
+    assert set(matching(tl.presets(), "Skin")) >= {"skin1", "skin2"}
+    assert matching(tl.presets(), "measured estimated") == {}

@@ -1,0 +1,187 @@
+"""Adaptive sampling: rays are traced from interfaces where samples of a pixel differ, elsewhere once or a few times."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from translucent.formulas.sampling import sample_shifts
+from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, record_at_eye
+from translucent.gpu.passes.variants import Variants
+from translucent.gpu.shaders import set_uniform
+from translucent.gpu.targets import read_floats
+from translucent.planning.passes import PassName
+
+Floats = npt.NDArray[np.float32]
+
+#: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
+#: that is as good as none, both as shares of the light. With more samples they are smaller.
+CONTRAST, ERROR = 0.1, 0.01
+
+#: Passes of a sample whose results are there, or are not read, when rays are traced from its interfaces.
+_DONE = (PassName.BACKDROP, PassName.CAUSTICS)
+_NEEDED = (PassName.SHADOW_MAPS, PassName.OPAQUE, PassName.INTERFACES, PassName.TRACED)
+
+Run = Callable[[tuple[PassName, ...]], None]
+
+
+class AdaptiveSampling:
+    """Averages over samples in two rounds: what is cheap for every sample, then rays from interfaces where it matters.
+
+    The first round finds for every sample which pixels show an interface, and sums up the light of those that do not:
+    edges are as smooth as ever. The second traces rays; of each pixel, the mean of those traced stands for all of its
+    samples that meet an interface. Opaque objects are seen through interfaces as the mean of all samples shows them.
+
+    Parameters
+    ----------
+    gl : moderngl.Context
+    """
+
+    def __init__(self, gl: moderngl.Context) -> None:
+        vertex = "geometry/fullscreen.vert"
+        units = {"bent_light": 0, "bent_spread": 1, "average_light": 2}
+        self._gl = gl
+        self._unsettled = Variants(gl, vertex, "transport/unsettled.frag", **units)
+        self._part = Variants(gl, vertex, "shade/part_of_mean.frag", sampled=0)
+        self._left = gl.query(samples=True)
+
+    def run(self, job: FrameJob, samples: int, run_passes: Run) -> None:
+        """Sum up the samples of a job; `run_passes` runs its passes, but for some."""
+        clock = _Clock(job, samples)
+        job.targets.average().clear()
+        job.targets.bent().clear()
+        job.bent_apart = True
+        if job.features.has_opaque:
+            job.targets.opaque_mean().clear()
+        for number, shift in enumerate(sample_shifts(samples).tolist()):
+            job.sample, job.samples = number, samples
+            job.place(tuple(shift))
+            run_passes(())
+            if job.features.has_opaque:
+                self._add_opaque(job)
+            clock.outside()
+        job.bending = True
+        leave_out = _left_out(job)
+        # Settled pixels are left out after these; once a few are there, each time that their number has doubled.
+        looks = {1, 4} | {2**i for i in range(3, samples.bit_length())}
+        for number, shift in enumerate(_central_first(samples)):
+            if not number or number in looks:
+                left = self._find_unsettled(job, samples, number)
+                if not left:
+                    break
+                clock.left = left
+            job.sample = number
+            job.place(shift)
+            run_passes(leave_out)
+            clock.bent(number)
+        job.bending = False
+
+    def _add_opaque(self, job: FrameJob) -> None:
+        job.targets.opaque().color_attachments[1].use(0)
+        program = self._part.program()
+        set_uniform(program, "part", 1.0 / job.samples)
+        job.targets.opaque_mean().use()
+        self._add_up()
+        self._part.draw_fullscreen(program)
+
+    def _find_unsettled(self, job: FrameJob, samples: int, taken: int) -> int:
+        """Mark the pixels that need more samples than these; returns how many there are."""
+        mask = job.targets.unsettled()
+        mask.clear()
+        if not job.covered:
+            return 0
+        textures = *job.targets.bent().color_attachments, job.targets.average().color_attachments[0]
+        for unit, texture in enumerate(textures):
+            texture.use(unit)
+        program = self._unsettled.program()
+        finer = min(16.0 / samples, 1.0) ** 0.5
+        values = {"samples": samples, "contrast": CONTRAST * finer, "error": ERROR * finer, "first": taken == 1}
+        for name, value in values.items():
+            set_uniform(program, name, value)
+        mask.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        with self._left:
+            self._unsettled.draw_fullscreen(program)
+        return int(self._left.samples)
+
+    def _add_up(self) -> None:
+        self._gl.enable_only(moderngl.BLEND)
+        self._gl.blend_equation = moderngl.FUNC_ADD
+        self._gl.blend_func = moderngl.ONE, moderngl.ONE
+
+
+def is_adaptive(job: FrameJob, samples: int) -> bool:
+    """Whether rays need not be traced for every sample of a job: from smooth interfaces alone, and not from the eye."""
+    surfaces = [body.surface for body in job.scene.bodies if body.surface is not None]
+    return (
+        samples >= FEW_SAMPLES
+        and job.features.last_pass == PassName.TRACED
+        and not any(record_at_eye(job))
+        and not any(surface.roughness > 0 for surface in surfaces)
+    )
+
+
+def read_averages(job: FrameJob, samples: int) -> tuple[Floats, Floats, Floats]:
+    """Mean radiance (h, w, 3) and transmittance (h, w, 3) over samples, and the share (h, w) that can be trusted."""
+    averages = job.targets.average()
+    light, spread = (read_floats(averages, i, 4) for i in range(2))
+    with np.errstate(under="ignore"):
+        if job.bent_apart:
+            bent, trusted = read_floats(job.targets.bent(), 0, 4), read_floats(job.targets.bent(), 1, 4)[..., 3]
+            standing_for = (np.float32(samples) - light[..., 3]) / np.maximum(bent[..., 3], np.float32(1.0))
+            light[..., :3] += standing_for[..., None] * bent[..., :3]
+            spread[..., 3] += standing_for * trusted
+        count = np.float32(samples)
+        return light[..., :3] / count, spread[..., :3] / count, spread[..., 3] / count
+
+
+def traced_samples(job: FrameJob) -> float:
+    """Mean number of samples for which rays were traced, over the pixels in which they were."""
+    taken = read_floats(job.targets.bent(), 0, 4)[..., 3]
+    return float(taken[taken > 0].mean(dtype=np.float64)) if taken.any() else 0.0
+
+
+def _central_first(samples: int) -> list[tuple[float, float]]:
+    """The shifts of the samples, that nearest to the center of the pixel first: it stands for smooth surroundings."""
+    shifts = sample_shifts(samples)
+    nearest = int(np.argmin(np.square(shifts).sum(axis=1)))
+    shifts[[0, nearest]] = shifts[[nearest, 0]]
+    return [(right, down) for right, down in shifts.tolist()]
+
+
+def _left_out(job: FrameJob) -> tuple[PassName, ...]:
+    """Passes of a sample that tracing its rays does not need."""
+    features = job.features
+    if job.plan.ordered or features.emits or features.scatters or not features.one_interface:
+        return _DONE
+    return tuple(step.name for step in job.plan.passes if step.name not in _NEEDED)
+
+
+class _Clock:
+    """Clock that tells the share of the work that is done, by how long the first samples have taken."""
+
+    def __init__(self, job: FrameJob, samples: int) -> None:
+        self._job, self._samples = job, samples
+        self._begun = time.perf_counter()
+        self._outside = self._first = 0.0
+        self._most = self.left = 0
+
+    def outside(self) -> None:
+        """Tell of a sample whose rays are not traced yet: as if tracing took as long."""
+        self._job.gl.finish()
+        self._job.report(0.5 * (self._job.sample + 1) / self._samples)
+        self._outside = time.perf_counter() - self._begun
+
+    def bent(self, number: int) -> None:
+        """Tell of a sample whose rays have been traced."""
+        self._job.gl.finish()
+        spent = time.perf_counter() - self._begun
+        if not number:
+            self._first, self._most = spent - self._outside, max(self.left, 1)
+        rest = (self._samples - 1 - number) * self._first * self.left / self._most
+        self._job.report(0.5 + 0.5 * (spent - self._outside) / (spent - self._outside + rest))

@@ -1,0 +1,102 @@
+"""Library of materials: the presets of the toolkit and the user's own ones, searched, grouped and saved."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from translucent.errors import InputError
+from translucent.media.own_presets import OWN, preset_name, presets_folder, read_own_presets, save_own_preset
+from translucent.media.preset import Preset
+from translucent.media.presets import grouped, matching, presets
+from translucent.preview.document import Material
+from translucent.preview.scenes import medium_of
+
+#: Seconds between checks whether files of own presets have changed.
+WATCH = 1.0
+
+#: Source of presets that are saved here.
+SAVED = "saved in the previewer"
+
+
+class Library:
+    """Library of materials.
+
+    Parameters
+    ----------
+    refuse : callable
+        Is told what is wrong with files of own presets, once.
+    folder : Path, optional
+        Of own presets. Default: `presets_folder`.
+
+    Attributes
+    ----------
+    search : str
+        Words that presets on show have.
+    """
+
+    def __init__(self, refuse: Callable[[Exception], None], folder: Path | None = None) -> None:
+        self.search = ""
+        self.folder = folder or presets_folder()
+        self._refuse = refuse
+        self._own: dict[str, Preset] = {}
+        self._found: dict[str, list[Preset]] = {}
+        self._searched: str | None = None
+        self._checked = -WATCH
+        self._files: object = None
+
+    def groups(self) -> dict[str, list[Preset]]:
+        """Presets with the words of the search, by their groups; own ones are read again when their files change."""
+        self._refresh()
+        if self._searched != self.search:
+            self._found, self._searched = grouped(matching(self._own | presets(), self.search)), self.search
+        return self._found
+
+    def find(self, name: str) -> Preset | None:
+        """Preset of a name; None if it is gone."""
+        self._refresh()
+        return presets().get(name) or self._own.get(name)
+
+    def save(self, words: str, material: Material) -> tuple[Path, list[str]]:
+        """Save a material as an own preset, and return its file and what no preset keeps.
+
+        Raises
+        ------
+        InputError
+            If there is no name, or one of the toolkit's presets has it.
+        RenderError
+            If it cannot be written.
+        """
+        name = preset_name(words)
+        if name in presets():
+            raise InputError(f"preset {name!r}", "one of the toolkit's has that name", "choose another")
+        medium = medium_of(material)
+        g = float(medium.anisotropy)
+        source = f"{SAVED}, after {material.preset}" if material.preset else SAVED
+        one = Preset(name, medium, "estimated", source, "", (), (g, g, g), False, material.roughness, OWN)
+        path = save_own_preset(one, self.folder)
+        self._checked = -WATCH
+        left_out = ["transmission"] if material.transmission != 1.0 else []
+        left_out += ["dispersion"] if material.dispersion else []
+        return path, left_out
+
+    def _refresh(self) -> None:
+        if time.monotonic() - self._checked < WATCH:
+            return
+        self._checked = time.monotonic()
+        if (files := _files(self.folder)) == self._files:
+            return
+        self._files, self._searched = files, None
+        self._own, wrong = read_own_presets(self.folder)
+        for error in wrong:
+            self._refuse(error)
+
+
+def _files(folder: Path) -> list[tuple[str, int, int]]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted((e.name, e.stat().st_mtime_ns, e.stat().st_size) for e in entries if e.is_file())
+    except OSError:
+        return []
