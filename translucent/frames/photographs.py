@@ -240,7 +240,7 @@ def _measured(picture: Picture, rectangle: Rectangle, what: str) -> _Mean:
     # Rounding to levels is wrong by the same everywhere, unless noise spreads it over several: without, two at most are
     # met, and their variance is at most a quarter of a level squared.
     spread = np.where(kept, (pixels - level) ** 2, 0.0).mean(axis=(0, 1))
-    rounding = np.where(spread < 0.3 * step**2, step**2 / 12.0, 0.0)
+    rounding = np.where(picture.blocks | (spread < 0.3 * step**2), step**2 / 12.0, 0.0)
     return _Mean(level, tiles + rounding, black, saturated)
 
 

@@ -16,12 +16,18 @@ from translucent.scene.environment_files import read_linear
 #: Suffixes of linear pictures.
 LINEAR = (".exr", ".hdr", ".pic")
 
+#: Suffixes of pictures that are rounded by blocks.
+LOSSY = (".jpg", ".jpeg", ".webp")
+
 
 class Picture(NamedTuple):
-    """Linear values (h, w, 3) and the largest level of the file, such as 255; 0 of a linear one, which has none."""
+    """Linear values (h, w, 3), the largest level of the file, such as 255, 0 of a linear one, which has none; and
+    whether the file rounds whole blocks of pixels, as JPEG does, so that noise does not spread the error of that.
+    """
 
     linear: Array
     levels: int
+    blocks: bool = False
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -45,4 +51,4 @@ def read_picture(path: str | Path) -> Picture:
     encoded = read_encoded(path, f"picture {str(path)!r}")
     levels = int(np.iinfo(encoded.dtype).max)
     table = srgb_to_linear(np.arange(levels + 1) / levels).astype(np.float32)
-    return Picture(table[encoded], levels)
+    return Picture(table[encoded], levels, Path(path).suffix.lower() in LOSSY)
