@@ -24,7 +24,6 @@ from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, 
 from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
 from translucent.cpu.vectors import dot, largest, unit
-from translucent.formulas import optics
 from translucent.formulas.diffusion import HAZE_MIRRORED, HAZE_ROUGHNESS
 from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
@@ -225,20 +224,22 @@ class _Growth:
         if emitted is not None:
             self._add(own, emitted)
         if self.tree.diffused:
-            self._add_haze(own, passed, length[inside] * self.caster.radius)
+            self._add_haze(own, passed)
         throughput = beams.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
         return replace(beams, throughput=throughput)
 
-    def _add_haze(self, beams: Beams, passed: Array, length: Array) -> None:
-        """Add what is scattered ahead, over lengths in metres (n,), where diffusion takes it for unscattered."""
+    def _add_haze(self, beams: Beams, passed: Array) -> None:
+        """Add what is scattered ahead, where diffusion takes it for unscattered."""
         ahead = self.tree.diffused.scattered_ahead(self.media.dominant(beams.record))
         hazy = np.flatnonzero(ahead.any(axis=1))
         if hazy.size:
             own, ahead = beams.where(hazy), ahead[hazy]
+            # Of what has passed, as the density counts for both: T^(1 - ahead / extinction).
             extinction = self.media.coefficients(own.record)[0]
-            through = optics.transmittance(np.maximum(extinction - ahead, 0.0) * length[hazy, None])
+            with np.errstate(under="ignore"):
+                through = passed[hazy] ** np.maximum(1.0 - ahead / np.where(extinction > 0.0, extinction, 1.0), 0.0)
             mirrored = 0.5 * HAZE_MIRRORED * self.tree.diffused.mirrored(self.media.dominant(own.record))[:, None]
             behind, before = (
                 self.tree.surroundings.blurred(own, sign * own.directions, HAZE_ROUGHNESS) for sign in (1.0, -1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,7 @@ from scipy import sparse
 from scipy.ndimage import map_coordinates, uniform_filter
 
 from translucent.arrays import Array
+from translucent.diffusion.densities import Densities, densities
 from translucent.diffusion.dimming import dimming_bodies
 from translucent.diffusion.entering import (
     Casters,
@@ -135,7 +137,7 @@ class Entrance:
 
 @dataclass(frozen=True, eq=False)
 class LitBody:
-    """Geometry of a body in which light diffuses; the same for all media and lights.
+    """Geometry and densities of a body in which light diffuses; the same for all media and lights.
 
     Attributes
     ----------
@@ -148,6 +150,11 @@ class LitBody:
     casters: Casters
     sky: Sky
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
+
+    @cached_property
+    def densities(self) -> Densities:
+        """Densities of the body."""
+        return densities(self.casters.body, self.grid)
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Light that enters through this interface; that of the last one is kept."""
@@ -183,7 +190,7 @@ class DiffusingBody:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
         self._entrance = lit.entrance(medium.ior, roughness)
-        self._system = BodySystem(lit.grid, medium, roughness)
+        self._system = BodySystem(lit.grid, medium, roughness, lit.densities)
 
     @np.errstate(under="ignore")
     def field(self, scene: Scene, body: int) -> DiffusionField:
