@@ -24,7 +24,7 @@ from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, 
 from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
 from translucent.cpu.vectors import dot, largest, unit
-from translucent.formulas.diffusion import HAZE_MIRRORED, HAZE_ROUGHNESS
+from translucent.formulas.diffusion import HAZE_ROUGHNESS
 from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
@@ -232,19 +232,17 @@ class _Growth:
 
     def _add_haze(self, beams: Beams, passed: Array) -> None:
         """Add what is scattered ahead, where diffusion takes it for unscattered."""
-        ahead = self.tree.diffused.scattered_ahead(self.media.dominant(beams.record))
+        ahead, far, near = np.moveaxis(self.tree.diffused.haze(self.media.dominant(beams.record)), 1, 0)
         hazy = np.flatnonzero(ahead.any(axis=1))
         if hazy.size:
-            own, ahead = beams.where(hazy), ahead[hazy]
-            # Of what has passed, as the density counts for both: T^(1 - ahead / extinction).
-            extinction = self.media.coefficients(own.record)[0]
+            own, ahead, far, near = beams.where(hazy), ahead[hazy], far[hazy], near[hazy]
+            # Of the optical depth, which varies as the density does, the part by such events does not count.
             with np.errstate(under="ignore"):
-                through = passed[hazy] ** np.maximum(1.0 - ahead / np.where(extinction > 0.0, extinction, 1.0), 0.0)
-            mirrored = 0.5 * HAZE_MIRRORED * self.tree.diffused.mirrored(self.media.dominant(own.record))[:, None]
+                through = passed[hazy] ** (1.0 - ahead)
             behind, before = (
                 self.tree.surroundings.blurred(own, sign * own.directions, HAZE_ROUGHNESS) for sign in (1.0, -1.0)
             )
-            self._add(own, (through - passed[hazy]) * ((1.0 - mirrored) * behind + mirrored * before))
+            self._add(own, (through - passed[hazy]) * (far * behind + near * before))
 
     def _at_surfaces(self, beams: Beams) -> Beams:
         """Cross the surfaces that beams, with their origins there, have come to; what continues from there."""

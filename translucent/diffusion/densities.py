@@ -1,7 +1,7 @@
 """Relative density of a body from cell to cell, below its surface, and on the ways of light that enters.
 
-Lengths count for as much as the density on them: in metres that are stretched so, D and sigma_a are those of the medium,
-and the one-dimensional solutions below the surface hold as they are, however the density varies with depth.
+Lengths count for as much as the density on them: in metres that are stretched so, D and sigma_a are those of the
+medium, and the one-dimensional solutions below the surface hold as they are, however the density varies with depth.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def cell_means(body: Object, grid: BodyGrid) -> Array:
 
 
 def _lengths(sums: Array, dense: Array, piece: Array, integral: Array) -> Array:
-    """Lengths at which integrals are reached by sums (n, s) over pieces (s,) of densities (n, s); beyond all: twice these."""
+    """Lengths (s,) to integrals (s,), by sums (n, s) over pieces (s,) of densities (n, s); beyond all, twice these."""
     number = (sums <= integral).sum(axis=0)
     at = np.minimum(number, len(sums) - 1)
     row = np.arange(len(piece))

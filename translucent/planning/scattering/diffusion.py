@@ -29,8 +29,8 @@ class Diffusion(Scattering):
     The diffusion equation on cells that the mesh cuts, lit by what enters: the environment and lights, shadowed by the
     body and by opaque objects, and light of the body that falls on it again. Solved on the CPU where the light, the
     medium or the mesh changes; a picture then takes two look-ups. Light that passes unscattered is seen along rays as
-    ever. Where the density varies, it does so from cell to cell; without an interface, as in clouds, rays gather what is
-    scattered into them on their way, from a solution by discrete ordinates that diffusion accelerates.
+    ever. Where the density varies, it does so from cell to cell. Without an interface, as in clouds, rays gather what
+    is scattered into them on their way, from a solution by discrete ordinates that diffusion accelerates.
 
     Parameters
     ----------
