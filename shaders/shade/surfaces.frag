@@ -37,8 +37,8 @@ layout(location = 1) out vec4 out_transmittance;
 
 struct Crossing {
     vec3 light;
-    vec3 passed;      // transmittance along the refracted ray
-    float thickness;  // metres inside media along it
+    vec3 optical_depth;  // along the refracted ray
+    float thickness;     // metres inside media along it
 };
 
 // The straight ray's path and optical depth.
@@ -56,7 +56,7 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     vec3 passed = transmittance(straight.optical_depth);
     float blur = finish.roughness * sqrt(0.5 * abs(1.0 - 1.0 / ior));
     vec3 light = passed * radiance_beyond(point, refracted_direction(ray, normal, ior), blur);
-    return Crossing(light, passed, straight.thickness);
+    return Crossing(light, straight.optical_depth, straight.thickness);
 }
 #else
 // Light that crosses the first interval along a refracted ray; the media there are taken to be mixed as along the straight one.
@@ -66,9 +66,10 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     vec3 beyond = point + leaving.path * inside;
     Crossing result;
     result.thickness = max(straight.thickness + leaving.path - straight.first_interval, 0.0);
-    result.passed = transmittance(straight.optical_depth * (result.thickness / max(straight.thickness, 1e-30)));
+    result.optical_depth = straight.optical_depth * (result.thickness / max(straight.thickness, 1e-30));
+    vec3 passed = transmittance(result.optical_depth);
     if (leaving.stopped) {
-        result.light = leaving.stop * result.passed;
+        result.light = leaving.stop * passed;
         return result;
     }
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
@@ -76,11 +77,11 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     float blur = refraction_roughness(finish.roughness, ior);
     // What the far interface keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
     // where it is mirrored to. Light that scatters on the way comes out all the same where media give it back.
-    vec3 again = finish.scatters_much ? vec3(1.0) : result.passed;
+    vec3 again = finish.scatters_much ? vec3(1.0) : passed;
     result.light = kept * again * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
     if (kept < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
-    result.light *= result.passed;
+    result.light *= passed;
     return result;
 }
 #endif
@@ -89,7 +90,7 @@ Crossing crossed(Finish finish, vec3 point, vec3 normal, vec3 ray, bool enters, 
     if (finish.is_sheet || straight.first_interval < 0.0) {
         vec3 passed = transmittance(straight.optical_depth);
         float blur = refraction_roughness(finish.roughness, finish.ior);
-        return Crossing(passed * radiance_beyond(point, ray, blur), passed, straight.thickness);
+        return Crossing(passed * radiance_beyond(point, ray, blur), straight.optical_depth, straight.thickness);
     }
     if (finish.dispersion == 0.0) { return refracted(finish, point, normal, ray, finish.ior, enters, straight); }
     vec3 iors = channel_iors(finish.ior, finish.dispersion);
@@ -160,9 +161,14 @@ void main() {
 #endif
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;
-        if (finish.scatters_much) { light += scattered_out(finish, point, normal, crossing.thickness, crossing.passed); }
+        if (finish.scatters_much) {
+            light += scattered_out(finish, point, normal, crossing.thickness, transmittance(crossing.optical_depth));
+        }
 #if DIFFUSED
-        light += diffused_out(int(surface.x + 0.5), point, starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior));
+        int object = int(surface.x + 0.5);
+        light += diffused_out(object, point, starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior));
+        vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, finish.ior);
+        light += haze(object, inside, crossing.optical_depth);
 #endif
         light *= finish.transmission * finish.color;
     }

@@ -241,8 +241,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 #if DIFFUSED
             if (before != AIR) {
                 sum.light += ray.share * diffused_out(before, ray.origin, clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0));
-                vec3 ahead = transmittance(max(filling.extinction - scattered_ahead(before), 0.0) * path) - passed;
-                if (strength(ahead) > 0.0) { sum.light += ray.share * ahead * haze(before, ray.direction); }
+                sum.light += ray.share * haze(before, ray.direction, filling.extinction * path);
             }
 #endif
             ray.share *= passed;

@@ -13,6 +13,7 @@ optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 19
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy import sparse
 
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
+from translucent.diffusion.densities import Densities, even_densities
 from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
@@ -74,7 +76,7 @@ class _Layer:
 
     u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
     the flux to the surface D u' / u times it. All are given times exp(-k d), d the depth of reading, so that nothing
-    overflows however dense the medium.
+    overflows however dense the medium. Depths are integrals of the density.
     """
 
     depth: Array
@@ -116,15 +118,19 @@ class BodySystem:
         In channels in which it does not scatter nothing is found.
     roughness : float
         Of its surface.
+    dense : Densities, optional
+        Of the body; default: `even_densities`.
     """
 
     @np.errstate(under="ignore")
-    def __init__(self, grid: BodyGrid, medium: Medium, roughness: float) -> None:
+    def __init__(self, grid: BodyGrid, medium: Medium, roughness: float, dense: Densities | None = None) -> None:
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         ways = _first_ways(grid, medium.ior)
+        dense = dense or even_densities(grid)
+        deep = _DeepWays(dense, ways, dense.lengths(ways))
         self._channels = {
-            channel: _Channel(grid, medium.ior, roughness, float(absorption), float(scattering), ways)
+            channel: _Channel(grid, medium.ior, roughness, float(absorption), float(scattering), deep)
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
             if scattering > 0.0
         }
@@ -157,6 +163,15 @@ class BodySystem:
         return SurfaceLight(fluence, flux, cells, steps)
 
 
+@dataclass(frozen=True, eq=False)
+class _DeepWays:
+    """Ways (s, 3) of light below the samples of a body, and metres on them for integrals of its density (s,)."""
+
+    dense: Densities
+    directions: Array
+    length: Callable[[Array], Array]
+
+
 class _Channel:
     """The linear system of one channel."""
 
@@ -167,7 +182,7 @@ class _Channel:
         roughness: float,
         absorption: float,
         scattering: float,
-        ways: Array,
+        deep: _DeepWays,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
         self._exit_share = interface.exit_share
@@ -175,23 +190,26 @@ class _Channel:
         extinction = absorption + scattering
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
-        self._read, depth = grid.below
+        self._read, depth = grid.below[0], deep.dense.depth
         layer = _Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
         self._relative = 1.0 / layer.u(depth)
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
         # What of the entering light the exact half-space gives back less than diffusion would.
         self._excess = _half_space_excess(self._albedo, ior) / diffuse_interface(ior).conductance
-        self._sources(layer, interface, extinction, ways, d)
+        self._sources(layer, interface, extinction, deep, d)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
         self._glow_near = layer.bend() / d * self._relative
         below = grid.area * (layer.rise(depth) + layer.condition * layer.bend()) * self._relative
-        self._glow_cells = grid.cores + self._read.T @ below
+        self._glow_cells = deep.dense.cells * grid.cores + self._read.T @ below
         lost = grid.area * d * layer.slope() * self._relative
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
-        self._cells = CellSystem(grid, np.full(grid.count, d), absorption * absorbing, lost)
+        absorbed = absorption * deep.dense.cells * absorbing
+        self._cells = CellSystem(grid, deep.dense.diffusion_coefficients(d), absorbed, lost)
 
-    def _sources(self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: Array, d: float) -> None:
+    def _sources(
+        self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: _DeepWays, d: float
+    ) -> None:
         """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
         grid, count = self._grid, len(self._grid.points)
         # Shares of the light that is scattered above the depth of reading, and below it.
@@ -207,9 +225,9 @@ class _Channel:
         # Interpolation by chance: each place stands for the cell around it.
         spread = grid.cells.step * (box_points(count) - 0.5)
         for quantile in _tails(count) if below.max() > _NOTHING else ():
-            path = slant - np.log1p(-quantile) / extinction
+            path = ways.length(slant - np.log1p(-quantile) / extinction)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
-            cell, inside = grid.cell_at(grid.points + path[:, None] * ways + spread)
+            cell, inside = grid.cell_at(grid.points + path[:, None] * ways.directions + spread)
             share = self._albedo / DEEP_EVENTS * below * inside
             deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
         sources = deep + sparse.diags_array(into_cells) @ self._read

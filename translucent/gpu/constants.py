@@ -6,7 +6,7 @@ from typing import get_args
 
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import HAZE_MIRRORED, HAZE_ROUGHNESS
+from translucent.formulas.diffusion import HAZE_ROUGHNESS
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.spherical_harmonics import BAND_0, BAND_1, BAND_2, BAND_2_ZONAL
 from translucent.formulas.tone import (
@@ -69,7 +69,6 @@ CONSTANTS: dict[str, str] = {
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
     "HAZE_ROUGHNESS": repr(HAZE_ROUGHNESS),
-    "HAZE_MIRRORED": repr(HAZE_MIRRORED),
     "DENSITY_GRID": "1.0",
     "DENSITY_LINEAR": "2.0",
     "DENSITY_EXPONENTIAL": "3.0",

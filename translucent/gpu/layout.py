@@ -234,7 +234,9 @@ SURFACE_ROW = PackedTable(
         ("emergent_fluxes", "f4", (4,)),
         ("exit_share", "f4", ()),
         ("mean_cosine", "f4", ()),
-        ("scattered_ahead", "f4", (3,)),  # part of its extinction, in 1/m
+        ("ahead", "f4", (3,)),  # share of its extinction by light that is scattered ahead
+        ("haze_far", "f4", (3,)),  # share of that light which leaves where a ray does,
+        ("haze_near", "f4", (3,)),  # and on the other side
     ),
 )
 

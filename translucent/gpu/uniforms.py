@@ -282,7 +282,9 @@ _NO_DIFFUSION: dict[str, npt.ArrayLike] = {
     "emergent_fluxes": 0.0,
     "exit_share": 0.0,
     "mean_cosine": 1.0,
-    "scattered_ahead": 0.0,
+    "ahead": 0.0,
+    "haze_far": 0.0,
+    "haze_near": 0.0,
 }
 
 
