@@ -259,6 +259,9 @@ class SceneHierarchies:
             "emissive": np.asarray(surface.emissive),
             "metallic": surface.metallic,
             "one_sided": float(not surface.double_sided),
+            "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+            "clearcoat": surface.clearcoat,
+            "clearcoat_roughness": surface.clearcoat_roughness,
         }
 
     def release(self) -> None:

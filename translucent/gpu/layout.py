@@ -229,6 +229,9 @@ SURFACE_ROW = PackedTable(
         ("exit_share", "f4", ()),
         ("mean_cosine", "f4", ()),
         ("scattered_ahead", "f4", (3,)),  # part of its extinction, in 1/m
+        ("clearcoat", "f4", ()),
+        ("film", "f4", (3,)),  # share of the surface that has it, its ior, and metres
+        ("clearcoat_roughness", "f4", ()),
     ),
 )
 
@@ -265,6 +268,9 @@ TRACED_BODY = PackedTable(
         ("slot", "f4", ()),  # the same for objects of one medium
         ("anisotropy", "f4", ()),
         ("scattering", "f4", (3,)),
+        ("clearcoat", "f4", ()),
+        ("film", "f4", (3,)),  # as in `SURFACE_ROW`
+        ("clearcoat_roughness", "f4", ()),
     ),
 )
 

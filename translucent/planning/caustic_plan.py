@@ -95,4 +95,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
     ]
     if any(body.medium is not None and body.medium.scatters for body in scene.bodies):
         texts.append("caustics in media that scatter, and photons that they scatter")
+    surfaces = [body.surface for body in scene.bodies if body.surface is not None]
+    if any(surface.iridescence or surface.clearcoat for surface in surfaces):
+        texts.append("what thin films and clear coats change in caustics")
     return tuple(Note(NoteKind.CAUSTICS, text) for text in texts)

@@ -7,7 +7,7 @@ import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.variants import Variants, look_switches
+from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
 from translucent.gpu.scene_view import SceneView
 from translucent.gpu.shaders import set_uniform
@@ -52,7 +52,7 @@ class OpaquePass:
                     WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **common
                 )
             else:
-                looks = look_switches(job.scene.objects[i])
+                looks = look_switches(job.scene.objects[i]) | coat_switches([job.scene.objects[i]])
                 program = self._finished.program(SURFACE=1, **common, **looks)
                 self._maps.bind(job)
                 self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
@@ -76,7 +76,9 @@ class OpaquePass:
                 switches = {"WITH_NORMAL": 1, "WITH_POSITION": 1, "SURFACE": 0, "VERTEX_COLORS": 0, "OCCLUSION": 0}
                 program = self._plain.program(**switches, **common)
             else:
-                program = self._finished.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))
+                program = self._finished.program(
+                    SURFACE=1, **common, **look_switches(view.scene.objects[i]), **coat_switches(())
+                )
                 self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
             view.draw(program, (i,))
 
@@ -119,6 +121,8 @@ class FinishMaps:
             "opaque_emissive": tuple(np.asarray(surface.emissive)),
             "opaque_passed": (*passed, surface.double_sided),
             "opaque_passed_share": surface.diffuse_transmission,
+            "opaque_film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+            "opaque_clearcoat": (surface.clearcoat, surface.clearcoat_roughness),
         }
         for name, value in values.items():
             if name in program:  # not all are where an object only glows, or only its depth is needed
