@@ -87,7 +87,7 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
 #endif
     Layer coat = layer_of(facing, table);
     Layer metal = layer_of(facing_metal, table);
-    float painted = (1.0 - finish.metallic) * (1.0 - max(coat.mirrored.r, max(coat.mirrored.g, coat.mirrored.b)));
+    vec3 painted = (1.0 - finish.metallic) * (1.0 - coat.mirrored);
     vec3 paint = finish.base * (1.0 - finish.passed_share);
 
     vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)

@@ -2,11 +2,11 @@
 
 Each has a twin in ``shaders/lib/thin_film.glsl``.
 
-All functions are pure and broadcast; results are linear Rec.709 (..., 3). A film so thin that light reflected at its two
-sides interferes is colored, as soap bubbles and oxide layers are. Amplitudes are exact (Fresnel, both polarizations);
-what spectra do to colors is in Gaussians of the wave number, fitted to the sensitivity of the eye, in whose Fourier
-transforms each order of the interference is a closed form. A film without an effect on gray light stays gray: the light
-of the environment is that of equal energy, adapted to the white of Rec.709.
+All functions are pure and broadcast; results are linear Rec.709 (..., 3). A film so thin that light reflected at its
+two sides interferes is colored, as soap bubbles and oxide layers are. Amplitudes are exact (Fresnel, both
+polarizations); what spectra do to colors is in Gaussians of the wave number, fitted to the sensitivity of the eye, in
+whose Fourier transforms each order of the interference is a closed form. Light has equal energy at all wavelengths, and
+is adapted to the white of Rec.709, so that a film which reflects all of them alike is gray.
 
 References
 ----------
