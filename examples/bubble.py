@@ -2,8 +2,8 @@
 Soap bubbles over a glazed dish: thin films and clear coats
 ===========================================================
 
-Light that is reflected at both sides of a film some hundred nanometres thick interferes, and the film is colored. A soap
-bubble is a sheet around air with such a film, a dish has one between a clear coat and its glaze.
+Light that is reflected at both sides of a film some hundred nanometres thick interferes, and the film is colored. A
+soap bubble is a sheet around air with such a film, a dish has one between a clear coat and its glaze.
 """
 
 import os
@@ -18,11 +18,16 @@ import translucent as tl
 # bubble has the index 1: all that it mirrors, the film does. Films of soap get thinner with time.
 
 
+ball = trimesh.creation.icosphere(subdivisions=4)
+sphere = tl.Mesh(ball.vertices, ball.faces, name="bubble")
+
+
 def bubble(center: tuple[float, float, float], radius: float, nanometres: float) -> tl.Object:
-    ball = trimesh.creation.icosphere(subdivisions=5, radius=radius)
+    """A bubble of a film that is so many nanometres thick."""
+    place = np.diag([radius, radius, radius, 1.0])
+    place[:3, 3] = center
     soap = tl.Surface(iridescence=1.0, iridescence_ior=1.33, iridescence_thickness=nanometres * 1e-9)
-    mesh = tl.Mesh(ball.vertices + center, ball.faces, name=f"bubble of {nanometres:g} nm")
-    return tl.Object(mesh, tl.Medium(), sheet_thickness=1e-6, surface=soap)
+    return tl.Object(sphere, tl.Medium(), place, sheet_thickness=1e-6, surface=soap)
 
 
 bubbles = [
@@ -34,10 +39,10 @@ bubbles = [
 # %%
 # The dish is opaque: dark blue glaze under the film, and a clear coat over all of it.
 
-angle = np.linspace(0.0, np.pi / 2.6, 24)
+angle = np.linspace(0.0, np.pi / 2.6, 16)
 inner = np.column_stack([0.11 * np.sin(angle), 0.11 * (1.0 - np.cos(angle))])
 profile = np.concatenate([inner, (inner + [0.004, -0.004])[::-1], [[0.0, -0.004]]])
-turned = trimesh.creation.revolve(profile, sections=128)
+turned = trimesh.creation.revolve(profile, sections=96)
 glaze = tl.Surface(
     color=(0.01, 0.02, 0.06),
     roughness=0.35,
@@ -49,8 +54,8 @@ glaze = tl.Surface(
 dish = tl.Object(tl.Mesh(turned.vertices[:, [0, 2, 1]], turned.faces[:, ::-1], name="dish"), surface=glaze)
 
 # %%
-# Rays are traced, so that bubbles mirror the dish and show their far sides. Films cost only where they are: without one,
-# nothing of them is in any shader.
+# Rays are traced, so that bubbles mirror the dish and show their far sides. Films cost only where they are: without
+# one, nothing of them is in any shader.
 
 dark = tl.Environment.constant((0.03, 0.03, 0.04))
 scene = tl.Scene(

@@ -186,11 +186,12 @@ class CausticsPass:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<="
         unshadowed = shadow_switches(False, job.resources)
+        bare = unshadowed | coat_switches(())
         for i in objects[::-1]:
             body = job.scene.objects[i]
             if (surface := body.surface) is None:
                 program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **unshadowed
+                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **bare
                 )
             else:
                 program = self._finished.program(

@@ -49,7 +49,13 @@ class OpaquePass:
         for i in spec.objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **common
+                    WITH_NORMAL=1,
+                    WITH_POSITION=1,
+                    SURFACE=0,
+                    VERTEX_COLORS=0,
+                    OCCLUSION=0,
+                    **common,
+                    **coat_switches(()),
                 )
             else:
                 looks = look_switches(job.scene.objects[i]) | coat_switches([job.scene.objects[i]])
@@ -69,16 +75,14 @@ class OpaquePass:
         framebuffer.use()
         view.gl.enable_only(moderngl.DEPTH_TEST)
         common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "PROJECTED_DEPTH": projected}
-        common |= {"SHADOW_MAPS": False, "SHADOW_SPECTRAL": False}
+        common |= {"SHADOW_MAPS": False, "SHADOW_SPECTRAL": False} | coat_switches(())
         for i in objects:
             surface = view.scene.objects[i].surface
             if surface is None or not surface.alpha_cutoff:
                 switches = {"WITH_NORMAL": 1, "WITH_POSITION": 1, "SURFACE": 0, "VERTEX_COLORS": 0, "OCCLUSION": 0}
                 program = self._plain.program(**switches, **common)
             else:
-                program = self._finished.program(
-                    SURFACE=1, **common, **look_switches(view.scene.objects[i]), **coat_switches(())
-                )
+                program = self._finished.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))
                 self._maps.set_finish(view, program, surface, surface.alpha_cutoff)
             view.draw(program, (i,))
 
