@@ -129,7 +129,14 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     vec3 color = paint_color(body, point);
     if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
     OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
-        body.emissive, normal, 0.0, 1.0, 1.0, false);
+        body.emissive, normal, 0.0, 1.0, 1.0, false
+#if THIN_FILM
+        , body.film
+#endif
+#if CLEAR_COAT
+        , vec2(body.clearcoat, body.clearcoat_roughness)
+#endif
+    );
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
 
@@ -293,6 +300,10 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         float transmission = as_first ? seen.finish.transmission : body.transmission;
         vec3 tint = as_first ? seen.finish.color : body.color;
         float alpha = roughness * roughness;
+#if CLEAR_COAT
+        vec3 coat_normal = smooth_normal;
+        bool polished = roughness == 0.0;
+#endif
 #if MICROFACETS
         vec3 facet, facet_normal;
         float facet_alpha = 0.0, full_alpha = 0.0;
@@ -310,6 +321,11 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         float reflectance = interface_reflectance(cosine, ior, roughness);
         vec3 share_back = vec3(reflectance);
         vec3 share_on = vec3(1.0 - reflectance);
+#if THIN_FILM
+        vec3 filmed = filmed_reflectance(body.film, reflectance, cosine, ior, index_of(before, channel));
+        share_back = filmed;
+        share_on = 1.0 - filmed;
+#endif
         vec3 on_way = ray.direction;
         if (kind == KIND_SHEET) {
             float through = 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
@@ -317,10 +333,19 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 #if EMISSION
             // What a sheet emits goes back and forth in it, too.
             vec3 leaving = (1.0 - reflectance) / max(1.0 - reflectance * transmittance(depth), vec3(1e-6));
+#if THIN_FILM
+            vec3 mirrored_on = reflectance * transmittance(depth);
+            leaving = (1.0 - filmed) * (1.0 + mirrored_on) / max(1.0 - filmed * transmittance(depth) * mirrored_on, vec3(1e-6));
+#endif
             sum.light += ray.share * leaving * emitted_radiance(body.emission, body.extinction, through);
 #endif
+#if THIN_FILM
+            share_back = film_slab_reflectance(filmed, reflectance, depth);
+            share_on = film_slab_transmittance(filmed, reflectance, depth);
+#else
             share_back = slab_reflectance(reflectance, depth);
             share_on = slab_transmittance(reflectance, depth);
+#endif
         } else {
             on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
         }
@@ -333,6 +358,21 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
         }
 #endif
         vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
+#if CLEAR_COAT
+        if (body.clearcoat > 0.0 && (outside || kind == KIND_SHEET)) {
+            float coated = coated_share(vec2(body.clearcoat, body.clearcoat_roughness), clamp(-dot(coat_normal, ray.direction), 0.0, 1.0));
+            share_back *= 1.0 - coated;
+            share_on *= 1.0 - coated;
+            if (polished && body.clearcoat_roughness == 0.0) {
+                share_back += coated;
+            } else {
+                float coat_alpha = body.clearcoat_roughness * body.clearcoat_roughness;
+                vec3 coat_way = kept_on_side(reflected_direction(ray.direction, coat_normal), face_normal);
+                sum.light += (first ? seen.finish.unoccluded : 1.0) * coated * ray.share
+                    * environment_seen(point, coat_way, true, ray.blur + coat_alpha * coat_alpha);
+            }
+        }
+#endif
 #if PAINTED
         if (transmission < 1.0 && enters) {
             Finish finish = seen.finish;
@@ -479,7 +519,13 @@ void main() {
     if (front.w < NOTHING && !starts_inside) {
         float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
         share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
-        light += highlights(seen.point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
+        vec3 glints = highlights(seen.point, front.xyz, direction, finish, highlight_alpha(finish.roughness, surface.w));
+#if CLEAR_COAT
+        float below = 1.0 - coated_share(finish.clearcoat, cosine);
+        share *= below;
+        glints = below * glints + coat_highlights(seen.point, front.xyz, direction, finish, surface.w);
+#endif
+        light += glints;
     }
 #if !EMISSION
     light += share * emitted;

@@ -25,6 +25,7 @@ from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
 from translucent.cpu.vectors import dot, largest, unit
 from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.interface import reflected_direction
 from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
@@ -296,6 +297,7 @@ class _Growth:
         """Branches that are followed from interfaces; `there` are the records behind these."""
         met = self.interfaces.meet(beams, places, self.pixel[beams.owner], self.spread)
         self._add(beams, self.light.radiance(self._rays(beams), met))
+        self._add_coats(beams, met)
         beams = replace(beams, met=beams.met + 1)
         back, on = self._both(beams, there, met, places.before == places.after)
         if self.tree.diffused:
@@ -318,6 +320,15 @@ class _Growth:
             self._look_up(branch.where(exists & ~follow))
             kept.append(branch.where(follow))
         return kept
+
+    def _add_coats(self, beams: Beams, met: Meetings) -> None:
+        """Add the environment as clear coats mirror it that are not as rough as what is below."""
+        coated = np.flatnonzero(met.coated)
+        if coated.size:
+            own = beams.where(coated)
+            ways = reflected_direction(own.directions, met.normals[coated])
+            mirrored = self.tree.surroundings.blurred(own, ways, met.coat_roughness[coated])
+            self._add(own, met.coated[coated, None] * mirrored)
 
     def _both(self, beams: Beams, there: Record, met: Meetings, sheet: Mask) -> tuple[Beams, Beams]:
         """Reflected and refracted branches at interfaces, those of sheets included; some carry no light."""

@@ -306,5 +306,8 @@ def _surface_row(
         "stream_absorption": np.minimum(stream[0], limit),
         "inner_mirror": diffuse_interface(medium.ior).reflected,
         "stream_scattering": np.minimum(stream[1], limit),
+        "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+        "clearcoat": surface.clearcoat,
+        "clearcoat_roughness": surface.clearcoat_roughness,
         **(_NO_DIFFUSION if diffused is None else diffused),
     }
