@@ -203,6 +203,7 @@ class _Window:
         from translucent.preview.panels.material import material_panel
         from translucent.preview.panels.messages import messages_panel
         from translucent.preview.panels.method import method_panel
+        from translucent.preview.panels.tree import scene_panel
         from translucent.preview.panels.viewport import viewport_panel
 
         docking = hello_imgui.DockingParams()
@@ -216,6 +217,7 @@ class _Window:
             ("Viewport", "MainDockSpace", viewport_panel),
             ("Material", "Left", material_panel),
             ("Library", "Left", library_panel),
+            ("Scene", "Left", scene_panel),
             ("Method", "Right", method_panel),
             ("Look", "Right", look_panel),
             ("Environments", "Right", environments_panel),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from translucent.preview.desk import FAINT, Desk, em
+from translucent.preview.hiding import hide, isolate, show_all
 
 #: What mouse and keys do.
 KEYS = (
@@ -13,6 +14,8 @@ KEYS = (
     ("wheel", "zoom to the cursor"),
     ("click", "select an object, whose material the panels then change"),
     ("F", "frame the model, or the selected object"),
+    ("H, Alt H", "hide the selected object; show all"),
+    ("I", "isolate the selected object; all again"),
     ("O", "orthographic or perspective"),
     ("C", "converge: path trace the still picture"),
     ("P", "photons: caustics in the still picture"),
@@ -69,6 +72,12 @@ def handle_keys(desk: Desk) -> None:
         return
     if imgui.is_key_pressed(imgui.Key.f):
         desk.frame()
+    if imgui.is_key_pressed(imgui.Key.h) and io.key_alt:
+        show_all(desk)
+    elif imgui.is_key_pressed(imgui.Key.h) and desk.target is not None:
+        hide(desk, desk.target)
+    if imgui.is_key_pressed(imgui.Key.i) and desk.target is not None:
+        isolate(desk, desk.target)
     if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
         desk.change("display.converge", not desk.get("display.converge"), step=True)
     if imgui.is_key_pressed(imgui.Key.p):
