@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from translucent.errors import InputError
 from translucent.preview.actions import Pan, Turn, Zoom
@@ -92,9 +92,12 @@ class Script:
     ----------
     steps : list of Step
         Those that are still to be done, the next one last.
+    remembers : bool
+        Whether the window remembers what windows without a script remember.
     """
 
     steps: list[Step]
+    remembers: ClassVar[bool] = False
     _frames: int = 0
     _waiting: float | None = None
     _until: float = 0.0
