@@ -43,7 +43,7 @@ from translucent.preview.script import Script
 Waiting = Iterator[None]
 
 #: Seconds after which something that was to happen has not, and frames for what a click does to be seen.
-PATIENCE, FRAMES = 120.0, 4
+PATIENCE, FRAMES = 300.0, 4
 
 #: Widgets whose places are noted, by their labels.
 WIDGETS = ("button", "small_button", "selectable", "checkbox", "invisible_button", "slider_float", "color_edit3")
@@ -417,7 +417,8 @@ def undo_ten(a: Artist) -> Waiting:
     require(before >= 10, f"{before} steps to undo")
     for _ in range(10):
         yield from a.hand.key("ctrl+z")
-    require(len(a.desk.work.history.past) == before - 10, "ten steps are undone")
+    undone = before - len(a.desk.work.history.past)
+    require(undone == 10, f"ten steps are undone, not {undone}")
     require(a.document.material.roughness == 0.0, "roughness is as it was")
 
 
@@ -517,6 +518,8 @@ def find_again(a: Artist) -> Waiting:
 TASKS: dict[str, Callable[[Artist], Waiting]] = {
     "open": open_file,
     "frame": frame,
+    "png with alpha": save_png,
+    "turntable": save_turntable,
     "preset by picture": preset_by_picture,
     "drag color": drag_color,
     "distance in mm": distance,
@@ -524,8 +527,6 @@ TASKS: dict[str, Callable[[Artist], Waiting]] = {
     "probe": probe,
     "reference": read_reference,
     "bake": bake,
-    "png with alpha": save_png,
-    "turntable": save_turntable,
     "undo ten times": undo_ten,
     "second file": open_second,
     "two materials": assign_two,

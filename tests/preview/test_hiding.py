@@ -5,18 +5,22 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import translucent as tl
 from tests.preview.test_library import two_bodies
 from tests.preview.waiting import wait
+from translucent.geometry.solids import Box
 from translucent.preview.actions import Hide, Open, apply
 from translucent.preview.document import Document, Orbit
 from translucent.preview.history import History
+from translucent.preview.loaded import Loaded
 from translucent.preview.recipes import Shot, command_line, python_code
-from translucent.preview.scenes import scene_of
+from translucent.preview.scenes import material_of, scene_of
 from translucent.preview.session import from_table, load_session, save_session, to_table
 from translucent.preview.workspace import Workspace
+from translucent.scene.showcase import DEFAULT_COLOR, DEFAULT_REACH
 
 SEEN = dataclasses.replace(Document(), orbit=Orbit())
 
@@ -67,3 +71,14 @@ def test_an_object_is_isolated_and_the_last_one_is_not_hidden(work: Workspace) -
     assert work.document.hidden == ()
     work.do(Hide((0, 1, 2)))
     assert work.document.hidden == (), "a picture of nothing is none"
+
+
+def test_a_model_of_opaque_objects_is_filled_with_what_is_seen(tmp_path: Path) -> None:
+    """And not with a medium that does nothing: its objects would be invisible."""
+    box = Box().tessellate()
+    scene = tl.Scene([tl.Object(box)], tl.Camera.look_at((0, 0, 5), (0, 0, 0)))
+    loaded = Loaded(Document().model, scene, material_of(scene))
+    filled = scene_of(dataclasses.replace(SEEN, material=loaded.material), loaded).objects[0].medium
+    assert filled is not None
+    left = filled.transmittance(DEFAULT_REACH * scene.diagonal)
+    assert np.allclose(left, DEFAULT_COLOR)

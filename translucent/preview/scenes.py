@@ -31,7 +31,9 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
     diagonal = scene.diagonal or 1.0
     body = fillable(scene)[0] if number is None else scene.objects[number]
     if body.medium is None or body.covers:
-        return Material(color=DEFAULT_COLOR, distance=DEFAULT_REACH * diagonal, thickness=0.1 * diagonal)
+        reach = DEFAULT_REACH * diagonal
+        red, green, blue = Medium.from_color(DEFAULT_COLOR, reach).absorption.tolist()
+        return Material(color=DEFAULT_COLOR, distance=reach, absorption=(red, green, blue), thickness=0.1 * diagonal)
     medium, surface = body.medium or Medium(), body.surface or Surface()
     reach = DEFAULT_REACH * diagonal
     # Where the showcase states it; if that is too dark or too bright to tell, where 1/e is left.

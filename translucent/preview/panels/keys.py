@@ -70,25 +70,25 @@ def handle_keys(desk: Desk) -> None:
         desk.keys_shown = not desk.keys_shown
     if desk.keys_shown:
         return
-    if imgui.is_key_pressed(imgui.Key.f):
+    if imgui.is_key_pressed(imgui.Key.f, False):
         desk.frame()
-    if imgui.is_key_pressed(imgui.Key.h) and io.key_alt:
+    if imgui.is_key_pressed(imgui.Key.h, False) and io.key_alt:
         show_all(desk)
-    elif imgui.is_key_pressed(imgui.Key.h) and desk.target is not None:
+    elif imgui.is_key_pressed(imgui.Key.h, False) and desk.target is not None:
         hide(desk, desk.target)
-    if imgui.is_key_pressed(imgui.Key.i) and desk.target is not None:
+    if imgui.is_key_pressed(imgui.Key.i, False) and desk.target is not None:
         isolate(desk, desk.target)
-    if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
+    if imgui.is_key_pressed(imgui.Key.c, False) and not io.key_ctrl:
         desk.change("display.converge", not desk.get("display.converge"), step=True)
-    if imgui.is_key_pressed(imgui.Key.p):
+    if imgui.is_key_pressed(imgui.Key.p, False):
         desk.change("display.caustics", not desk.get("display.caustics"), step=True)
     if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
         (desk.work.redo if io.key_shift else desk.work.undo)()
     elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
         desk.work.redo()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o):
+    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o, False):
         desk.ask_file("open")
-    elif imgui.is_key_pressed(imgui.Key.o) and desk.work.document.orbit is not None:
+    elif imgui.is_key_pressed(imgui.Key.o, False) and desk.work.document.orbit is not None:
         desk.change("orbit.orthographic", not desk.get("orbit.orthographic"), step=True)
 
 

@@ -6,10 +6,10 @@ from imgui_bundle import ImVec2, imgui
 
 from translucent.preview.actions import Assign
 from translucent.preview.desk import FAINT, Desk, em, tooltip, wrapped
-from translucent.preview.document import Material
+from translucent.preview.document import Material, Triple
 from translucent.preview.hiding import hide, isolate, show_all
 from translucent.preview.numbers import to_display
-from translucent.preview.panels.library import PRESET
+from translucent.preview.panels.library import PRESET, seen_color
 
 TIP = "Click: select, for the Material and Library panels. Double click: frame. Right click: more."
 
@@ -93,12 +93,20 @@ def _material(desk: Desk, number: int, own: bool) -> None:
     if desk.objects[number].medium is None and not own and desk.work.document.material.source == "file":
         return imgui.text_colored(FAINT, "opaque")
     material = desk.material_of(number)
-    red, green, blue = to_display(material.color)
     flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_inputs
-    imgui.color_button("##color", imgui.ImVec4(red, green, blue, 1.0), flags, ImVec2(em(1.0), em(1.0)))
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + (imgui.get_frame_height() - em(1.0)) / 2)
+    imgui.color_button("##color", imgui.ImVec4(*_color(desk, material), 1.0), flags, ImVec2(em(1.0), em(1.0)))
     imgui.same_line()
     text = _told(material)
     return imgui.text(text) if own else imgui.text_colored(FAINT, text)
+
+
+def _color(desk: Desk, material: Material) -> Triple:
+    """Encode the color in which a material is seen in sRGB."""
+    if (found := desk.work.library.find(material.preset)) is None:
+        return to_display(material.color)
+    text = seen_color(found)
+    return int(text[1:3], 16) / 255.0, int(text[3:5], 16) / 255.0, int(text[5:7], 16) / 255.0
 
 
 def _told(material: Material) -> str:
