@@ -3,8 +3,9 @@
 On a display of its own (Xvfb), in two windows one after the other. Where xdotool is installed, the pointer and the
 keys are those of the system; else imgui is told of them. Fields and buttons are found by what the window has drawn in
 the last frame, so that the tool presses what a user sees, where it is seen. Each task checks its result. For each are
-told the seconds that it took, the longest frame, and how much of that the renderer took. ``--size 2560x1600 --scale
-2`` for a large display, ``--keep FOLDER`` for a picture of the window after each task.
+told the seconds that it took, the longest frame, how much of that the renderer took, and the time of all cores in it,
+which tells more where others use them. ``--size 2560x1600 --scale 2`` for a large display, ``--keep FOLDER`` for a
+picture of the window after each task.
 """
 
 from __future__ import annotations
@@ -554,7 +555,8 @@ class Tasks(Script):
     _name: str = ""
     _began: float = 0.0
     _last: float = 0.0
-    _longest: tuple[float, float] = (0.0, 0.0)
+    _last_spent: float = 0.0
+    _longest: tuple[float, float, float] = (0.0, 0.0, 0.0)
     _artist: Artist | None = None
     _places: Places = field(default_factory=Places)
 
@@ -562,9 +564,13 @@ class Tasks(Script):
         """Continue the task; returns whether all are done."""
         now = time.perf_counter()
         if self._running is not None and self._last:
-            self._longest = max(self._longest, (now - self._last, desk.stage.drawing))
+            spent = time.process_time() - self._last_spent
+            self._longest = max(self._longest, (now - self._last, desk.stage.drawing, spent))
         ended = self._continue(desk)
-        self._last = time.perf_counter()  # what the tool does is no part of a frame
+        self._last, self._last_spent = (
+            time.perf_counter(),
+            time.process_time(),
+        )  # what the tool does is no part of a frame
         return ended
 
     def _continue(self, desk: Desk) -> bool:
@@ -578,7 +584,7 @@ class Tasks(Script):
             if not self.todo:
                 return True
             self._name, task = self.todo.pop(0)
-            self._running, self._began, self._longest = task(self._artist), time.perf_counter(), (0.0, 0.0)
+            self._running, self._began, self._longest = task(self._artist), time.perf_counter(), (0.0, 0.0, 0.0)
         problem = ""
         try:
             next(self._running)
@@ -594,8 +600,10 @@ class Tasks(Script):
         return False
 
     def _tell(self, problem: str) -> None:
-        spent, (longest, drawing) = time.perf_counter() - self._began, self._longest
-        text = f"longest frame {1e3 * longest:5.0f} ms, {1e3 * drawing:5.0f} of drawing"
+        spent, (longest, drawing, cpu) = time.perf_counter() - self._began, self._longest
+        text = (
+            f"longest frame {1e3 * longest:5.0f} ms, {1e3 * drawing:5.0f} of drawing, {1e3 * cpu:5.0f} ms of all cores"
+        )
         print(f"{self._name:22} {spent:6.1f} s, {text}{'; FAILED: ' if problem else ''}{problem}", flush=True)
         if self.keep is not None:
             picture = ImageGrab.grab(xdisplay=os.environ["DISPLAY"])

@@ -32,7 +32,7 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
     body = fillable(scene)[0] if number is None else scene.objects[number]
     if body.medium is None or body.covers:
         reach = DEFAULT_REACH * diagonal
-        red, green, blue = Medium.from_color(DEFAULT_COLOR, reach).absorption.tolist()
+        red, green, blue = np.asarray(Medium.from_color(DEFAULT_COLOR, reach).absorption).tolist()
         return Material(color=DEFAULT_COLOR, distance=reach, absorption=(red, green, blue), thickness=0.1 * diagonal)
     medium, surface = body.medium or Medium(), body.surface or Surface()
     reach = DEFAULT_REACH * diagonal
