@@ -480,7 +480,12 @@ def load_hdr(a: Artist) -> Waiting:
     yield from a.click("Open ...", "Environments")
     yield from a.answer(a.folder / "sky.hdr")
     yield from a.until(lambda: a.document.look.environment.endswith("sky.hdr"), "it lights the model", 20.0)
-    yield from a.until(lambda: a.desk.drawn, "it is drawn")
+
+    def lit() -> bool:
+        scene = a.desk.work.scene()
+        return scene is not None and scene.environment.kind == "image" and a.desk.stage.viewport.steps(0) > 0
+
+    yield from a.until(lit, "it is in the picture")
     require(a.desk.work.failure is None, f"nothing failed: {a.desk.work.failure}")
 
 
