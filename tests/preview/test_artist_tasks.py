@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "preview_tasks.py"
-NAMES = ("drag color", "distance in mm", "find a key")
+NAMES = ("distance in mm", "find a key")
 
 
-def test_a_color_is_dragged_a_distance_typed_and_a_key_found(display: str, tmp_path: Path) -> None:
+def test_a_distance_is_typed_and_a_key_found(display: str, tmp_path: Path) -> None:
     folders = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_CACHE_HOME"), str(tmp_path))
     command = [sys.executable, str(TOOL), *NAMES, "--folder", str(tmp_path), "--size", "1000x700"]
     done = subprocess.run(
