@@ -147,7 +147,8 @@ class Hand:
         """Press and release a key, with modifiers before a plus sign; or one of both."""
         if self.real:
             verb = {None: "key", True: "keydown", False: "keyup"}[down]
-            yield from self._x(verb, "+".join(X_KEYS.get(word, word) for word in name.split("+")))
+            between = ("--delay", 60)  # each in a frame of its own, as by a hand
+            yield from self._x(verb, *between, "+".join(X_KEYS.get(word, word) for word in name.split("+")))
             return
         modifiers = {"ctrl": imgui.Key.mod_ctrl, "shift": imgui.Key.mod_shift}
         keys = [modifiers.get(word) or getattr(imgui.Key, word) for word in name.split("+")]
