@@ -54,8 +54,10 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
 
     vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)
             * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + painted * (paint * environment_irradiance(normal) * environment_reaching(point, normal)
-            + finish.passed * environment_irradiance(-normal) * environment_reaching(point, -normal)) / PI);
+        + painted * paint * environment_irradiance(normal) * environment_reaching(point, normal) / PI);
+    if (finish.passed != vec3(0.0)) {
+        sum += finish.unoccluded * painted * finish.passed * environment_irradiance(-normal) * environment_reaching(point, -normal) / PI;
+    }
     float alpha = highlight_alpha(finish.roughness, finish.variance);
     for (int light = 0; light < light_count; ++light) {
         vec4 at = light_position[light];
