@@ -92,8 +92,10 @@ vec3 opaque_radiance_of(OpaqueFinish finish, vec3 normal, vec3 ray, vec3 positio
 
     vec3 sum = finish.unoccluded * (mix(coat.mirrored, metal.mirrored, finish.metallic)
             * environment_light(reflected_direction(ray, normal), finish.roughness)
-        + painted * (paint * environment_irradiance(normal) * environment_reaching(point, normal)
-            + finish.passed * environment_irradiance(-normal) * environment_reaching(point, -normal)) / PI);
+        + painted * paint * environment_irradiance(normal) * environment_reaching(point, normal) / PI);
+    if (finish.passed != vec3(0.0)) {
+        sum += finish.unoccluded * painted * finish.passed * environment_irradiance(-normal) * environment_reaching(point, -normal) / PI;
+    }
 #if CLEAR_COAT
     Layer lacquer = clearcoat_layer(finish.clearcoat, cos_view);
     float coated = finish.clearcoat.x * lacquer.mirrored.r;
