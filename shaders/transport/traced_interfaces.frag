@@ -182,7 +182,12 @@ bool opaque_shown(Glimpse end, out vec3 light) {
         return true;
     }
 #endif
-    light = texelFetch(opaque_radiance, texel, 0).rgb;
+    vec4 found = texelFetch(opaque_radiance, texel, 0);
+#if ADAPTIVE
+    light = found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
+#else
+    light = found.rgb;
+#endif
     return true;
 }
 #endif
