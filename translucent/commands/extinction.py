@@ -38,7 +38,7 @@ TARGETS = (
 
 
 class _Wanted(NamedTuple):
-    """What is to be told of a medium, and how."""
+    """Facts to be told of a medium, and their form."""
 
     target: str | None
     ior: float | None

@@ -111,7 +111,7 @@ class Desk:
 
     @property
     def target_text(self) -> str:
-        """What a material is assigned to."""
+        """Target that a material is assigned to."""
         return "fills the model" if self.target is None else f"assigns to {self.name_of(self.target)}"
 
     @property

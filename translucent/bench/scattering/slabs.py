@@ -135,7 +135,7 @@ def _grid() -> BodyGrid:
 
 
 def _planned(albedo: float, depth: float, anisotropy: float, ior: float) -> _Way:
-    """What the planner takes for such a slab of one optical depth."""
+    """Method that the planner takes for such a slab of one optical depth."""
     body = _body(Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
     scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
     back = given_back(scene, None)
