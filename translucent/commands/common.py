@@ -107,7 +107,7 @@ def refuse_overwriting(output: Path, *inputs: str | Path | None) -> None:
     if click.get_current_context().meta.get(_OVERWRITE) or not os.path.exists(output):
         return
     for name in [str(given) for given in inputs if given is not None]:
-        for file in (Path(name), Path(name.rpartition(",")[0]), *_linked_files(name)):
+        for file in (Path(name), Path(name.rpartition(",")[0] or name), *_linked_files(name)):
             if same_file(file, output):
                 raise InputError(
                     f"output {str(output)!r}",

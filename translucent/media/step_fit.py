@@ -159,8 +159,9 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
     Raises
     ------
     InputError
-        If no sample of a channel is left.
+        If no sample of a channel is left, or the index is none.
     """
+    index = Medium(ior=1.0 if ior is None else ior).ior  # one that is none is refused before it is calculated with
     found = [_fit_channel(photographs, channel, ior) for channel in range(3)]
     sigma, error, interval, loss, chi2, samples = (np.array(row) for row in list(zip(*found, strict=True))[:6])
     warnings = [line for one in found for line in one[6]]
@@ -169,7 +170,7 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
         for name, value in zip(CHANNELS, sigma, strict=True)
         if value < 0
     ]
-    medium = Medium(absorption=np.maximum(sigma, 0.0), ior=1.0 if ior is None else ior)
+    medium = Medium(absorption=np.maximum(sigma, 0.0), ior=index)
     distance = float(np.median(np.concatenate([one.thickness for one in photographs])))
     return StepFit(medium, error, interval, loss, chi2, samples, distance, tuple(dict.fromkeys(warnings)))
 
