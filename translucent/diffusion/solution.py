@@ -124,7 +124,9 @@ class BodySystem:
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         ways = _first_ways(grid, medium.ior)
         self._channels = {
-            channel: _Channel(grid, medium.ior, roughness, float(absorption), float(scattering), ways)
+            channel: _Channel(
+                grid, medium.ior, roughness, float(absorption), float(scattering), ways, medium.anisotropy
+            )
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
             if scattering > 0.0
         }
@@ -168,6 +170,7 @@ class _Channel:
         absorption: float,
         scattering: float,
         ways: Array,
+        anisotropy: float = 0.0,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
         self._exit_share = interface.exit_share
@@ -180,7 +183,7 @@ class _Channel:
         self._relative = 1.0 / layer.u(depth)
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
         # What of the entering light the exact half-space gives back less than diffusion would.
-        self._excess = _half_space_excess(self._albedo, ior) / diffuse_interface(ior).conductance
+        self._excess = _half_space_excess(self._albedo, ior, anisotropy) / diffuse_interface(ior).conductance
         self._sources(layer, interface, extinction, ways, d)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
@@ -266,10 +269,12 @@ def _first_ways(grid: BodyGrid, ior: float) -> Array:
     return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
 
 
-def _half_space_excess(albedo: float, ior: float) -> float:
-    """Share of the light entering a half-space that diffusion gives back beyond the exact one."""
+def _half_space_excess(albedo: float, ior: float, anisotropy: float = 0.0) -> float:
+    """Share of the light entering a half-space that diffusion, with this reduced albedo, gives back beyond the exact one."""
     interface = diffuse_interface(ior)
     d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance
     attenuation = np.sqrt((1.0 - albedo) / d)
     diffused = albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine))
-    return float(diffused - half_space_reflectance(round(albedo, 6), ior))
+    albedo = round(albedo, 6)
+    of_events = albedo / (albedo + (1.0 - albedo) * (1.0 - anisotropy))
+    return float(diffused - half_space_reflectance(of_events, ior, anisotropy))
