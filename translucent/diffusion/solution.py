@@ -45,6 +45,9 @@ MOST_SHARE = 0.99
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
+#: Reduced albedo below which what half-spaces give back is in proportion to it.
+_LEAST_ALBEDO = 1e-6
+
 
 @dataclass(frozen=True)
 class SurfaceLight:
@@ -182,8 +185,11 @@ class _Channel:
         layer = _Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
         self._relative = 1.0 / layer.u(depth)
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
-        # What of the entering light the exact half-space gives back less than diffusion would.
-        self._excess = _half_space_excess(self._albedo, ior, anisotropy) / diffuse_interface(ior).conductance
+        # Media that scatter ahead turn back less of what enters: so much less of it is scattered here, to all sides.
+        self._scattered = self._albedo * _turned_back(self._albedo, ior, anisotropy)
+        # What of that light the exact half-space gives back less than diffusion would.
+        excess = _half_space_excess(self._albedo, ior) * self._scattered / self._albedo
+        self._excess = excess / diffuse_interface(ior).conductance
         self._sources(layer, interface, extinction, ways, d)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
@@ -203,7 +209,7 @@ class _Channel:
         self._near, into_cells = np.zeros(count), np.zeros(count)
         for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
             depth = -np.log1p(-quantile * above) * interface.mean_cosine / extinction
-            share = self._albedo / EVENTS * above * self._relative
+            share = self._scattered / EVENTS * above * self._relative
             into_cells += share * layer.u(depth)
             self._near += share * layer.rise(layer.depth - depth) / d
         deep = sparse.csr_array((count, grid.count))
@@ -213,7 +219,7 @@ class _Channel:
             path = slant - np.log1p(-quantile) / extinction
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
             cell, inside = grid.cell_at(grid.points + path[:, None] * ways + spread)
-            share = self._albedo / DEEP_EVENTS * below * inside
+            share = self._scattered / DEEP_EVENTS * below * inside
             deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
@@ -269,12 +275,26 @@ def _first_ways(grid: BodyGrid, ior: float) -> Array:
     return np.asarray(level[:, None] * sideways - cosine[:, None] * normal)
 
 
-def _half_space_excess(albedo: float, ior: float, anisotropy: float = 0.0) -> float:
-    """Share of the light entering a half-space that diffusion, with this reduced albedo, gives back beyond the exact one."""
+def _half_space_excess(albedo: float, ior: float) -> float:
+    """Share of the light entering a half-space that diffusion gives back beyond the exact one."""
     interface = diffuse_interface(ior)
     d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance
     attenuation = np.sqrt((1.0 - albedo) / d)
     diffused = albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine))
-    albedo = round(albedo, 6)
-    of_events = albedo / (albedo + (1.0 - albedo) * (1.0 - anisotropy))
-    return float(diffused - half_space_reflectance(of_events, ior, anisotropy))
+    return float(diffused - half_space_reflectance(round(albedo, 6), ior))
+
+
+def _turned_back(albedo: float, ior: float, anisotropy: float) -> float:
+    """Share that an exact half-space gives back, over that of the one which scatters alike to all sides.
+
+    Parameters
+    ----------
+    albedo : float
+        The reduced one, which both have.
+    ior, anisotropy : float
+    """
+    if anisotropy == 0.0:
+        return 1.0
+    reduced = max(round(albedo, 6), _LEAST_ALBEDO)
+    own = reduced / (reduced + (1.0 - reduced) * (1.0 - anisotropy))
+    return half_space_reflectance(own, ior, anisotropy) / half_space_reflectance(reduced, ior)
