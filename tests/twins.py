@@ -7,13 +7,24 @@ from types import ModuleType
 import numpy as np
 import numpy.typing as npt
 
-from translucent.formulas import color, diffusion, interface, lights, optics, spherical_harmonics, tone, two_stream
+from translucent.formulas import (
+    color,
+    diffusion,
+    interface,
+    lights,
+    optics,
+    spherical_harmonics,
+    thin_film,
+    tone,
+    two_stream,
+)
 from translucent.media import density
 from translucent.scene import camera, environment
 
 MODULES: dict[str, ModuleType] = {
     "optics": optics,
     "interface": interface,
+    "thin_film": thin_film,
     "lights": lights,
     "two_stream": two_stream,
     "diffusion": diffusion,
@@ -95,6 +106,23 @@ def _directions_and_normals() -> list[np.ndarray]:
 def _slab_arguments() -> list[np.ndarray]:
     reflectance, depth = _mixed(UNIT, DEPTHS[::7])
     return [reflectance, _triples(depth)]
+
+
+def _film_arguments() -> list[np.ndarray]:
+    """Films of all thicknesses, without those within rounding of total reflection's edge, and grazing rays."""
+    cosine, ior, film, metres = _mixed(
+        np.array([1e-3, 0.1, 0.4, 0.8, 1.0]),
+        np.array([1 / 1.5, 1.0, 1.5, 2.4]),
+        np.array([1 / 1.5, 1.0, 1.33, 2.0]),
+        np.array([0.0, 1e-9, 50e-9, 150e-9, 400e-9, 1.2e-6, 1e-4]),
+    )
+    clear = [np.abs((n - 1.0) * (n + 1.0) + cosine * cosine) > 1e-5 for n in (ior, film)]
+    return [column[clear[0] & clear[1]] for column in (cosine, ior, film, metres)]
+
+
+def _film_slab_arguments() -> list[np.ndarray]:
+    front, back, depth = _mixed(UNIT[::4], np.array([0.0, 0.04, 0.5, 1.0]), DEPTHS[::13])
+    return [_triples(front), back, np.repeat(depth[:, None], 3, axis=1)]
 
 
 def _layer_arguments() -> list[np.ndarray]:
@@ -200,6 +228,10 @@ ARGUMENTS = {
     "ggx_visible_normal": _facet_arguments(),
     "slab_transmittance": _slab_arguments(),
     "slab_reflectance": _slab_arguments(),
+    "film_interference": [np.concatenate([[0.0], np.geomspace(1e-10, 1e-4, 200)]).astype(np.float32)],
+    "thin_film_reflectance": _film_arguments(),
+    "film_slab_transmittance": _film_slab_arguments(),
+    "film_slab_reflectance": _film_slab_arguments(),
     "two_stream_absorption": [_triples(DEPTHS)],
     "two_stream_scattering": [_triples(DEPTHS), np.resize([-0.9, 0.0, 0.5, 0.99], len(DEPTHS)).astype(np.float32)],
     **dict.fromkeys(
@@ -246,6 +278,10 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
 FLOOR = {
     "fresnel_dielectric": 2e-7,
     "refracted_cosine": 1e-7,
+    # Cosines of some 50 radians, good to a rounding of those; mixed by a matrix whose rows add up to 5.
+    "film_interference": 4e-5,
+    "thin_film_reflectance": 4e-5,
+    "film_slab_reflectance": 4e-7,
     "exit_lobe": 4e-7,  # that of Fresnel's reflectance, over half
     "real_harmonics": 4e-7,  # differences of squares up to 1
     "composite_over": 1e-7,

@@ -1,9 +1,10 @@
 """Whether frames got slower: two checkouts of the project draw the same frames in turns.
 
-``python tools/compare_checkouts.py OLDER [NEWER] [--scene SCENE]``; NEWER is this checkout unless given, and
-``git worktree add`` makes others. Each draws in a process of its own; the times are processor time, which other
+``python tools/compare_checkouts.py OLDER [NEWER] [--scene SCENE] [--rounds N]``; NEWER is this checkout unless given,
+and ``git worktree add`` makes others. Each draws in a process of its own; the times are processor time, which other
 programs hardly change. Scenes: ``absorbing`` is a body without interfaces, lights or scattering; ``glass`` a bear with
-interfaces, which covers a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view.
+interfaces, which covers a quarter of 640 x 480 pixels; ``empty`` the same with the bear out of view; ``staged`` the
+bear as `render` shows it, in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by.
 """
 
 from __future__ import annotations
@@ -26,6 +27,14 @@ camera = tl.Camera.look_at(eye, {target}, fov_y=45.0)
 scene = tl.Scene([tl.Object(mesh, glass)], camera, environment=tl.Environment.constant((1, 1, 1)))
 """
 
+_RIM = """
+mesh = tl.load_mesh("meshes/goblet.ply")
+size, top = (120, 90), [*(mesh.vertices.min(axis=0) / 2 + mesh.vertices.max(axis=0) / 2)]
+top[1] = mesh.vertices[:, 1].max()
+eye = [at + share * mesh.diagonal for at, share in zip(top, (0.25, 0.12, 0.55))]
+scene = tl.showcase(mesh, tl.Medium(ior=1.5), size, camera=tl.Camera.look_at(eye, top, fov_y=30.0))
+"""
+
 #: What makes a scene and its size, by any version of the project.
 SCENES = {
     "absorbing": """
@@ -34,6 +43,8 @@ scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 
 """,
     "glass": _BEAR.format(target="center"),
     "empty": _BEAR.format(target="2 * eye - center"),
+    "staged": 'size = (240, 135)\nscene = tl.showcase(tl.load_mesh("meshes/bear.ply"), None, size)',
+    "rim": _RIM,
 }
 
 #: Answers every line on its input with the processor time of some frames.
@@ -98,10 +109,11 @@ def main() -> int:
     parser.add_argument("older", type=Path)
     parser.add_argument("newer", type=Path, nargs="?", default=Path(__file__).parents[1])
     parser.add_argument("--scene", choices=SCENES, default="absorbing")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
     chosen = parser.parse_args()
     older, newer = (Checkout(root.resolve(), chosen.scene) for root in (chosen.older, chosen.newer))
     times: list[tuple[float, float]] = []
-    for number in range(ROUNDS):
+    for number in range(chosen.rounds):
         if number % 2:
             after, before = newer.seconds(), older.seconds()
         else:

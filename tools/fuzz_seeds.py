@@ -21,6 +21,8 @@ from translucent.bench.picture import Picture
 from translucent.bench.record import CaseRecord, Provenance, Report
 from translucent.bench.row import Errors, Row, Timing
 from translucent.files.unpacking import PICTURES
+from translucent.frames.photographs import read_photographs
+from translucent.frames.picture import read_picture
 from translucent.geometry.solids import Box
 from translucent.gltf.materials import read_materials
 from translucent.gltf.write import write_medium
@@ -52,6 +54,13 @@ do = "change"
 field = "look.light"
 value = true
 """
+PHOTOGRAPHS = b"""
+white = "10,10,60,60"
+[[photograph]]
+file = "steps.jpg"
+patches = ["90,10,400,60=1mm,2mm", "9,9,160,20=1mm..8mm"]
+"""
+
 PRESETS = b"""[wax]
 kind = "estimated"
 source = "me"
@@ -270,6 +279,8 @@ def readers(folder: Path) -> dict[str, Reader]:
         "material": Reader(load_medium, list(materials.items())),
         "table": Reader(_read_table, [("t.csv", TABLE), ("t.json", ROWS)]),
         "wedge": Reader(fit_wedge, [("w.csv", b"distance,color,weight\n1cm,#7b1e3a,1\n2cm,#3b0e1a,2\n")]),
+        "photographs": Reader(read_photographs, [("p.toml", PHOTOGRAPHS)]),
+        "picture": Reader(read_picture, [("a.png", picture("PNG")), ("a.exr", _exr(folder))]),
         "presets": Reader(lambda path: read_presets(path.read_text("utf-8", "replace")), [("p.toml", PRESETS)]),
         "session": Reader(_read_preview, [("s.toml", SESSION)]),
         "script": Reader(_read_script, [("s.toml", SCRIPT)]),

@@ -1,6 +1,7 @@
-"""Light that is scattered many times in clouds and fog, against path-traced truth: errors of what the planner takes.
+"""Light that is scattered many times in clouds and fog, and in uneven and thin bodies behind interfaces, against
+path-traced truth: errors of what the planner takes.
 
-Usage: python tools/measure_clouds.py [--paths 192] [--size 24]
+Usage: python tools/measure_clouds.py [--paths 192] [--size 24] [--only behind]
 """
 
 from __future__ import annotations
@@ -50,6 +51,15 @@ def ball(depth: float, anisotropy: float, lit: bool) -> tl.Scene:
     return tl.Scene([tl.Object(Sphere().tessellate(32), medium)], camera, [SUN] if lit else [], DARK if lit else SKY)
 
 
+def behind(extinction: float, density: Density | None, anisotropy: float) -> tl.Scene:
+    """A ball with an interface, of such a largest reduced extinction in 1/m, in the light of a sky."""
+    albedo = np.array(FOG)
+    full = extinction / (1 - albedo * anisotropy)
+    medium = tl.Medium(full * (1 - albedo), full * albedo, anisotropy=anisotropy, ior=1.5)
+    body = tl.Object(Sphere().tessellate(48), medium, density=density)
+    return tl.Scene([body], tl.Camera.look_at((0.5, 0.8, 4), (0, 0, 0), fov_y=32.0), [], SKY)
+
+
 def scenes() -> Iterator[tuple[str, tl.Scene]]:
     """All scenes, with their names."""
     for lit in (False, True):
@@ -60,6 +70,12 @@ def scenes() -> Iterator[tuple[str, tl.Scene]]:
         yield f"linear profile, extinction 16, {light}", cloud(16.0, tl.LinearDensity(1, 1.0, 0.05), 0.0, lit)
         for depth, anisotropy in ((0.5, 0.0), (2.0, 0.0), (8.0, 0.0), (8.0, 0.7), (20.0, 0.0), (200.0, 0.0)):
             yield f"ball of depth {depth:g}, g {anisotropy:g}, {light}", ball(depth, anisotropy, lit)
+    sides = tl.DensityGrid(np.where(np.arange(32) < 16, 0.1, 1.0).reshape(32, 1, 1))
+    for anisotropy in (0.0, 0.8):
+        for what, density in (("even", None), ("linear", tl.LinearDensity(1, 1.0, 0.1)), ("two halves", sides)):
+            yield f"behind an interface, {what}, g {anisotropy:g}", behind(10.0, density, anisotropy)
+    for depth in (0.2, 0.4):
+        yield f"behind an interface, thin, {depth:g} / m, g 0.9", behind(depth, None, 0.9)
 
 
 def nrmse(found: Array, one: Array, other: Array) -> float:
@@ -73,10 +89,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--paths", type=int, default=192)
     parser.add_argument("--size", type=int, default=24)
+    parser.add_argument("--only", default="", help="scenes with this in their names")
     asked = parser.parse_args()
     size = asked.size, asked.size
     with tl.Renderer() as renderer:
         for name, scene in scenes():
+            if asked.only not in name:
+                continue
             halves = [tl.reference.path_trace(scene, size, asked.paths // 2, seed)[0].radiance for seed in (1, 2)]
             inside = tl.interior(tl.reference.hit_counts(scene, size)) & tl.reference.render(scene, size).coverage
             one, other = (half[inside] for half in halves)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.bake.baked import BakeReport as BakeReport
     from translucent.bake.batch import BatchReport as BatchReport
     from translucent.bake.batch import bake_many as bake_many
+    from translucent.bake.lithophane import Lithophane as Lithophane
+    from translucent.bake.lithophane import lithophane as lithophane
     from translucent.bake.reading import load_thickness_map as load_thickness_map
     from translucent.bake.scatter.bake import bake_scatter as bake_scatter
     from translucent.bake.scatter.bake import bake_vertex_scatter as bake_vertex_scatter
@@ -43,6 +45,8 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.frames.metrics import Errors as Errors
     from translucent.frames.metrics import compare as compare
     from translucent.frames.metrics import interior as interior
+    from translucent.frames.photographs import Photograph as Photograph
+    from translucent.frames.photographs import fit_photographs as fit_photographs
     from translucent.frames.tiled import Tile as Tile
     from translucent.geometry.mesh import Mesh as Mesh
     from translucent.gltf.load import load_scene as load_scene
@@ -67,6 +71,7 @@ if TYPE_CHECKING:  # for checkers and editors: the same names as in the table be
     from translucent.media.preset import Preset as Preset
     from translucent.media.presets import preset as preset
     from translucent.media.presets import presets as presets
+    from translucent.media.step_fit import StepFit as StepFit
     from translucent.mesh_files import load_mesh as load_mesh
     from translucent.notebook.view import view as view
     from translucent.page.write import write_page as write_page
@@ -112,6 +117,7 @@ _NAMES = {
     "bake.bake": "bake_thickness",
     "bake.baked": "BakeReport",
     "bake.batch": "BatchReport bake_many",
+    "bake.lithophane": "Lithophane lithophane",
     "bake.reading": "load_thickness_map",
     "bake.scatter.bake": "bake_scatter bake_vertex_scatter",
     "bake.scatter.result": "ScatterMap VertexScatter",
@@ -122,6 +128,7 @@ _NAMES = {
     "frames.appearance": "Appearance appearance_of average_color medium_for_average_color",
     "frames.frame": "Frame",
     "frames.metrics": "Errors compare interior",
+    "frames.photographs": "Photograph fit_photographs",
     "frames.tiled": "Tile",
     "geometry.mesh": "Mesh",
     "gltf.load": "load_scene",
@@ -136,6 +143,7 @@ _NAMES = {
     "media.medium": "Medium",
     "media.preset": "Preset",
     "media.presets": "preset presets",
+    "media.step_fit": "StepFit",
     "mesh_files": "load_mesh",
     "notebook.view": "view",
     "page.write": "write_page",

@@ -14,6 +14,7 @@ from translucent.commands.console import echo
 from translucent.commands.doctor import doctor
 from translucent.commands.explain import explain
 from translucent.commands.extinction import extinction
+from translucent.commands.lithophane import lithophane
 from translucent.commands.material import material
 from translucent.commands.page import page
 from translucent.commands.presets import presets
@@ -75,7 +76,20 @@ def cli() -> None:
     """Translucent materials on meshes, with the exact thickness along every view ray."""
 
 
-for command in (render, preview, page, bake, explain, extinction, presets, material, report, shader, doctor):
+for command in (
+    render,
+    preview,
+    page,
+    bake,
+    lithophane,
+    explain,
+    extinction,
+    presets,
+    material,
+    report,
+    shader,
+    doctor,
+):
     cli.add_command(command)
 
 

@@ -26,16 +26,14 @@ vec3 diffused_out(int object, vec3 point, float cosine) {
     return max(emergent * scale, vec3(0.0)) / (4.0 * PI * row.ior * row.ior);
 }
 
-// Of an object's extinction, in 1/m, the part by light that is scattered ahead: by similarity g sigma_s.
-vec3 scattered_ahead(int object) {
-    return surface_table_row(object).scattered_ahead;
-}
-
-// Radiance that comes along a ray by light which is scattered ahead, and which diffusion takes for unscattered: from the
-// environment behind, blurred, and where it is mirrored on its way out, half as much as diffuse light, from both sides.
-vec3 haze(int object, vec3 direction) {
-    float mirrored = HAZE_MIRRORED * surface_table_row(object).inner_mirror;
-    vec3 behind = environment_light(direction, HAZE_ROUGHNESS);
-    return mix(behind, environment_light(-direction, HAZE_ROUGHNESS), 0.5 * mirrored);
+// Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion
+// takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment
+// behind, blurred, and as much as is mirrored on its way out from the other side.
+vec3 haze(int object, vec3 direction, vec3 optical_depth) {
+    SurfaceRow row = surface_table_row(object);
+    vec3 hazy = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
+    if (max(hazy.r, max(hazy.g, hazy.b)) <= 0.0) { return vec3(0.0); }
+    vec3 far = row.haze_far * environment_light(direction, HAZE_ROUGHNESS);
+    return hazy * (far + row.haze_near * environment_light(-direction, HAZE_ROUGHNESS));
 }
 #endif

@@ -1,10 +1,13 @@
 // Light that interfaces of bodies reflect, and give back from paint and from many scattering events. Needs <constants>,
 // <View>, <Lights>, <Surfaces>, <SurfaceRow> and environment_light.glsl. SINGLE_SCATTERING: light of lights that is
-// scattered once is found elsewhere. Who includes it has light_passed, as in transport/light_passed.glsl.
+// scattered once is found elsewhere. THIN_FILM, CLEAR_COAT: some body has one. Who includes it has light_passed, as in transport/light_passed.glsl.
 
 #include "lib/interface.glsl"
 #include "lib/lights.glsl"
 #include "lib/optics.glsl"
+#if THIN_FILM
+#include "lib/thin_film.glsl"
+#endif
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
 #include "shade/shadows.glsl"
@@ -27,13 +30,26 @@ struct Finish {
     float transmission;
     vec3 color;
     float unoccluded;     // share of the light of the environment that reaches it
+#if THIN_FILM
+    vec3 film;            // share of the interface that has it, its ior, and metres
+#endif
+#if CLEAR_COAT
+    vec2 clearcoat;       // share of the interface that has it, and its roughness
+#endif
 };
 
 // surface: object, roughness, transmission.
 Finish finish_of(vec4 surface) {
     SurfaceRow row = surface_table_row(int(surface.x + 0.5));
     return Finish(row.ior, row.dispersion, row.is_sheet > 0.5, row.scatters_much > 0.5, row.sheet_depth, row.painted_through,
-        row.painted_share, row.stream_absorption, row.stream_scattering, row.inner_mirror, row.longest, surface.y, surface.z, vec3(1.0), 1.0);
+        row.painted_share, row.stream_absorption, row.stream_scattering, row.inner_mirror, row.longest, surface.y, surface.z, vec3(1.0), 1.0
+#if THIN_FILM
+        , row.film
+#endif
+#if CLEAR_COAT
+        , vec2(row.clearcoat, row.clearcoat_roughness)
+#endif
+    );
 }
 
 // Reflectance of a rough interface: exact for a polished one, and as the split sum has it relative to that (Karis 2013).
@@ -44,6 +60,24 @@ float interface_reflectance(float cosine, float ior, float roughness) {
     vec2 rough = texture(reflectance_table, reflectance_coordinate(cosine, roughness)).rg;
     vec2 smooth_one = texture(reflectance_table, reflectance_coordinate(cosine, 0.0)).rg;
     return min(polished * (facing * rough.x + rough.y) / max(facing * smooth_one.x + smooth_one.y, 1e-6), 1.0);
+}
+
+#if THIN_FILM
+// Reflectance of an interface that reflects `bare` without the film on it. before: index of the side that the ray comes from.
+vec3 filmed_reflectance(vec3 film, float bare, float cosine, float ior, float before) {
+    if (film.x == 0.0) { return vec3(bare); }
+    return mix(vec3(bare), thin_film_reflectance(cosine, ior, film.y / before, film.y * film.z), film.x);
+}
+#endif
+
+// Share of light that microfacets mirror, those of a sheet at both of its sides.
+vec3 mirrored_by_facets(Finish finish, float cosine) {
+    float bare = fresnel_dielectric(cosine, finish.ior);
+    vec3 share = vec3(finish.is_sheet ? 2.0 * bare : bare);
+#if THIN_FILM
+    share += filmed_reflectance(finish.film, bare, cosine, finish.ior, 1.0) - bare;
+#endif
+    return share;
 }
 
 // An interface that turns microfacets by small angles turns reflections by twice these, and refracted light by (ior - 1)
@@ -75,7 +109,7 @@ vec3 share_reaching(int light, vec3 point, vec3 normal, vec3 towards) {
 }
 
 // Microfacets that mirror the lights, as far as these reach them.
-vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, Finish finish, float alpha) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
     for (int light = 0; light < light_count; ++light) {
@@ -84,13 +118,30 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, float ior, float alpha) {
         float cos_light = dot(normal, towards);
         if (cos_light <= 0.0) { continue; }
         vec3 half_way = normalize(towards - ray);
-        float mirrored = fresnel_dielectric(max(dot(half_way, towards), 0.0), ior)
+        vec3 mirrored = mirrored_by_facets(finish, max(dot(half_way, towards), 0.0))
             * ggx_distribution(min(dot(half_way, normal), 1.0), alpha) * ggx_visibility(cos_light, cos_view, alpha);
         mirrored *= cos_light;
-        if (mirrored > FAINTEST_HIGHLIGHT) { sum += mirrored * share_reaching(light, point, normal, towards) * irradiance; }
+        if (max(mirrored.r, max(mirrored.g, mirrored.b)) > FAINTEST_HIGHLIGHT) { sum += mirrored * share_reaching(light, point, normal, towards) * irradiance; }
     }
     return sum;
 }
+
+#if CLEAR_COAT
+// Share of light that a clear coat mirrors, and the highlights of lights in it.
+float coated_share(vec2 clearcoat, float cosine) {
+    return clearcoat.x * interface_reflectance(cosine, CLEARCOAT_IOR, clearcoat.y);
+}
+
+vec3 coat_highlights(vec3 point, vec3 normal, vec3 ray, Finish finish, float variance) {
+    Finish coat = finish;
+    coat.ior = CLEARCOAT_IOR;
+    coat.is_sheet = false;
+#if THIN_FILM
+    coat.film = vec3(0.0, 1.0, 0.0);
+#endif
+    return finish.clearcoat.x * highlights(point, normal, ray, coat, highlight_alpha(finish.clearcoat.y, variance));
+}
+#endif
 
 // On both sides of an interface, as far as lights reach them. unoccluded: share of the environment's light.
 struct TwoSides {

@@ -110,18 +110,36 @@ float light_unblocked(int light, vec3 point, vec3 normal) {
     return view.ends ? light_through(view, point, normal, false).r : 1.0;
 }
 
+// Irradiance on a surface from one of the directions.
+vec3 light_of_sky(int number, vec3 normal) {
+    return sky_views[4 * number + 3].rgb * max(-dot(normal, sky_views[4 * number + 2].xyz), 0.0);
+}
+
+bool in_sky_map(int number, vec3 point) {
+    return max(abs(dot(sky_views[4 * number], vec4(point, 1.0))), abs(dot(sky_views[4 * number + 1], vec4(point, 1.0)))) < 1.0;
+}
+
 // Share of the light of the environment that reaches a surface.
 vec3 environment_reaching(vec3 point, vec3 normal) {
     if (sky_count == 0) { return vec3(1.0); }
-    vec3 all = vec3(0.0), reaching = vec3(0.0);
+    vec3 all = vec3(0.0), reaching = vec3(0.0), light = vec3(0.0);
     int step = abs(sky_step);
     bool alone = sky_step < 0;
-    for (int i = alone ? sky_first : 0; i < sky_count; i += alone ? step : 1) {
-        all += sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
-    }
-    for (int i = sky_first; i < sky_count; i += step) {
-        vec3 light = sky_views[4 * i + 3].rgb * max(-dot(normal, sky_views[4 * i + 2].xyz), 0.0);
-        if (light != vec3(0.0)) { reaching += light * light_through(sky_view(i), point, normal, true); }
+    for (int i = alone ? sky_first : 0; i < sky_count; i += alone ? step : 1) { all += light_of_sky(i, normal); }
+    int i = sky_first;
+    while (i < sky_count) {
+        // All pixels of a group look for their next direction in which anything may be, and then look it up together.
+        bool found = false;
+        while (i < sky_count && !found) {
+            light = light_of_sky(i, normal);
+            found = light != vec3(0.0) && in_sky_map(i, point);
+            if (!found) {
+                reaching += light;
+                i += step;
+            }
+        }
+        if (found) { reaching += light * light_through(sky_view(i), point, normal, true); }
+        i += step;
     }
     return mix(vec3(1.0), (alone ? 1.0 : float(step)) * reaching / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }

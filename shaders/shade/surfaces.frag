@@ -37,8 +37,8 @@ layout(location = 1) out vec4 out_transmittance;
 
 struct Crossing {
     vec3 light;
-    vec3 passed;      // transmittance along the refracted ray
-    float thickness;  // metres inside media along it
+    vec3 optical_depth;  // along the refracted ray
+    float thickness;     // metres inside media along it
 };
 
 // The straight ray's path and optical depth.
@@ -56,7 +56,7 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     vec3 passed = transmittance(straight.optical_depth);
     float blur = finish.roughness * sqrt(0.5 * abs(1.0 - 1.0 / ior));
     vec3 light = passed * radiance_beyond(point, refracted_direction(ray, normal, ior), blur);
-    return Crossing(light, passed, straight.thickness);
+    return Crossing(light, straight.optical_depth, straight.thickness);
 }
 #else
 // Light that crosses the first interval along a refracted ray; the media there are taken to be mixed as along the straight one.
@@ -66,21 +66,25 @@ Crossing refracted(Finish finish, vec3 point, vec3 normal, vec3 ray, float ior, 
     vec3 beyond = point + leaving.path * inside;
     Crossing result;
     result.thickness = max(straight.thickness + leaving.path - straight.first_interval, 0.0);
-    result.passed = transmittance(straight.optical_depth * (result.thickness / max(straight.thickness, 1e-30)));
+    result.optical_depth = straight.optical_depth * (result.thickness / max(straight.thickness, 1e-30));
+    vec3 passed = transmittance(result.optical_depth);
     if (leaving.stopped) {
-        result.light = leaving.stop * result.passed;
+        result.light = leaving.stop * passed;
         return result;
     }
     float cosine = clamp(-dot(leaving.normal, inside), 0.0, 1.0);
-    float kept = interface_reflectance(cosine, 1.0 / ior, 0.0);
+    vec3 kept = vec3(interface_reflectance(cosine, 1.0 / ior, 0.0));
+#if THIN_FILM
+    kept = filmed_reflectance(finish.film, kept.r, cosine, 1.0 / ior, ior);
+#endif
     float blur = refraction_roughness(finish.roughness, ior);
     // What the far interface keeps inside leaves after at least one more crossing, taken to be as long as this one: seen
     // where it is mirrored to. Light that scatters on the way comes out all the same where media give it back.
-    vec3 again = finish.scatters_much ? vec3(1.0) : result.passed;
+    vec3 again = finish.scatters_much ? vec3(1.0) : passed;
     result.light = kept * again * environment_light(reflected_direction(inside, leaving.normal), blur);
     vec3 outside = refracted_direction(inside, leaving.normal, 1.0 / ior);
-    if (kept < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
-    result.light *= result.passed;
+    if (min(kept.r, min(kept.g, kept.b)) < 1.0) { result.light += (1.0 - kept) * radiance_beyond(beyond, outside, blur); }
+    result.light *= passed;
     return result;
 }
 #endif
@@ -89,7 +93,7 @@ Crossing crossed(Finish finish, vec3 point, vec3 normal, vec3 ray, bool enters, 
     if (finish.is_sheet || straight.first_interval < 0.0) {
         vec3 passed = transmittance(straight.optical_depth);
         float blur = refraction_roughness(finish.roughness, finish.ior);
-        return Crossing(passed * radiance_beyond(point, ray, blur), passed, straight.thickness);
+        return Crossing(passed * radiance_beyond(point, ray, blur), straight.optical_depth, straight.thickness);
     }
     if (finish.dispersion == 0.0) { return refracted(finish, point, normal, ray, finish.ior, enters, straight); }
     vec3 iors = channel_iors(finish.ior, finish.dispersion);
@@ -138,18 +142,37 @@ void main() {
     float reflectance = starts_inside ? 0.0 : interface_reflectance(cosine, finish.ior, finish.roughness);
     vec3 mirrored_share = vec3(reflectance);
     vec3 entered_share = vec3(1.0 - reflectance);
+#if THIN_FILM
+    if (!starts_inside) { mirrored_share = filmed_reflectance(finish.film, reflectance, cosine, finish.ior, 1.0); }
+    entered_share = 1.0 - mirrored_share;
+#endif
     if (finish.is_sheet) {
         // All reflections between its two sides; what one passage absorbs is in the optical depth already.
         vec3 passage = finish.sheet_depth / max(refracted_cosine(cosine, finish.ior), MIN_THIN_LAYER_COSINE);
         vec3 back_and_forth = reflectance * transmittance(passage);
+#if THIN_FILM
+        vec3 front_share = mirrored_share;
+        back_and_forth = sqrt(front_share * reflectance) * transmittance(passage);
+        mirrored_share = film_slab_reflectance(front_share, reflectance, passage);
+        entered_share = (1.0 - front_share) * (1.0 - reflectance) / max(1.0 - back_and_forth * back_and_forth, 1e-6);
+#else
         mirrored_share = slab_reflectance(reflectance, passage);
         entered_share = (1.0 - reflectance) * (1.0 - reflectance) / max(1.0 - back_and_forth * back_and_forth, 1e-6);
+#endif
     }
     vec3 mirrored = vec3(0.0);
-    if (reflectance > 0.0) {
+    if (max(mirrored_share.r, max(mirrored_share.g, mirrored_share.b)) > 0.0) {
         mirrored = finish.unoccluded * mirrored_share * environment_light(reflected_direction(ray, normal), finish.roughness)
-            + highlights(point, normal, ray, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
+            + highlights(point, normal, ray, finish, highlight_alpha(finish.roughness, surface.w));
     }
+#if CLEAR_COAT
+    if (!starts_inside && finish.clearcoat.x > 0.0) {
+        float coated = coated_share(finish.clearcoat, cosine);
+        entered_share *= 1.0 - coated;
+        mirrored = (1.0 - coated) * mirrored + coat_highlights(point, normal, ray, finish, surface.w)
+            + finish.unoccluded * coated * environment_light(reflected_direction(ray, normal), finish.clearcoat.y);
+    }
+#endif
 
     vec3 light = vec3(0.0);
     if (finish.transmission > 0.0) {
@@ -160,9 +183,14 @@ void main() {
 #endif
         Crossing crossing = crossed(finish, point, normal, ray, !starts_inside, Straight(thickness, depth, first_interval));
         light = crossing.light;
-        if (finish.scatters_much) { light += scattered_out(finish, point, normal, crossing.thickness, crossing.passed); }
+        if (finish.scatters_much) {
+            light += scattered_out(finish, point, normal, crossing.thickness, transmittance(crossing.optical_depth));
+        }
 #if DIFFUSED
-        light += diffused_out(int(surface.x + 0.5), point, starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior));
+        int object = int(surface.x + 0.5);
+        light += diffused_out(object, point, starts_inside ? 1.0 : refracted_cosine(cosine, finish.ior));
+        vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, finish.ior);
+        light += haze(object, inside, crossing.optical_depth);
 #endif
         light *= finish.transmission * finish.color;
     }

@@ -102,7 +102,14 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     vec3 color = paint_color(body, point);
     if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
     OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
-        body.emissive, normal, 0.0, 1.0, 1.0, false);
+        body.emissive, normal, 0.0, 1.0, 1.0, false
+#if THIN_FILM
+        , body.film
+#endif
+#if CLEAR_COAT
+        , vec2(body.clearcoat, body.clearcoat_roughness)
+#endif
+    );
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
 
@@ -224,6 +231,17 @@ void meet(inout Path path, Place place, TracedBody body, int before, int after, 
     vec4 shares = random_shares(draws);
     path.flags |= FLAG_BENT;
     ++path.met;
+    vec3 mirrored = vec3(reflectance);
+    float coated = 0.0;
+#if THIN_FILM
+    if (body.film.x > 0.0) {
+        float film_ior = body.film.y / index_of(before, CHANNEL);
+        mirrored = mix(mirrored, thin_film_reflectance(cosine, ior, film_ior, body.film.y * body.film.z), body.film.x);
+    }
+#endif
+#if CLEAR_COAT
+    if (is_sheet || place.outside) { coated = body.clearcoat * fresnel_dielectric(cosine, CLEARCOAT_IOR); }
+#endif
     bool passes = shares.x >= reflectance;
     vec3 painted = vec3(1.0);
     vec3 way = reflected_direction(path.direction, normal);
@@ -260,10 +278,18 @@ void meet(inout Path path, Place place, TracedBody body, int before, int after, 
         vec3 depth = body.extinction * through;
 #if EMISSION
         // What a sheet emits goes back and forth in it, too.
-        vec3 leaving = (1.0 - reflectance) / max(1.0 - reflectance * transmittance(depth), vec3(1e-6));
+        vec3 again = reflectance * transmittance(depth);
+        vec3 leaving = (1.0 - mirrored) * (1.0 + again) / max(1.0 - mirrored * transmittance(depth) * again, vec3(1e-6));
+        leaving *= 1.0 - coated;
         path.light += path.share * leaving * emitted_radiance(body.emission, body.extinction, through);
 #endif
+#if THIN_FILM
+        vec3 back = film_slab_reflectance(mirrored, reflectance, depth), on = film_slab_transmittance(mirrored, reflectance, depth);
+#else
         vec3 back = slab_reflectance(reflectance, depth), on = slab_transmittance(reflectance, depth);
+#endif
+        back += coated * (1.0 - back);
+        on *= 1.0 - coated;
         float chance = dot(path.share, on * passing + vec3(1e-30));
         chance /= chance + dot(path.share, back);
         // Paint is lit by all that passes, whatever the path does.
@@ -274,8 +300,14 @@ void meet(inout Path path, Place place, TracedBody body, int before, int after, 
         way = passes ? path.direction : way;
         path.share *= passes ? on / chance : back / (1.0 - chance);
         painted = vec3(0.0);
-    } else if (passes) {
-        way = refracted_direction(path.direction, normal, ior);
+    } else {
+        mirrored += coated * (1.0 - mirrored);
+        if (mirrored != vec3(reflectance)) {
+            float chance = dot(mirrored, vec3(1.0 / 3.0));
+            passes = shares.x >= chance;
+            path.share *= passes ? (1.0 - mirrored) / (1.0 - chance) : mirrored / max(chance, 1e-30);
+        }
+        if (passes) { way = refracted_direction(path.direction, normal, ior); }
     }
     if (passes) {
         if (body.transmission < 1.0 && painted.r > 0.0) {

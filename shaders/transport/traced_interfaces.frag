@@ -44,6 +44,7 @@ layout(location = 1) out vec4 out_transmittance;
 
 const float EDGE_ON = 1e-3;
 const int WAITING = 8;
+const int GLIMPSES = 8;
 
 // One of the rays that wait to be followed.
 struct Ray {
@@ -129,7 +130,14 @@ vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
     vec3 color = paint_color(body, point);
     if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
     OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
-        body.emissive, normal, 0.0, 1.0, 1.0, false);
+        body.emissive, normal, 0.0, 1.0, 1.0, false
+#if THIN_FILM
+        , body.film
+#endif
+#if CLEAR_COAT
+        , vec2(body.clearcoat, body.clearcoat_roughness)
+#endif
+    );
     return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
 }
 
@@ -147,46 +155,64 @@ float depth_within_pixel(vec3 point, vec3 normal) {
 }
 #endif
 
-// The same where the picture shows it: with its textures, and blurred behind rough interfaces.
-vec3 opaque_seen(TracedBody body, vec3 normal, Ray ray, vec3 point) {
+// The end of a branch: what is seen there is found for all rays of a group together, apart from following them.
+struct Glimpse {
+    int object;        // that is opaque; AIR for the environment
+    vec3 normal;       // of the object
+    vec3 origin;       // of the ray
+    vec3 point;        // of the object
+    vec3 direction;
+    vec3 share;        // of the light that reaches the eye
+    bool reflected;
+    float blur;
+};
+
 #if OPAQUE
-    vec3 shown = seen_at(point);
-    if (in_picture(shown.xy)) {
-        ivec2 texel = stored(texel_of(shown.xy));
-        float there = texelFetch(opaque_axial_depth, texel, 0).r;
-        if (abs(there - shown.z) * surface_ahead.y < 1e-2 * surface_reach + depth_within_pixel(point, normal)) {
+// Opaque objects as the picture shows them: with their textures, and blurred behind rough interfaces. False where it does not.
+bool opaque_shown(Glimpse end, out vec3 light) {
+    vec3 shown = seen_at(end.point);
+    if (!in_picture(shown.xy)) { return false; }
+    ivec2 texel = stored(texel_of(shown.xy));
+    float there = texelFetch(opaque_axial_depth, texel, 0).r;
+    if (abs(there - shown.z) * surface_ahead.y >= 1e-2 * surface_reach + depth_within_pixel(end.point, end.normal)) { return false; }
 #if MICROFACETS
-            if (ray.blur > 0.0) {
-                vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(ray.blur), length(point - ray.origin), point));
-                return blurred.rgb + (1.0 - blurred.a) * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
-            }
-#endif
-            vec4 found = texelFetch(opaque_radiance, texel, 0);
-#if ADAPTIVE
-            return found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
-#else
-            return found.rgb;
-#endif
-        }
+    if (end.blur > 0.0) {
+        vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(end.blur), length(end.point - end.origin), end.point));
+        light = blurred.rgb + (1.0 - blurred.a) * environment_seen(end.origin, end.direction, end.reflected, end.blur);
+        return true;
     }
 #endif
-    return opaque_light(body, normal, ray.direction, point);
+    vec4 found = texelFetch(opaque_radiance, texel, 0);
+#if ADAPTIVE
+    light = found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
+#else
+    light = found.rgb;
+#endif
+    return true;
+}
+#endif
+
+vec3 light_at(Glimpse end) {
+    if (end.object == AIR) { return environment_seen(end.origin, end.direction, end.reflected, end.blur); }
+#if OPAQUE
+    vec3 light;
+    if (opaque_shown(end, light)) { return light; }
+#endif
+    return opaque_light(traced_body(end.object), end.normal, end.direction, end.point);
 }
 
 // What a ray sees that is not followed on: the environment, or the ground before it.
-vec3 seen_ahead(vec3 origin, Ray ray, vec3 direction, bool reflected) {
+Glimpse seen_ahead(Ray ray, vec3 direction, vec3 share, bool reflected) {
+    Glimpse end = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, direction, share, reflected, ray.blur);
 #if OPAQUE
-    if (ground_object >= 0) {
-        float falling = -dot(ground_plane.xyz, direction), height = dot(ground_plane.xyz, origin) - ground_plane.w;
-        if (falling > 1e-3 && height > 0.0) {
-            Ray down = ray;
-            down.direction = direction;
-            down.reflected = reflected;
-            return opaque_seen(traced_body(ground_object), ground_plane.xyz, down, origin + height / falling * direction);
-        }
+    float falling = -dot(ground_plane.xyz, direction), height = dot(ground_plane.xyz, ray.origin) - ground_plane.w;
+    if (ground_object >= 0 && falling > 1e-3 && height > 0.0) {
+        end.object = ground_object;
+        end.normal = ground_plane.xyz;
+        end.point += height / falling * direction;
     }
 #endif
-    return environment_seen(origin, direction, reflected, ray.blur);
+    return end;
 }
 
 // The first interface, as the rasterizer has found it.
@@ -196,7 +222,6 @@ struct Seen {
     vec3 normal;
     Finish finish;
 };
-
 
 Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
     Sum sum = Sum(vec3(0.0), 0.0);
@@ -209,185 +234,227 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
     bool ends = false;
     vec3 passed = vec3(1.0);  // transmittance of the last segment
     float reach = first_reach;
-    for (int step = 0; step < MOST_STEPS; ++step) {
-        if (ends) {
-            if (waits == 0) { break; }
-            ray = waiting[--waits];
-            ends = false;
-        }
-        Hit hit = nearest_hit(ray.origin, ray.direction, 0.0, reach, uvec4(0u));
-        if (hit.object < 0 && reach < NOTHING) {
-            reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
-            continue;
-        }
-        reach = NOTHING;
-        if (hit.object < 0 && all_closed == 1) { ray.record = uvec4(0u); }
-        int before = dominant_body(ray.record);
-        passed = vec3(1.0);
-        if (ray.record.x != 0u) {
-            if (hit.object < 0) { sum.lost += strength(ray.share) / 3.0; }  // it has left through a hole
-            Filling filling = filling_of(ray.record, before);
-            float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
-#if EMISSION
-            sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
-#endif
-            passed = transmittance(filling.extinction * path);
-#if LAYERED
-            if (before != AIR && surface_table_row(before).scatters_much > 0.5) {
-                Finish layer = finish_of(vec4(float(before), 0.0, 1.0, 0.0));
-                sum.light += ray.share * scattered_out(layer, ray.origin, ray.outwards, path, passed);
+    Glimpse glimpses[GLIMPSES];
+    int ended = 0;  // branches of which it is not known yet what they see; a step ends two at most
+    int step = 0;
+    do {
+        for (; step < MOST_STEPS && ended + 2 <= GLIMPSES; ++step) {
+            if (ends) {
+                if (waits == 0) { break; }
+                ray = waiting[--waits];
+                ends = false;
             }
+            Hit hit = nearest_hit(ray.origin, ray.direction, 0.0, reach, uvec4(0u));
+            if (hit.object < 0 && reach < NOTHING) {
+                reach = NOTHING;  // the rasterizer sees this edge a little elsewhere
+                continue;
+            }
+            reach = NOTHING;
+            if (hit.object < 0 && all_closed == 1) { ray.record = uvec4(0u); }
+            int before = dominant_body(ray.record);
+            passed = vec3(1.0);
+            if (ray.record.x != 0u) {
+                if (hit.object < 0) { sum.lost += strength(ray.share) / 3.0; }  // it has left through a hole
+                Filling filling = filling_of(ray.record, before);
+                float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
+#if EMISSION
+                sum.light += ray.share * emitted_radiance(filling.emission, filling.extinction, path);
+#endif
+                passed = transmittance(filling.extinction * path);
+#if LAYERED
+                if (before != AIR && surface_table_row(before).scatters_much > 0.5) {
+                    Finish layer = finish_of(vec4(float(before), 0.0, 1.0, 0.0));
+                    sum.light += ray.share * scattered_out(layer, ray.origin, ray.outwards, path, passed);
+                }
 #endif
 #if DIFFUSED
-            if (before != AIR) {
-                sum.light += ray.share * diffused_out(before, ray.origin, clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0));
-                vec3 ahead = transmittance(max(filling.extinction - scattered_ahead(before), 0.0) * path) - passed;
-                if (strength(ahead) > 0.0) { sum.light += ray.share * ahead * haze(before, ray.direction); }
-            }
+                if (before != AIR) {
+                    sum.light += ray.share * diffused_out(before, ray.origin, clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0));
+                    sum.light += ray.share * haze(before, ray.direction, filling.extinction * path);
+                }
 #endif
-            ray.share *= passed;
-        }
-        if (hit.object < 0) {
-            sum.light += ray.share * environment_seen(ray.origin, ray.direction, ray.reflected, ray.blur);
-            ends = true;
-            continue;
-        }
-        vec3 point = ray.origin + hit.path * ray.direction;
-        bool sound = true;
-        Place place = place_at(ray.origin, ray.direction, ray.record, hit, before, channel, sound);
-        TracedBody body = traced_body(place.object);
-        int kind = int(body.kind);
-        bool outside = place.outside;
-        vec3 face_normal = place.face_normal;
+                ray.share *= passed;
+            }
+            if (hit.object < 0) {
+                glimpses[ended++] = Glimpse(AIR, vec3(0.0), ray.origin, ray.origin, ray.direction, ray.share, ray.reflected, ray.blur);
+                ends = true;
+                continue;
+            }
+            vec3 point = ray.origin + hit.path * ray.direction;
+            bool sound = true;
+            Place place = place_at(ray.origin, ray.direction, ray.record, hit, before, channel, sound);
+            TracedBody body = traced_body(place.object);
+            int kind = int(body.kind);
+            bool outside = place.outside;
+            vec3 face_normal = place.face_normal;
 #if !FROM_EYE
-        // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
-        if (ray.met == 0 && kind == KIND_SOLID && !outside && ray.record.x == 0u) {
-            leave(ray, point, face_normal);
-            continue;
-        }
-#endif
-        if (!sound && (all_closed == 0 || is_full(ray.record))) { sum.lost += strength(ray.share) / 3.0; }
-        vec3 smooth_normal = place.smooth_normal;
-        bool first = ray.met == 0 && place.object == seen.object && distance(point, seen.point) < 1e-3 * surface_reach;
-        if (first) { smooth_normal = seen.normal; }
-        float facing = dot(smooth_normal, ray.direction);
-        if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
-        sum.light += ray.share * place.glow;
-        ray.share *= place.coat;
-        if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
-            sum.light += ray.share * opaque_seen(body, smooth_normal, ray, point);
-            ends = true;
-            continue;
-        }
-        int after = dominant_body(place.record);
-        if (kind != KIND_SHEET && !alters_light(before, after, channel)) {
-            leave(ray, ray.origin + place.path * ray.direction, face_normal);
-            ray.record = place.record;
-            ray.outwards = smooth_normal;
-            continue;
-        }
-        float ior = index_of(kind == KIND_SHEET ? place.object : after, channel) / index_of(before, channel);
-        bool enters = kind == KIND_SHEET || place.object == after;
-        // Textures are read where a ray first meets an object; farther on it counts as the same all over.
-        bool as_first = place.object == seen.object;
-        float roughness = as_first ? seen.finish.roughness : body.roughness;
-        float transmission = as_first ? seen.finish.transmission : body.transmission;
-        vec3 tint = as_first ? seen.finish.color : body.color;
-        float alpha = roughness * roughness;
-#if MICROFACETS
-        vec3 facet, facet_normal;
-        float facet_alpha = 0.0, full_alpha = 0.0;
-        if (roughness > 0.0 && blurred_share < 1.0) {
-            facet_alpha = sqrt(1.0 - blurred_share) * alpha;
-            full_alpha = alpha;
-            alpha *= sqrt(blurred_share);
-            facet = microfacet_normal(smooth_normal, ray.direction, facet_alpha, microfacet_shares(ray.met, ray.turns));
-            facet_normal = smooth_normal;
-            smooth_normal = facet;
-            roughness = 0.0;
-        }
-#endif
-        float cosine = clamp(-dot(smooth_normal, ray.direction), 0.0, 1.0);
-        float reflectance = interface_reflectance(cosine, ior, roughness);
-        vec3 share_back = vec3(reflectance);
-        vec3 share_on = vec3(1.0 - reflectance);
-        vec3 on_way = ray.direction;
-        if (kind == KIND_SHEET) {
-            float through = 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
-            vec3 depth = body.extinction * through;
-#if EMISSION
-            // What a sheet emits goes back and forth in it, too.
-            vec3 leaving = (1.0 - reflectance) / max(1.0 - reflectance * transmittance(depth), vec3(1e-6));
-            sum.light += ray.share * leaving * emitted_radiance(body.emission, body.extinction, through);
-#endif
-            share_back = slab_reflectance(reflectance, depth);
-            share_on = slab_transmittance(reflectance, depth);
-        } else {
-            on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
-        }
-#if MICROFACETS
-        if (facet_alpha > 0.0) {
-            float towards = -dot(facet_normal, ray.direction);
-            vec3 mirrored_way = reflected_direction(ray.direction, facet);
-            share_back *= masking_ratio(towards, dot(facet_normal, mirrored_way), full_alpha);
-            share_on *= kind == KIND_SHEET ? 1.0 : masking_ratio(towards, -dot(facet_normal, on_way), full_alpha);
-        }
-#endif
-        vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
-#if PAINTED
-        if (transmission < 1.0 && enters) {
-            Finish finish = seen.finish;
-            if (!as_first) {
-                finish = finish_of(vec4(float(place.object), roughness, transmission, 0.0));
-                finish.color = tint;
+            // Before the first interface a ray is in no body; it started a little before what the rasterizer has found.
+            if (ray.met == 0 && kind == KIND_SOLID && !outside && ray.record.x == 0u) {
+                leave(ray, point, face_normal);
+                continue;
             }
-            sum.light += ray.share * share_on * (1.0 - transmission) * paint(finish, point, smooth_normal);
-        }
 #endif
-        if (enters) { share_on *= transmission * tint; }
-        float ior_inside = max(ior, 1.0 / ior);
-        float occlusion = first ? seen.finish.unoccluded : 1.0;
-        Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
-            ray.met == 0 ? 0 : ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
-            ray.turns * 2 + 1, -smooth_normal);
-        Ray on = Ray(point, 0.0, on_way, ray.share * share_on, place.record, ray.met + 1, ray.forks, ray.reflected,
-            ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal);
-        leave(back, point, face_normal);
-        leave(on, ray.origin + place.path * ray.direction, face_normal);
-        bool on_stronger = strength(on.share) >= strength(back.share);
-        bool last = ray.met + 1 >= most_interfaces || step > 3 * MOST_STEPS / 4;
-        Ray weaker = back;
-        vec3 arrival = ray.direction;
-        bool arrived_reflected = ray.reflected;
-        vec3 again = outside ? vec3(1.0) : passed;
+            if (!sound && (all_closed == 0 || is_full(ray.record))) { sum.lost += strength(ray.share) / 3.0; }
+            vec3 smooth_normal = place.smooth_normal;
+            bool first = ray.met == 0 && place.object == seen.object && distance(point, seen.point) < 1e-3 * surface_reach;
+            if (first) { smooth_normal = seen.normal; }
+            float facing = dot(smooth_normal, ray.direction);
+            if (facing > -EDGE_ON) { smooth_normal = normalize(smooth_normal - (facing + EDGE_ON) * ray.direction); }
+            sum.light += ray.share * place.glow;
+            ray.share *= place.coat;
+            if (kind == KIND_OPAQUE && (outside || body.one_sided == 0.0)) {
+                glimpses[ended++] = Glimpse(place.object, smooth_normal, ray.origin, point, ray.direction, ray.share, ray.reflected, ray.blur);
+                ends = true;
+                continue;
+            }
+            int after = dominant_body(place.record);
+            if (kind != KIND_SHEET && !alters_light(before, after, channel)) {
+                leave(ray, ray.origin + place.path * ray.direction, face_normal);
+                ray.record = place.record;
+                ray.outwards = smooth_normal;
+                continue;
+            }
+            float ior = index_of(kind == KIND_SHEET ? place.object : after, channel) / index_of(before, channel);
+            bool enters = kind == KIND_SHEET || place.object == after;
+            // Textures are read where a ray first meets an object; farther on it counts as the same all over.
+            bool as_first = place.object == seen.object;
+            float roughness = as_first ? seen.finish.roughness : body.roughness;
+            float transmission = as_first ? seen.finish.transmission : body.transmission;
+            vec3 tint = as_first ? seen.finish.color : body.color;
+            float alpha = roughness * roughness;
+#if CLEAR_COAT
+            vec3 coat_normal = smooth_normal;
+            bool polished = roughness == 0.0;
+#endif
+#if MICROFACETS
+            vec3 facet, facet_normal;
+            float facet_alpha = 0.0, full_alpha = 0.0;
+            if (roughness > 0.0 && blurred_share < 1.0) {
+                facet_alpha = sqrt(1.0 - blurred_share) * alpha;
+                full_alpha = alpha;
+                alpha *= sqrt(blurred_share);
+                facet = microfacet_normal(smooth_normal, ray.direction, facet_alpha, microfacet_shares(ray.met, ray.turns));
+                facet_normal = smooth_normal;
+                smooth_normal = facet;
+                roughness = 0.0;
+            }
+#endif
+            float cosine = clamp(-dot(smooth_normal, ray.direction), 0.0, 1.0);
+            float reflectance = interface_reflectance(cosine, ior, roughness);
+            vec3 share_back = vec3(reflectance);
+            vec3 share_on = vec3(1.0 - reflectance);
+#if THIN_FILM
+            vec3 filmed = filmed_reflectance(body.film, reflectance, cosine, ior, index_of(before, channel));
+            share_back = filmed;
+            share_on = 1.0 - filmed;
+#endif
+            vec3 on_way = ray.direction;
+            if (kind == KIND_SHEET) {
+                float through = 1.0 / max(refracted_cosine(cosine, ior), MIN_THIN_LAYER_COSINE);
+                vec3 depth = body.extinction * through;
+#if EMISSION
+                // What a sheet emits goes back and forth in it, too.
+                vec3 leaving = (1.0 - reflectance) / max(1.0 - reflectance * transmittance(depth), vec3(1e-6));
+#if THIN_FILM
+                vec3 mirrored_on = reflectance * transmittance(depth);
+                leaving = (1.0 - filmed) * (1.0 + mirrored_on) / max(1.0 - filmed * transmittance(depth) * mirrored_on, vec3(1e-6));
+#endif
+                sum.light += ray.share * leaving * emitted_radiance(body.emission, body.extinction, through);
+#endif
+#if THIN_FILM
+                share_back = film_slab_reflectance(filmed, reflectance, depth);
+                share_on = film_slab_transmittance(filmed, reflectance, depth);
+#else
+                share_back = slab_reflectance(reflectance, depth);
+                share_on = slab_transmittance(reflectance, depth);
+#endif
+            } else {
+                on_way = kept_on_side(refracted_direction(ray.direction, smooth_normal, ior), -face_normal);
+            }
+#if MICROFACETS
+            if (facet_alpha > 0.0) {
+                float towards = -dot(facet_normal, ray.direction);
+                vec3 mirrored_way = reflected_direction(ray.direction, facet);
+                share_back *= masking_ratio(towards, dot(facet_normal, mirrored_way), full_alpha);
+                share_on *= kind == KIND_SHEET ? 1.0 : masking_ratio(towards, -dot(facet_normal, on_way), full_alpha);
+            }
+#endif
+            vec3 back_way = kept_on_side(reflected_direction(ray.direction, smooth_normal), face_normal);
+#if CLEAR_COAT
+            if (body.clearcoat > 0.0 && (outside || kind == KIND_SHEET)) {
+                float coated = coated_share(vec2(body.clearcoat, body.clearcoat_roughness), clamp(-dot(coat_normal, ray.direction), 0.0, 1.0));
+                share_back *= 1.0 - coated;
+                share_on *= 1.0 - coated;
+                if (polished && body.clearcoat_roughness == 0.0) {
+                    share_back += coated;
+                } else {
+                    float coat_alpha = body.clearcoat_roughness * body.clearcoat_roughness;
+                    vec3 coat_way = kept_on_side(reflected_direction(ray.direction, coat_normal), face_normal);
+                    sum.light += (first ? seen.finish.unoccluded : 1.0) * coated * ray.share
+                        * environment_seen(point, coat_way, true, ray.blur + coat_alpha * coat_alpha);
+                }
+            }
+#endif
+#if PAINTED
+            if (transmission < 1.0 && enters) {
+                Finish finish = seen.finish;
+                if (!as_first) {
+                    finish = finish_of(vec4(float(place.object), roughness, transmission, 0.0));
+                    finish.color = tint;
+                }
+                sum.light += ray.share * share_on * (1.0 - transmission) * paint(finish, point, smooth_normal);
+            }
+#endif
+            if (enters) { share_on *= transmission * tint; }
+            float ior_inside = max(ior, 1.0 / ior);
+            float occlusion = first ? seen.finish.unoccluded : 1.0;
+            Ray back = Ray(point, 0.0, back_way, occlusion * ray.share * share_back, ray.record, ray.met + 1,
+                ray.met == 0 ? 0 : ray.forks, true, ray.blur + alpha * alpha * (outside ? 1.0 : ior_inside * ior_inside),
+                ray.turns * 2 + 1, -smooth_normal);
+            Ray on = Ray(point, 0.0, on_way, ray.share * share_on, place.record, ray.met + 1, ray.forks, ray.reflected,
+                ray.blur + alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0), ray.turns * 2, smooth_normal);
+            leave(back, point, face_normal);
+            leave(on, ray.origin + place.path * ray.direction, face_normal);
+            bool on_stronger = strength(on.share) >= strength(back.share);
+            bool last = ray.met + 1 >= most_interfaces || step > 3 * MOST_STEPS / 4;
+            Ray weaker = back;
+            vec3 arrival = ray.direction;
+            bool arrived_reflected = ray.reflected;
+            vec3 again = outside ? vec3(1.0) : passed;
 #if LAYERED
-        // Light that scatters on the way comes out all the same where media give it back.
-        if (before != AIR && surface_table_row(before).scatters_much > 0.5) { again = vec3(1.0); }
+            // Light that scatters on the way comes out all the same where media give it back.
+            if (before != AIR && surface_table_row(before).scatters_much > 0.5) { again = vec3(1.0); }
 #endif
-        ray = on;
-        if (!on_stronger) {
-            weaker = on;
-            ray = back;
-        }
+            ray = on;
+            if (!on_stronger) {
+                weaker = on;
+                ray = back;
+            }
 #if FORKS > 0
-        weaker.forks -= ray.met == 1 ? 0 : 1;
-        if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > faintest_share) {
-            waiting[waits++] = weaker;
-        } else
+            weaker.forks -= ray.met == 1 ? 0 : 1;
+            if (weaker.forks >= 0 && !last && waits < WAITING && strength(weaker.share) > faintest_share) {
+                waiting[waits++] = weaker;
+            } else
 #endif
-        if (strength(weaker.share) > 0.0) {
-            sum.light += (on_stronger ? again : vec3(1.0)) * weaker.share * seen_ahead(weaker.origin, weaker, weaker.direction, weaker.reflected);
+            if (strength(weaker.share) > 0.0) {
+                vec3 share = (on_stronger ? again : vec3(1.0)) * weaker.share;
+                glimpses[ended++] = seen_ahead(weaker, weaker.direction, share, weaker.reflected);
+            }
+            if (last || strength(ray.share) < faintest_share) {
+                // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
+                bool total = reflectance == 1.0;
+                vec3 share = (on_stronger ? vec3(1.0) : again) * ray.share;
+                glimpses[ended++] = seen_ahead(ray, total ? arrival : ray.direction, share, total ? arrived_reflected : ray.reflected);
+                ends = true;
+            }
         }
-        if (last || strength(ray.share) < faintest_share) {
-            // What is mirrored totally is looked up as if it left straight on: mirrored on, it would most often leave there, too.
-            bool total = reflectance == 1.0;
-            sum.light += (on_stronger ? vec3(1.0) : again) * ray.share
-                * seen_ahead(ray.origin, ray, total ? arrival : ray.direction, total ? arrived_reflected : ray.reflected);
-            ends = true;
+        while (ended > 0) {
+            --ended;
+            sum.light += glimpses[ended].share * light_at(glimpses[ended]);
         }
-    }
+    } while (step < MOST_STEPS && !(ends && waits == 0));
     // Not all has been followed after too many steps, or where a driver cuts long loops short: Mesa does after 65,535 turns.
-    if (!(ends && waits == 0)) { sum.lost = 1.0; }
+    if (!(ends && waits == 0 && ended == 0)) { sum.lost = 1.0; }
     return sum;
 }
 
@@ -480,7 +547,13 @@ void main() {
     if (front.w < NOTHING && !starts_inside) {
         float cosine = clamp(-dot(front.xyz, direction), 0.0, 1.0);
         share = vec3(1.0 - interface_reflectance(cosine, finish.ior, finish.roughness)) * finish.transmission * finish.color;
-        light += highlights(seen.point, front.xyz, direction, finish.ior, highlight_alpha(finish.roughness, surface.w)) * (finish.is_sheet ? 2.0 : 1.0);
+        vec3 glints = highlights(seen.point, front.xyz, direction, finish, highlight_alpha(finish.roughness, surface.w));
+#if CLEAR_COAT
+        float below = 1.0 - coated_share(finish.clearcoat, cosine);
+        share *= below;
+        glints = below * glints + coat_highlights(seen.point, front.xyz, direction, finish, surface.w);
+#endif
+        light += glints;
     }
 #if !EMISSION
     light += share * emitted;

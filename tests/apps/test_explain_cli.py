@@ -95,12 +95,12 @@ def test_explain_says_how_light_scattered_many_times_is_shown(run: Run, cube: Pa
 
 
 def test_what_a_scene_leaves_out_is_a_warning_line(run: Run, tmp_path: Path) -> None:
-    coated = GLASS | {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
+    coated = GLASS | {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 0}}}
     model = write_scene(tmp_path / "scene.glb", {"extensions": coated, "name": "Glass"})
     with warnings.catch_warnings():
         warnings.simplefilter("always")  # pytest turns warnings into errors, which nothing else does
         result = run("explain", model, "--json")
-    lost = "clear coats ('Glass')"
+    lost = "textures of clear coats ('Glass')"
     assert result.err.splitlines() == [f"warning: scene 'scene.glb': left out: {lost}"]
     assert strict_json(result.out)["left_out"] == [lost]
 

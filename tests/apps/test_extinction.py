@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.assets import mesh_path
 from translucent.commands.extinction import TARGETS
 from translucent.commands.on_model import SIZE
+from translucent.formulas.color import linear_to_srgb
 from translucent.media.batch import MOST_SHOWN, convert_table
 from translucent.media.colors import parse_color
 
@@ -237,6 +239,26 @@ def test_a_wedge_is_fitted(run: Run, here: Path) -> None:
     assert (code, err) == (0, "")
     assert "standard error" in out
     assert "residuals of 2 samples" in out
+
+
+def test_photographs_are_fitted(run: Run, here: Path) -> None:
+    rows = np.concatenate([[1.0], 0.92 * np.exp(-100.0 * np.array([1, 2, 4]) * 1e-3)])
+    for name, exposure in (("dim.png", 0.4), ("bright.png", 0.95)):
+        picture = np.repeat(np.repeat(exposure * rows, 20)[None, :, None], 20, axis=0).repeat(3, axis=2)
+        Image.fromarray(np.round(255 * linear_to_srgb(picture)).astype(np.uint8)).save(here / name)
+    how = ("--fit", "dim.png", "--fit", "bright.png", "--white", "0,0,20,20")
+    told = json.loads(run(*how, "--patch", "20,0,60,20=1,2,4", "--unit", "mm", "--json").out)
+    assert np.abs(np.subtract(told["extinction"], 100)).max() <= max(told["interval"]) < 5
+    assert told["surface_loss"] == pytest.approx([0.08] * 3, abs=0.01)
+    assert told["samples"] == [6, 6, 6]
+    code, out, err = run(*how, "--patch", "20,0,60,20=1mm,2mm,4mm", "--ior", "1.5")
+    assert (code, err) == (0, "")
+    assert "to either side hold the extinction with 95 %" in out
+    assert "6, 6, 6 patches in 2 photographs" in out
+    assert "--patch is missing; say where" in one_error_line(run(*how))
+    assert "outside of the picture" in one_error_line(run(*how, "--patch", "70,0,60,20=1mm"))
+    assert "--white; only --fit PHOTO takes it" in one_error_line(run("gray", "1cm", "--white", "0,0,1,1"))
+    assert "give one table or .toml" in one_error_line(run("--fit", "a.csv", "--fit", "b.csv"))
 
 
 # On a model

@@ -9,7 +9,9 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import translucent as tl
 from tests.little import with_few_shadows
@@ -34,6 +36,10 @@ def make_models() -> None:
 
     trimesh.creation.icosphere(subdivisions=2).export("model.glb")
     trimesh.creation.icosphere(subdivisions=2).export("model.stl")
+    Image.fromarray(np.arange(32 * 24, dtype=np.uint16).astype(np.uint8).reshape(24, 32)).save("photo.jpg")
+    # White at 10,10,60,60, and from 90,10 steps of 100 pixels, behind which ever less light is left.
+    steps = np.repeat(np.array([250, 200, 160, 110, 60], dtype=np.uint8), [90, 100, 100, 100, 110])
+    Image.fromarray(np.broadcast_to(steps[None, :, None], (80, 500, 3)).copy()).save("steps.jpg")
 
 
 def little(snippet: str) -> str:
@@ -114,6 +120,7 @@ SMALL = {
     "render": ["--size", "96x72", "--samples", "2"],
     "page": ["--poster", "none", "--stage", "none"],
     "bake": ["--size", "64", "--rays", "16"],
+    "lithophane": ["--pitch", "2mm"],
 }
 
 #: Likewise of `bake --mode scatter`.

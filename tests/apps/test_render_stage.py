@@ -65,10 +65,13 @@ def test_environments_take_the_place_of_the_stage(run: Run, tmp_path: Path, opti
     code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, *SMALL)
     assert code == 0
     assert "shadow_maps" not in out
-    quick = ("--stage", "daylight", "--shadow-size", "64", *SMALL)
-    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, *quick)
+    code, out, _ = run("render", "sphere", "-o", str(tmp_path / "a.png"), *option, "--stage", "daylight", *FEW)
     assert code == 0
-    assert "128 directions of the environment" in out
+    assert " 8 directions of the environment" in out
+
+
+def test_stages_have_128_shadows(run: Run) -> None:
+    assert " 128 directions of the environment" in run("explain", "sphere", "--stage", "daylight").out
 
 
 def test_transparent_pictures_keep_the_shadow(run: Run, tmp_path: Path) -> None:

@@ -241,7 +241,7 @@ def test_frames_show_the_tree_where_interfaces_are() -> None:
 )
 def test_pictures_are_near_full_light_transport(name: str, most: float, transport: ModuleType) -> None:
     scene, side = transport.make(name)
-    frame = CpuRenderer().render(scene, (side, side), tl.plan(scene), samples=16)
+    frame = CpuRenderer().render(scene, (side, side), tl.plan(scene), samples=8)
     assert transport.errors(frame.radiance, transport.load(name))["nrmse"] < most
 
 

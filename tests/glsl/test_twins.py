@@ -15,6 +15,7 @@ from translucent.gpu.probe import run_function, signatures
 #: Functions of these modules that are no formulas of light, and so have no twin.
 HOST_ONLY = {
     "color": {"to_hex"},
+    "diffusion": {"haze_shares"},
     "lights": {"light_cone"},
     "camera": {"check_size"},
     "tone": {"tone_curve"},

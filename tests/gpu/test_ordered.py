@@ -17,6 +17,7 @@ from tests.scans import scan
 from translucent.assets import mesh_path
 from translucent.frames.metrics import interior
 from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.constants import PEEL_BATCH
 from translucent.gpu.storage import Storage
 from translucent.gpu.timer import PassTimer
 
@@ -208,8 +209,9 @@ def shells(count: int) -> tl.Scene:
 
 
 def test_a_hundred_nested_shells(renderer: tl.Renderer) -> None:
+    """Which lists and buffers hold at once; peeling holds no more than a batch, whatever their number."""
     scene, size = shells(100), (48, 36)
-    for method in (tl.FragmentLists(), tl.DepthPeeling(max_layers=200), tl.KBuffer(k=200)):
+    for method in (tl.FragmentLists(), tl.KBuffer(k=200)):
         frame = assert_equal_to_reference(renderer, scene, size, method)
         assert frame.layers.max() == 200
 
@@ -249,8 +251,9 @@ def test_pixels_without_anything_have_no_layers(renderer: tl.Renderer, method: A
 
 
 def test_peeling_goes_on_in_batches(renderer: tl.Renderer) -> None:
-    """Forty shells need more passes than are folded at a time, and windings that wait in textures."""
-    scene, size = shells(40), (64, 48)
+    """Twelve shells need more passes than are folded at a time, and windings that wait in textures."""
+    scene, size = shells(12), (64, 48)
+    assert 2 * len(scene.objects) > 2 * PEEL_BATCH, "three batches"
     for order in ("both-ends", "front-to-back", "back-to-front"):
         assert_equal_to_reference(renderer, scene, size, tl.DepthPeeling(max_layers=100, order=order))
 
@@ -296,9 +299,10 @@ def test_many_media(renderer: tl.Renderer, method: Any, count: int) -> None:
         for _ in range(count)
     ]
     scene = tl.Scene(objects, tl.Camera.look_at((1, 2, 7), (0, 0, 0)))
-    frame = renderer.render(scene, (96, 72), method)
-    truth = references.render(scene, (96, 72))
-    inside = interior(references.hit_counts(scene, (96, 72)))
+    size = (64, 48)
+    frame = renderer.render(scene, size, method)
+    truth = references.render(scene, size)
+    inside = interior(references.hit_counts(scene, size))
     assert frame.valid.all()
     assert np.quantile(np.abs(frame.radiance - truth.radiance)[inside], 0.99) <= 1e-5 * float(truth.radiance.max())
 

@@ -40,6 +40,12 @@ do = "wheel"
 steps = 1.0
 [[action]]
 do = "select"
+panel = "Scene"
+[[action]]
+do = "hide"
+number = 0
+[[action]]
+do = "select"
 panel = "Look"
 [[action]]
 do = "wait"
@@ -133,8 +139,9 @@ def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  #
     told = json.loads(done.stdout)
     assert told["model"] == "leaf"
     texts = {kind: [m["text"] for m in told["messages"] if m["kind"] == kind] for kind in ("info", "warning", "error")}
-    assert len(texts["error"]) == 1
-    assert "bad.glb" in texts["error"][0]
+    assert len(texts["error"]) == 2
+    assert "the only one on show" in texts["error"][0]
+    assert "bad.glb" in texts["error"][1]
     assert f"wrote {picture}" in texts["info"]
     assert "color = [" in session.read_text()
     assert asked.read_text() == session.read_text(), "the built-in browser asks where it is to be written"

@@ -13,6 +13,7 @@ from scipy import sparse
 import translucent as tl
 from translucent.bench.shapes import joined
 from translucent.diffusion.cells import TOLERANCE
+from translucent.diffusion.densities import even_densities
 from translucent.diffusion.entering import Casters, from_light, opaque_surfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_body
 from translucent.diffusion.grid import BodyGrid, body_grid, box_points, other_plane_points, plane_points
@@ -22,12 +23,14 @@ from translucent.diffusion.solution import (
     BodySystem,
     SurfaceLight,
     _Channel,
+    _DeepWays,
     _first_ways,
     _half_space_excess,
     _tails,
-    _turned_back,
 )
+from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient
+from translucent.formulas.diffusion import HAZE_MIRRORED, haze_shares
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.scattering import Diffusion
 from translucent.reference import slabs
@@ -229,7 +232,7 @@ def test_wide_slabs_reflect_and_transmit(slab: BodyGrid, albedo: float, ior: flo
 def test_deep_slabs_that_scatter_ahead_reflect(slab: BodyGrid, anisotropy: float) -> None:
     """Against layers that are added and doubled; similar ones that scatter to all sides alike reflect up to twice that.
 
-    Measured, found over exact, for albedos of 0.6 and 0.95: 1.003 and 1.011 at g = 0.5, 1.000 and 1.006 at 0.9.
+    Measured: up to 1.9 % more, at g = 0.9 and an albedo of 0.6, where four depths stand for all first events.
     """
     albedo = np.array([0.6, 0.95, 0.0])
     depth = 60 / (1 - albedo * anisotropy)
@@ -238,7 +241,7 @@ def test_deep_slabs_that_scatter_ahead_reflect(slab: BodyGrid, anisotropy: float
     middle = np.abs(slab.points[:, [0, 2]]).max(axis=1) < 1
     fluence = lit(slab, medium, np.where(top, 1.0, 0.0)[:, None]).fluence[top & middle].mean(axis=0)
     exact = [slabs.shares(w, d, 1.33, anisotropy)[0] for w, d in zip(albedo.tolist(), depth.tolist(), strict=True)]
-    np.testing.assert_allclose(diffuse_interface(1.33).exit_share * fluence, exact, rtol=0.015)
+    np.testing.assert_allclose(diffuse_interface(1.33).exit_share * fluence, exact, rtol=0.025)
 
 
 def test_exact_slabs_are_exact() -> None:
@@ -305,7 +308,8 @@ def test_lamps_in_lossless_hollows_light_the_outside(ior: float, off: float) -> 
 def test_the_system_is_symmetric_and_positive() -> None:
     """So light goes both ways between any two places alike, and conjugate gradients get there."""
     grid = ball_grid(10)
-    channel = _Channel(grid, 1.4, 0.0, 0.5, 5.0, _first_ways(grid, 1.4))
+    dense, ways = even_densities(grid), _first_ways(grid, 1.4)
+    channel = _Channel(grid, 1.4, 0.0, 0.5, 5.0, _DeepWays(dense, ways, dense.lengths(ways)))
     matrix = channel._cells._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive
@@ -334,10 +338,17 @@ def test_channels_without_scattering_stay_dark() -> None:
 
 @pytest.mark.parametrize("anisotropy", [-0.5, 0.8])
 def test_anisotropy_counts_by_similarity(anisotropy: float) -> None:
+    """Where nothing is absorbed; else less light is turned back the more it is scattered ahead."""
     grid = ball_grid(10)
-    plain = lit(grid, tl.Medium(0.1, 5.0)).fluence
-    ahead = lit(grid, tl.Medium(0.1, 5.0 / (1 - anisotropy), anisotropy=anisotropy)).fluence
-    np.testing.assert_allclose(ahead, _turned_back(5.0 / 5.1, 1.0, anisotropy) * plain, rtol=1e-9)
+    absorption = np.array([0.0, 0.1, 5.0])
+    plain = lit(grid, tl.Medium(absorption, 5.0, ior=1.4)).fluence.mean(axis=0)
+    ahead = lit(grid, tl.Medium(absorption, 5.0 / (1 - anisotropy), anisotropy=anisotropy, ior=1.4)).fluence.mean(
+        axis=0
+    )
+    # Modes conserve light to the root of the rounding.
+    assert ahead[0] == pytest.approx(plain[0], rel=1e-4)
+    more = (ahead[1:] / plain[1:] - 1) * -np.sign(anisotropy)
+    assert (more > [1e-5, 0.05]).all()
 
 
 def test_size_does_not_matter() -> None:
@@ -458,3 +469,44 @@ def test_other_bodies_dim_lights_on_their_way_in(inside: bool) -> None:
         assert (share >= np.exp(-2.0 * absorption) * 0.999).all()
     else:
         np.testing.assert_allclose(dimmed[seen], (alone * np.exp(-0.3 * absorption))[seen], rtol=1e-5)
+
+
+# Light that is scattered ahead
+
+
+@pytest.mark.parametrize("passed", [1.0, 0.6, 0.0])
+def test_haze_is_mirrored_until_it_leaves(passed: float) -> None:
+    """The closed form against its sum, mirror by mirror; nothing is lost where nothing is absorbed."""
+    far, near = haze_shares(0.6, passed)
+    inside, out = HAZE_MIRRORED * 0.6, [1.0 - HAZE_MIRRORED * 0.6, 0.0]
+    for bounce in range(1, 200):
+        out[bounce % 2] += inside * passed * 0.4
+        inside *= passed * 0.6
+    np.testing.assert_allclose((far, near), out, rtol=1e-12)
+    if passed == 1.0:
+        assert far + near == pytest.approx(1.0, abs=1e-12)
+
+
+def test_haze_is_mirrored_less_than_diffuse_light() -> None:
+    """By the mean cosine c of what is scattered by Henyey and Greenstein on its way across.
+
+    Of that, similarity takes the share 1 - c for isotropic, which interfaces mirror as they do diffuse light, and c for
+    unscattered: r - (r - m(c)) / c of which is mirrored, if they mirror m(c) of all. Between 0.28 and 0.6 of r.
+    """
+    interface, (mu, weight) = diffuse_interface(1.5), slabs.cosines(1.5)
+    entering = mu * weight * (1.0 - optics.fresnel_dielectric(mu, 1 / 1.5))
+    inside = (np.arange(200) + 0.5) / 200
+    mirror, around = optics.fresnel_dielectric(inside, 1 / 1.5), np.cos((np.arange(64) + 0.5) / 64 * np.pi)
+    level = np.sqrt(1 - mu**2)[:, None] * np.sqrt(1 - inside**2)
+    turn = (mu[:, None] * inside)[..., None] + level[..., None] * around
+    found = []
+    for depth in (0.5, 4.0, 16.0):
+        scattered = 1.2 * depth  # along the mean of the ways across
+        c = (math.exp(-0.1 * scattered) - math.exp(-scattered)) / (1 - math.exp(-scattered))
+        flux = ((1 - c * c) / (1 + c * c - 2 * c * turn) ** 1.5).mean(axis=-1) * inside
+        mirrored = float((flux @ mirror / flux.sum(axis=1)) @ entering / entering.sum())
+        r = interface.reflected
+        found.append((r - (r - mirrored) / c) / r)
+    assert found == sorted(found)
+    assert found[0] == pytest.approx(0.28, abs=0.01)
+    assert found[0] < HAZE_MIRRORED < found[-1] < 0.6

@@ -177,10 +177,15 @@ def test_the_transmission_test_has_clear_bodies_of_five_indices(assets: Path) ->
 
 
 def test_transmission_0_keeps_a_volume_opaque(assets: Path) -> None:
-    with pytest.warns(tl.TranslucentWarning, match=r"left out: iridescence \(.*'\)$"):
+    with pytest.warns(tl.TranslucentWarning, match=r"left out: textures of iridescence \(.*'\)$"):
         scene = tl.load_scene(assets / "gltf" / "IridescenceSuzanne.glb")
     assert [item.medium for item in scene.objects] == [None, None, tl.Medium(ior=1.5)]
     assert np.asarray(scene.objects[0].color) == pytest.approx([0.4, 0.4, 0.4])
+    films = [
+        item.surface and (item.surface.iridescence_ior, item.surface.iridescence_thickness) for item in scene.objects
+    ]
+    # The thickness of one varies by a texture.
+    assert films == [(ior, pytest.approx(400e-9)) for ior in (1.33, 1.33, 1.8)]
     (light,) = scene.lights
     assert np.asarray(light.irradiance).tolist() == [2.0, 2.0, 2.0]
     assert np.asarray(light.direction).tolist() == [0.0, 0.0, -1.0]

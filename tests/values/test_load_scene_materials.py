@@ -67,8 +67,14 @@ def test_everything_else_is_opaque_in_its_base_color(tmp_path: Path, extensions:
             {"alphaMode": "BLEND", "pbrMetallicRoughness": HALF, "extensions": glass()},
             "alphaMode BLEND of translucent objects ('Stuff')",
         ),
-        ({"extensions": {"KHR_materials_clearcoat": {}}}, "clear coats ('Stuff')"),
-        ({"extensions": glass() | {"KHR_materials_iridescence": {}}}, "iridescence ('Stuff')"),
+        (
+            {"extensions": {"KHR_materials_clearcoat": {"clearcoatNormalTexture": {"index": 0}}}},
+            "textures of clear coats ('Stuff')",
+        ),
+        (
+            {"extensions": glass() | {"KHR_materials_iridescence": {"iridescenceTexture": {"index": 0}}}},
+            "textures of iridescence ('Stuff')",
+        ),
         (
             {
                 "extensions": {
@@ -97,7 +103,7 @@ def test_what_a_material_loses_is_told(tmp_path: Path, material: Json, line: str
 def test_losses_are_listed_once_and_shortly(tmp_path: Path) -> None:
     writer = Writer()
     for i in range(6):
-        coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
+        coat = {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 0}}}
         blend = writer.material(
             name=f"Blend {min(i, 4)}", alphaMode="BLEND", pbrMetallicRoughness=HALF, extensions=coat
         )
@@ -108,7 +114,7 @@ def test_losses_are_listed_once_and_shortly(tmp_path: Path) -> None:
         scene = load(writer, tmp_path)
     assert scene.left_out == (
         "extensions (EXT_mesh_gpu_instancing)",
-        "clear coats ('Blend 0', 'Blend 1', 'Blend 2' and 2 more)",
+        "textures of clear coats ('Blend 0', 'Blend 1', 'Blend 2' and 2 more)",
         f"{BLENDED} ('Blend 0', 'Blend 1', 'Blend 2' and 2 more)",
         "animations (1)",
     )

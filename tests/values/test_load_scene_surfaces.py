@@ -107,6 +107,12 @@ def test_an_opaque_object_has_all_that_its_material_says(tmp_path: Path) -> None
             "KHR_materials_ior": {"ior": 2.0},
             "KHR_materials_emissive_strength": {"emissiveStrength": 4.0},
             DIFFUSE: {"diffuseTransmissionFactor": 0.5, "diffuseTransmissionColorFactor": [1, 0.5, 0.25]},
+            "KHR_materials_iridescence": {
+                "iridescenceFactor": 0.5,
+                "iridescenceIor": 1.8,
+                "iridescenceThicknessMaximum": 250,
+            },
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.75, "clearcoatRoughnessFactor": 0.125},
         },
     }
     path = plate(tmp_path, material, png(PICTURE))
@@ -117,6 +123,9 @@ def test_an_opaque_object_has_all_that_its_material_says(tmp_path: Path) -> None
     assert np.asarray(item.base_color).tolist() == [0.1, 0.2, 0.3]
     assert np.asarray(found.emissive).tolist() == [2.0, 4.0, 0.0]
     assert np.asarray(found.diffuse_transmission_color).tolist() == [1.0, 0.5, 0.25]
+    assert (found.iridescence, found.iridescence_ior) == (0.5, 1.8)
+    assert found.iridescence_thickness == pytest.approx(250e-9)
+    assert (found.clearcoat, found.clearcoat_roughness) == (0.75, 0.125)
     assert (found.alpha_cutoff, found.double_sided) == (0.5, True)  # of the texture's own opacity
     # The same picture as numbers is one texture; as encoded colors, another.
     assert found.roughness_texture is found.normal_texture
@@ -127,6 +136,7 @@ def test_an_opaque_object_has_all_that_its_material_says(tmp_path: Path) -> None
 def test_factors_that_are_not_stated_have_the_defaults_of_gltf(tmp_path: Path) -> None:
     found = surface(plate(tmp_path, {}))
     assert (found.metallic, found.roughness, found.ior, found.alpha_cutoff, found.double_sided) == (1, 1, 1.5, 0, False)
+    assert (found.iridescence, found.iridescence_ior, found.clearcoat, found.clearcoat_roughness) == (0, 1.3, 0, 0)
 
 
 def test_a_body_has_tint_roughness_dispersion_and_share_of_transmission(tmp_path: Path) -> None:

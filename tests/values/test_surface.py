@@ -22,6 +22,9 @@ PICTURE = np.arange(24, dtype=np.float64).reshape(2, 4, 3) / 24
         ({"ior": 0.9}, "surface ior 0.9; not in 1 to 100"),
         ({"alpha_cutoff": 2}, "surface alpha_cutoff 2; not in 0 to 1"),
         ({"dispersion": 11}, "surface dispersion 11; not in 0 to 10"),
+        ({"iridescence_thickness": 400}, "surface iridescence_thickness 400; not in 0 to 0.0001"),  # nm
+        ({"iridescence_ior": 0.9}, "surface iridescence_ior 0.9; not in 1 to 100"),
+        ({"clearcoat": 1.5}, "surface clearcoat 1.5; not in 0 to 1"),
         ({"color": (1, 2, 0)}, r"surface color \(1, 2, 0\); not three numbers in 0 to 1"),
         ({"emissive": (-1, 0, 0)}, r"surface emissive \(-1, 0, 0\); not three numbers in 0 to 1e\+18"),
         ({"emissive": "glow"}, "'glow'"),

@@ -24,12 +24,12 @@ from translucent.commands.common import (
     triple_text,
 )
 from translucent.commands.console import echo
+from translucent.commands.fitting import fit_options, fitted, is_table
 from translucent.commands.on_model import doubts_on, report_on, thickness_on, told_on
 from translucent.errors import InputError, TranslucentError
 
 if TYPE_CHECKING:
     from translucent.frames.frame import Frame
-    from translucent.media.fitting import Fit
     from translucent.media.medium import Medium
 
 TARGETS = (
@@ -38,7 +38,7 @@ TARGETS = (
 
 
 class _Wanted(NamedTuple):
-    """What is to be told of a medium, and how."""
+    """Facts to be told of a medium, and their form."""
 
     target: str | None
     ior: float | None
@@ -57,7 +57,12 @@ _DEFAULT = click.core.ParameterSource.DEFAULT
 @click.option("--unit-out", default="m", show_default=True, metavar="U", help="Give the extinction per this unit, too.")
 @clamp_option
 @click.option("--as", "target", type=click.Choice(TARGETS), help="Print the material for an engine, to paste.")
-@click.option("--ior", type=float, metavar="N", help="Of --as: its index of refraction. Default: the medium's, or 1.")
+@click.option(
+    "--ior",
+    type=float,
+    metavar="N",
+    help="Of --as and of photographs: index of refraction. Default: the medium's, or 1.",
+)
 @click.option(
     "--roughness",
     type=click.FloatRange(0.0, 1.0),
@@ -66,7 +71,7 @@ _DEFAULT = click.core.ParameterSource.DEFAULT
 )
 @click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
-@click.option("--fit", type=click.Path(path_type=Path), metavar="FILE", help="Fit to rows of distance,color[,weight].")
+@fit_options
 @click.option("--preset", "preset_name", metavar="NAME", help="A named medium instead of a color at a distance.")
 @click.option("--from", "source", metavar="FILE", help="The medium of a .mtlx or .usda file, or of what --as printed.")
 @click.option("--td", metavar="D", help="Transmission distance of a filament for 3D printers instead: 4mm, or 4.")
@@ -94,7 +99,9 @@ def extinction(
     roughness: float | None,
     batch: Path | None,
     output: Path | None,
-    fit: Path | None,
+    fits: tuple[Path, ...],
+    white: str | None,
+    patches: tuple[str, ...],
     preset_name: str | None,
     source: str | None,
     td: str | None,
@@ -113,6 +120,9 @@ def extinction(
 
     With --td D, the gray medium of a filament with this transmission distance: translucent extinction --td 4mm. Makers
     agree that next to no light passes there, not on the share: it is --td-transmittance, and told with every result.
+
+    With --fit PHOTO, the medium of plates photographed before a light, with error bars; --ior says what their faces
+    reflect: translucent extinction --fit steps.jpg --white 10,10,60,60 --patch 90,10,400,60=1mm,2mm,4mm,8mm
     """
     from translucent.media.colors import QUOTE_HINT
     from translucent.units import metres_per_unit
@@ -123,14 +133,17 @@ def extinction(
         td = f"{td}mm"
     media: dict[str, object] = {
         "--batch": batch,
-        "--fit": fit,
+        "--fit": fits or None,
         "COLOR": color,
         "--preset": preset_name,
         "--from": source,
         "--td": td,
     }
-    _check_usage(media, {"--batch": batch, "--fit": fit, "--on": model}, {"--json": as_json or None, "--as": target})
-    for option, value in (("--ior", ior), ("--roughness", roughness)):
+    _check_usage(
+        media, {"--batch": batch, "--fit": fits or None, "--on": model}, {"--json": as_json or None, "--as": target}
+    )
+    of_photographs = bool(fits) and not is_table(fits)
+    for option, value in (("--ior", None if of_photographs else ior), ("--roughness", roughness)):
         if value is not None and target is None:
             raise InputError(f"{option} {value:g}", "only a material for an engine has it", "add --as, or leave it out")
     wanted = _Wanted(target, ior, read_roughness(roughness, preset_name) or 0.0, td_transmittance, as_json)
@@ -144,10 +157,14 @@ def extinction(
         if target is not None:
             raise InputError(f"--as {target}", "it takes one color, not --batch", "leave one of them out")
         return _batch(batch, output, unit, unit_out, clamp is not False)
-    if fit is not None:
+    if not fits and (white is not None or patches):
+        raise InputError("--white" if white is not None else "--patch", "only --fit PHOTO takes it", "add --fit PHOTO")
+    if fits:
         if clamp:
             raise InputError("--clamp", "a sample made up would bend --fit", "leave rows with a channel of 0 out")
-        return _fit(fit, unit, unit_out, wanted)
+        found = fitted(fits, white, patches, ior, unit, unit_out)
+        _tell(found.told, found.medium, found.distance, wanted)
+        return None if as_json or target is not None else echo(found.report)
     medium = _given_medium(source, preset_name, unit) if td is None else _filament(td, unit, td_transmittance)
     if medium is None and (color is None or (distance is None and model is None)):
         missing, hint = ("'COLOR'", QUOTE_HINT) if color is None else ("'DISTANCE'", "")
@@ -299,28 +316,3 @@ def _batch(table: Path, output: Path | None, unit: str, unit_out: str, clamp: bo
         raise TranslucentError(
             f"{len(done.errors)} of {total} rows failed", f"the others are in {output or 'the output'}"
         )
-
-
-def _fit(table: Path, unit: str, unit_out: str, wanted: _Wanted) -> None:
-    import numpy as np
-
-    from translucent.media.conversion import summary
-    from translucent.media.fitting import fit_wedge
-
-    fit = fit_wedge(table, unit)
-    distance = float(np.median(fit.distances))
-    told = summary(fit.medium.transmittance(distance), distance, fit.medium.extinction, unit_out)
-    told["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
-    error = None if fit.standard_error is None else fit.standard_error.tolist()
-    told |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
-    _tell(told, fit.medium, distance, wanted)
-    if not wanted.as_json and wanted.target is None:
-        echo(_fit_report(fit))
-
-
-def _fit_report(fit: Fit) -> str:
-    error = "unknown with one sample" if fit.standard_error is None else f"{triple_text(fit.standard_error)} 1/m"
-    lines = [f"standard error  {error}", f"residuals of {len(fit.distances)} samples, log(color / fit):"]
-    for distance, residual in zip(fit.distances, fit.residuals, strict=True):
-        lines.append(f"at {distance:<12.4g} m {triple_text(residual)}")
-    return "\n".join(lines)

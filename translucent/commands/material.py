@@ -62,6 +62,11 @@ def _describe(entry: GltfMaterial) -> None:
             echo(f"  scattering  {triple_text(medium.scattering)} 1/m, anisotropy {medium.anisotropy:g}")
     if entry.dispersion:
         echo(f"  dispersion  {entry.dispersion:10.5g}")
+    if entry.iridescence:
+        film = f"{1e9 * entry.iridescence_thickness:.5g} nm of ior {entry.iridescence_ior:g}"
+        echo(f"  iridescence {entry.iridescence:10.5g}, {film}")
+    if entry.clearcoat:
+        echo(f"  clearcoat   {entry.clearcoat:10.5g}, roughness {entry.clearcoat_roughness:g}")
     if any(entry.emissive):
         echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
     for warning in entry.warnings:

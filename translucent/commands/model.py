@@ -64,7 +64,7 @@ class CameraOptions(NamedTuple):
 
 
 class FileLook(NamedTuple):
-    """Which of its looks a file has, and media for single objects: the options of `translucent.commands.objects`."""
+    """Choice of a file's looks, and media for single objects: the options of `translucent.commands.objects`."""
 
     media: Sequence[NamedMedium] = ()
     variant: str | None = None

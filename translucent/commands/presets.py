@@ -60,7 +60,8 @@ def _listed(group: str | None, search: str | None) -> list[Preset]:
             raise InputError(f"--group {group!r}", "no group is called so", f"use one of {', '.join(groups)}")
         found = {one.name: one for one in chosen}
     if search is not None and not (found := matching(found, search)):
-        raise InputError(f"--search {search!r}", "no preset has these words", "use fewer, or see 'translucent presets'")
+        which = "no preset" if group is None else f"no preset of --group {group!r}"
+        raise InputError(f"--search {search!r}", f"{which} has these words", "use fewer, or see 'translucent presets'")
     return list(found.values())
 
 

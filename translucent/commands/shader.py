@@ -68,7 +68,7 @@ def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Languag
 
 
 def _placed(block: UniformBlock) -> dict[str, object]:
-    """Where a uniform block is bound, and where its members are in it."""
+    """Binding of a uniform block, and the places of its members in it."""
     fields = block.dtype.fields
     assert fields is not None
     offsets = {name: place for name, (_, place, *_) in fields.items()}

@@ -9,7 +9,6 @@ import numpy as np
 from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.vectors import dot
 from translucent.diffusion.field import DiffusionField
-from translucent.formulas.diffuse_interface import diffuse_interface
 
 
 class DiffusedLight:
@@ -32,18 +31,13 @@ class DiffusedLight:
         """(k,): whether it leaves one of two bodies where they meet, bent or not."""
         return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
 
-    def scattered_ahead(self, body: Integers) -> Array:
-        """(k, 3): part of the extinction around rays in bodies (k,) by light that is scattered ahead, in 1/m."""
-        found = np.zeros((len(body), 3))
+    def haze(self, body: Integers) -> Array:
+        """(k, 3, 3): shares of the extinction around rays in bodies (k,) by light that is scattered ahead, and of that
+        light which leave on the far side and on the near one.
+        """
+        found = np.zeros((len(body), 3, 3))
         for number, field in self._fields.items():
-            found[body == number] = field.scattered_ahead
-        return found
-
-    def mirrored(self, body: Integers) -> Array:
-        """(k,): share of diffuse light inside bodies (k,) that their interfaces mirror."""
-        found = np.zeros(len(body))
-        for number, field in self._fields.items():
-            found[body == number] = diffuse_interface(field.ior).reflected
+            found[body == number] = np.stack([field.ahead, *field.haze])
         return found
 
     def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:

@@ -8,7 +8,8 @@ from translucent.arrays import Array, Integers
 from translucent.cpu.meetings import Meetings
 from translucent.cpu.vectors import dot, unit
 from translucent.formulas import optics
-from translucent.formulas.interface import ggx_distribution, ggx_visibility, slab_reflectance
+from translucent.formulas.interface import CLEARCOAT_IOR, ggx_distribution, ggx_visibility
+from translucent.formulas.thin_film import film_slab_reflectance
 from translucent.reference.interfaces import Optics
 from translucent.reference.rays import Rays
 from translucent.reference.surface_light import SurfaceLight
@@ -26,7 +27,7 @@ class InterfaceLight:
     """
 
     def __init__(self, own: Optics, light: SurfaceLight) -> None:
-        self.scene, self.light = own.scene, light
+        self.own, self.scene, self.light = own, own.scene, light
         surfaces = own.surfaces
         self._paint = np.array([1.0 - surface.transmission for surface in surfaces])
         self._color = np.array([surface.color for surface in surfaces], dtype=np.float64)
@@ -49,7 +50,11 @@ class InterfaceLight:
             self._add_paint(found, rays, met)
         rough = np.flatnonzero(met.alpha > 0) if self.scene.lights else np.empty(0, np.int64)
         if rough.size:
-            self._add_highlights(found, rays, met, rough)
+            coat = met.coat[rough] * optics.fresnel_dielectric(_facing(rays, met, rough), CLEARCOAT_IOR)
+            self._add_highlights(found, rays, met, rough, met.alpha[rough], 1.0 - coat)
+        coats = np.flatnonzero((met.coat > 0) & (met.coat_roughness > 0)) if self.scene.lights else rough[:0]
+        if coats.size:
+            self._add_highlights(found, rays, met, coats, met.coat_roughness[coats] ** 2, None)
         return found
 
     def _add_paint(self, found: Array, rays: Rays, met: Meetings) -> None:
@@ -62,10 +67,15 @@ class InterfaceLight:
             light = self._color[item] * (1.0 - through) * front + through * self._through_color[item] * back
             found[painted] += share[painted] / np.pi * light
 
-    def _add_highlights(self, found: Array, rays: Rays, met: Meetings, rough: Integers) -> None:
-        """Add single reflections of lights, as far as their light reaches the interfaces straight on."""
+    def _add_highlights(
+        self, found: Array, rays: Rays, met: Meetings, rough: Integers, alpha: Array, below: Array | None
+    ) -> None:
+        """Add single reflections of lights, as far as their light reaches the interfaces straight on.
+
+        `below` is what clear coats leave (k,) of those; without it they are of the coats.
+        """
         points, normals, to_eye = rays.origins[rough], met.normals[rough], -rays.directions[rough]
-        cos_view = np.clip(dot(normals, to_eye), 0.0, 1.0)
+        cos_view = _facing(rays, met, rough)
         for light in self.light.paths.lights:
             if isinstance(light, PositionalLight):
                 to_light = unit(np.asarray(light.position) - points)
@@ -74,18 +84,29 @@ class InterfaceLight:
             half = unit(to_eye + to_light)
             cos_half, cos_light = (np.clip(dot(normals, way), 0.0, 1.0) for way in (half, to_light))
             cos_facet = np.clip(dot(half, to_eye), 0.0, 1.0)
-            share = self._mirrored(met.item[rough], cos_facet, met.ior[rough])
-            density = ggx_distribution(cos_half, met.alpha[rough])
-            visible = ggx_visibility(cos_light, cos_view, met.alpha[rough])
+            if below is None:
+                share = (
+                    met.coat[rough, None] * optics.fresnel_dielectric(cos_facet, CLEARCOAT_IOR)[:, None] * np.ones(3)
+                )
+            else:
+                share = below[:, None] * self._mirrored(met, rough, cos_facet)
+            density, visible = ggx_distribution(cos_half, alpha), ggx_visibility(cos_light, cos_view, alpha)
             with np.errstate(under="ignore"):
                 mirrored = share * (density * visible)[:, None] * light.irradiance_on(points, normals)
                 lit = np.flatnonzero(mirrored.any(axis=1))
                 found[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
 
-    def _mirrored(self, item: Integers, cosine: Array, ior: Array) -> Array:
-        """(k, 3): share of light that microfacets mirror, those of sheets from both sides."""
-        share = optics.fresnel_dielectric(cosine, ior)[:, None]
+    def _mirrored(self, met: Meetings, rough: Integers, cosine: Array) -> Array:
+        """(k, 3): share of light that microfacets of `rough` interfaces mirror, those of sheets from both sides."""
+        item, ior = met.item[rough], met.ior[rough]
+        bare = optics.fresnel_dielectric(cosine, ior)
+        share = self.own.filmed(bare, item, met.before[rough], cosine, ior)
         path = optics.thin_layer_thickness(1.0, cosine, ior)[:, None]
         with np.errstate(over="ignore"):
             depth = self._depth[item] * path
-        return np.where(self._is_sheet[item, None], slab_reflectance(share, depth), share)
+        return np.where(self._is_sheet[item, None], film_slab_reflectance(share, bare, depth), share)
+
+
+def _facing(rays: Rays, met: Meetings, chosen: Integers) -> Array:
+    """(k,): cosines between the normals of interfaces and the ways back to the eye."""
+    return np.clip(-dot(met.normals[chosen], rays.directions[chosen]), 0.0, 1.0)

@@ -15,9 +15,8 @@ from translucent.formulas import optics
 from translucent.formulas.interface import (
     reflected_direction,
     refracted_direction,
-    slab_reflectance,
-    slab_transmittance,
 )
+from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance
 from translucent.reference.interfaces import EDGE_ON, Optics
 
 #: Share of light below which a microfacet counts as blocked.
@@ -50,8 +49,8 @@ class Meetings:
 
     Attributes
     ----------
-    item : (k,) int64
-        Whose interfaces these are.
+    item, before : (k,) int64
+        Whose interfaces these are, and the bodies that the beams come from, or `AIR`.
     normals : (k, 3) float64
         For shading, towards where the beams come from.
     ior, alpha : (k,) float64
@@ -66,9 +65,15 @@ class Meetings:
         Radiance that sheets emit.
     blur_reflected, blur_refracted : (k,) float64
         What is added to `Beams.blur`.
+    coated : (k,) float64
+        Share of light mirrored by clear coats that are not as rough as what is below; that of others is in
+        `reflectance`.
+    coat, coat_roughness : (k,) float64
+        Share of the interface that has a clear coat which light comes to from outside, and the roughness of that.
     """
 
     item: Integers
+    before: Integers
     normals: Array
     ior: Array
     alpha: Array
@@ -80,6 +85,9 @@ class Meetings:
     emitted: Array
     blur_reflected: Array
     blur_refracted: Array
+    coated: Array
+    coat: Array
+    coat_roughness: Array
 
 
 class Interfaces:
@@ -95,6 +103,7 @@ class Interfaces:
         self.caster, self.own = caster, own
         surfaces = own.surfaces
         self.alpha = np.array([surface.roughness for surface in surfaces]) ** 2
+        self.coat_roughness = np.array([surface.clearcoat_roughness for surface in surfaces])
         self.transmission = np.array([surface.transmission for surface in surfaces])
         self.color = np.array([surface.color for surface in surfaces], dtype=np.float64)
         self.metres = np.array([metres or 0.0 for metres in own.sheets])
@@ -118,16 +127,21 @@ class Interfaces:
             facets[rough], share[rough] = _at_facets(
                 directions[rough], normals[rough], facets[rough], ior[rough], alpha[rough]
             )
-        share = share[:, None] * np.ones(3)
+        cosine = _facing(directions, facets)
+        bare, share = share[:, None], own.filmed(share, places.item, places.before, cosine, ior)
         passed, emitted = 1.0 - share, np.zeros((len(beams), 3))
         refracted = _towards(refracted_direction(directions, facets, ior), -flat)
         chosen = np.flatnonzero(sheet)
         if chosen.size:
             share[chosen], passed[chosen], emitted[chosen] = self._slabs(
-                places.item[chosen], share[chosen], _facing(directions[chosen], facets[chosen]), ior[chosen]
+                places.item[chosen], share[chosen], bare[chosen], cosine[chosen], ior[chosen]
             )
             refracted[chosen] = directions[chosen]
         enters = sheet | (places.item == places.after)
+        coated = own.coated(places.item, enters, _facing(directions, normals))[:, None]
+        share, passed, emitted = (1.0 - coated) * share, (1.0 - coated) * passed, (1.0 - coated) * emitted
+        alike = self.coat_roughness[places.item] ** 2 == alpha
+        share = share + np.where(alike[:, None], coated, 0.0)
         tint = np.where(enters[:, None], self.color[places.item], 1.0) * self.transmission[places.item, None]
         reflected = _towards(reflected_direction(directions, facets), flat)
         blurred = (1.0 if spread is None else spread.blurred) * alpha * alpha
@@ -138,19 +152,38 @@ class Interfaces:
         # Light goes straight on through a sheet: its two interfaces do no more than to blur.
         shares, narrow_blur = (share, passed, passed * tint, emitted), np.where(sheet, 2.0 * alpha * alpha, blurred)
         return Meetings(
-            places.item, normals, ior, alpha, reflected, refracted, *shares, blurred * wide**2, narrow_blur * narrow**2
+            places.item,
+            places.before,
+            normals,
+            ior,
+            alpha,
+            reflected,
+            refracted,
+            *shares,
+            blurred * wide**2,
+            narrow_blur * narrow**2,
+            np.where(alike, 0.0, coated[:, 0]),
+            np.where(enters, own.coats[places.item], 0.0),
+            self.coat_roughness[places.item],
         )
 
-    def _slabs(self, item: Integers, share: Array, cosine: Array, ior: Array) -> tuple[Array, Array, Array]:
-        """Reflectance, transmittance and emitted radiance (k, 3) of sheets whose surfaces reflect `share` (k, 1)."""
+    def _slabs(
+        self, item: Integers, front: Array, bare: Array, cosine: Array, ior: Array
+    ) -> tuple[Array, Array, Array]:
+        """Reflectance, transmittance and emitted radiance (k, 3) of sheets.
+
+        Their surfaces reflect `front` (k, 3), which has a film, and `bare` (k, 1).
+        """
         path = optics.thin_layer_thickness(self.metres[item], cosine, ior)[:, None]
         with np.errstate(over="ignore", under="ignore"):
             depth = self.extinction[item] * path
-            kept = 1.0 - share * optics.transmittance(depth)
+            again = bare * optics.transmittance(depth)
+            kept = 1.0 - front * optics.transmittance(depth) * again
             # What a sheet emits goes back and forth in it, too.
-            leaving = np.where(kept > 0.0, (1.0 - share) / np.where(kept > 0.0, kept, 1.0), 0.0)
+            leaving = np.where(kept > 0.0, (1.0 - front) * (1.0 + again) / np.where(kept > 0.0, kept, 1.0), 0.0)
             emitted = leaving * optics.emitted_radiance(self.emission[item], self.extinction[item], path)
-        return slab_reflectance(share, depth), slab_transmittance(share, depth), emitted
+            back, on = (f(front, bare[:, 0], depth) for f in (film_slab_reflectance, film_slab_transmittance))
+        return back, on, emitted
 
     def _normals(self, face: Integers, beams: Beams) -> tuple[Array, Array]:
         """Unit normals (k, 3) towards where beams come from: for shading, as they face the beams, and of the faces."""

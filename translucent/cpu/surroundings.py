@@ -51,9 +51,9 @@ class Surroundings:
             seen[mirrored] = self._light(environment, beams.where(mirrored))
         return seen
 
-    def blurred(self, beams: Beams, directions: Array, roughness: float) -> Array:
-        """(n, 3): light of the environment in directions (n, 3), as mirrors of this roughness would blur it."""
-        hazy = replace(beams, directions=directions, blur=np.full(len(beams), roughness**4))
+    def blurred(self, beams: Beams, directions: Array, roughness: float | Array) -> Array:
+        """(n, 3): light of the environment in directions (n, 3), as mirrors of a roughness (n,) would blur it."""
+        hazy = replace(beams, directions=directions, blur=np.broadcast_to(roughness, len(beams)) ** 4)
         return self._light(self.environment, hazy)
 
     def _light(self, environment: Environment, beams: Beams) -> Array:

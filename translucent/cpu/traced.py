@@ -24,8 +24,8 @@ from translucent.cpu.media_record import NOTHING, Items, Record, RecordedMedia, 
 from translucent.cpu.meetings import Interfaces, Meetings, Places
 from translucent.cpu.surroundings import Surroundings
 from translucent.cpu.vectors import dot, largest, unit
-from translucent.formulas import optics
-from translucent.formulas.diffusion import HAZE_MIRRORED, HAZE_ROUGHNESS
+from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.interface import reflected_direction
 from translucent.reference.hits import Hits
 from translucent.reference.interfaces import Optics
 from translucent.reference.opaque import OpaqueHits, reflected_radiance
@@ -225,25 +225,25 @@ class _Growth:
         if emitted is not None:
             self._add(own, emitted)
         if self.tree.diffused:
-            self._add_haze(own, passed, length[inside] * self.caster.radius)
+            self._add_haze(own, passed)
         throughput = beams.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
         return replace(beams, throughput=throughput)
 
-    def _add_haze(self, beams: Beams, passed: Array, length: Array) -> None:
-        """Add what is scattered ahead, over lengths in metres (n,), where diffusion takes it for unscattered."""
-        ahead = self.tree.diffused.scattered_ahead(self.media.dominant(beams.record))
+    def _add_haze(self, beams: Beams, passed: Array) -> None:
+        """Add what is scattered ahead, where diffusion takes it for unscattered."""
+        ahead, far, near = np.moveaxis(self.tree.diffused.haze(self.media.dominant(beams.record)), 1, 0)
         hazy = np.flatnonzero(ahead.any(axis=1))
         if hazy.size:
-            own, ahead = beams.where(hazy), ahead[hazy]
-            extinction = self.media.coefficients(own.record)[0]
-            through = optics.transmittance(np.maximum(extinction - ahead, 0.0) * length[hazy, None])
-            mirrored = 0.5 * HAZE_MIRRORED * self.tree.diffused.mirrored(self.media.dominant(own.record))[:, None]
+            own, ahead, far, near = beams.where(hazy), ahead[hazy], far[hazy], near[hazy]
+            # Of the optical depth, which varies as the density does, the part by such events does not count.
+            with np.errstate(under="ignore"):
+                through = passed[hazy] ** (1.0 - ahead)
             behind, before = (
                 self.tree.surroundings.blurred(own, sign * own.directions, HAZE_ROUGHNESS) for sign in (1.0, -1.0)
             )
-            self._add(own, (through - passed[hazy]) * ((1.0 - mirrored) * behind + mirrored * before))
+            self._add(own, (through - passed[hazy]) * (far * behind + near * before))
 
     def _at_surfaces(self, beams: Beams) -> Beams:
         """Cross the surfaces that beams, with their origins there, have come to; what continues from there."""
@@ -297,6 +297,7 @@ class _Growth:
         """Branches that are followed from interfaces; `there` are the records behind these."""
         met = self.interfaces.meet(beams, places, self.pixel[beams.owner], self.spread)
         self._add(beams, self.light.radiance(self._rays(beams), met))
+        self._add_coats(beams, met)
         beams = replace(beams, met=beams.met + 1)
         back, on = self._both(beams, there, met, places.before == places.after)
         if self.tree.diffused:
@@ -319,6 +320,15 @@ class _Growth:
             self._look_up(branch.where(exists & ~follow))
             kept.append(branch.where(follow))
         return kept
+
+    def _add_coats(self, beams: Beams, met: Meetings) -> None:
+        """Add the environment as clear coats mirror it that are not as rough as what is below."""
+        coated = np.flatnonzero(met.coated)
+        if coated.size:
+            own = beams.where(coated)
+            ways = reflected_direction(own.directions, met.normals[coated])
+            mirrored = self.tree.surroundings.blurred(own, ways, met.coat_roughness[coated])
+            self._add(own, met.coated[coated, None] * mirrored)
 
     def _both(self, beams: Beams, there: Record, met: Meetings, sheet: Mask) -> tuple[Beams, Beams]:
         """Reflected and refracted branches at interfaces, those of sheets included; some carry no light."""

@@ -111,7 +111,7 @@ class FieldCache:
         self, body: Object, medium: Medium, places: Hashable, opaque: EmbreeMesh | None, diffusion: Diffusion
     ) -> DiffusingBody:
         step, roughness = diffusion.cell_size(body), _roughness(body)
-        place = _place(body), places, step
+        place = _place(body), body.density, places, step
         lit = _kept(self._bodies, place, lambda: lit_body(body, opaque, step), KEPT_BODIES)
         key = (place, medium, roughness)
         return _kept(self._diffusing, key, lambda: DiffusingBody(lit, medium, roughness), KEPT_BODIES)

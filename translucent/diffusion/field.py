@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,7 @@ from scipy import sparse
 from scipy.ndimage import map_coordinates, uniform_filter
 
 from translucent.arrays import Array
+from translucent.diffusion.densities import Densities, densities
 from translucent.diffusion.dimming import dimming_bodies
 from translucent.diffusion.entering import (
     Casters,
@@ -25,8 +27,9 @@ from translucent.diffusion.entering import (
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photon_fluence import EnteringPhotons
 from translucent.diffusion.solution import BodySystem, SurfaceLight
+from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, emergent_fluxes
-from translucent.formulas.diffusion import emergent_radiance
+from translucent.formulas.diffusion import emergent_radiance, haze_shares
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.medium import Medium
 from translucent.scene.lights import PositionalLight
@@ -67,8 +70,10 @@ class DiffusionField:
         In the system.
     ior : float
         Of the medium.
-    scattered_ahead : (3,) float64
-        Part of its extinction by light that is scattered ahead, g sigma_s in 1/m, which counts as unscattered here.
+    ahead : (3,) float64
+        Share of its extinction by light that is scattered ahead, g sigma_s / sigma_t, which counts as unscattered here.
+    haze : tuple of two (3,) float64
+        See `haze_shares`.
     """
 
     fluence: npt.NDArray[np.float32]
@@ -83,7 +88,8 @@ class DiffusionField:
     steps: int
     cells: int
     ior: float
-    scattered_ahead: Array
+    ahead: Array
+    haze: tuple[Array, Array]
 
     @property
     def volumes(self) -> tuple[npt.NDArray[np.float32], ...]:
@@ -137,7 +143,7 @@ class Entrance:
 
 @dataclass(frozen=True, eq=False)
 class LitBody:
-    """Geometry of a body in which light diffuses; the same for all media and lights.
+    """Geometry and densities of a body in which light diffuses; the same for all media and lights.
 
     Attributes
     ----------
@@ -150,6 +156,11 @@ class LitBody:
     casters: Casters
     sky: Sky
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
+
+    @cached_property
+    def densities(self) -> Densities:
+        """Densities of the body."""
+        return densities(self.casters.body, self.grid)
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Light that enters through this interface; that of the last one is kept."""
@@ -185,7 +196,7 @@ class DiffusingBody:
         self._lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
         self._entrance = lit.entrance(medium.ior, roughness)
-        self._system = BodySystem(lit.grid, medium, roughness)
+        self._system = BodySystem(lit.grid, medium, roughness, lit.densities)
 
     @np.errstate(under="ignore")
     def field(
@@ -210,7 +221,7 @@ class DiffusingBody:
         if photons is not None:
             entering = entering + flux_of(photons, grid)
         found = self._system.solved(entering, self._entrance.itself, inside)
-        return _field(grid, self._medium, self._roughness, found)
+        return _field(self._lit, self._medium, self._roughness, found)
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:
@@ -225,7 +236,8 @@ def _cell_at(grid: BodyGrid, point: Array) -> int:
     return int(grid.number[tuple(place)])
 
 
-def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight) -> DiffusionField:
+def _field(lit: LitBody, medium: Medium, roughness: float, found: SurfaceLight) -> DiffusionField:
+    grid, extinction = lit.grid, medium.extinction
     reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     total = reduced + np.asarray(medium.absorption)
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
@@ -233,6 +245,9 @@ def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight
     values = np.concatenate([found.fluence, albedo * found.entering], axis=1)
     deep = np.concatenate([found.inside, np.zeros_like(found.inside)], axis=1)
     volume = _spread(grid, values, deep).astype(np.float32)
+    ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
+    # Of diffuse light, four times the volume over the area.
+    chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.densities.cells, weights=grid.volumes))
     return DiffusionField(
         fluence=np.ascontiguousarray(volume[..., :3]),
         entering=np.ascontiguousarray(volume[..., 3:]),
@@ -246,7 +261,8 @@ def _field(grid: BodyGrid, medium: Medium, roughness: float, found: SurfaceLight
         steps=found.steps,
         cells=grid.count,
         ior=medium.ior,
-        scattered_ahead=np.asarray(medium.scattering) * max(medium.anisotropy, 0.0),
+        ahead=ahead / np.where(extinction > 0.0, extinction, 1.0),
+        haze=haze_shares(polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)),
     )
 
 

@@ -65,7 +65,7 @@ class Met:
 
 @dataclass(eq=False)
 class Turn:
-    """What surfaces make of photons.
+    """Photons at surfaces.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class PhotonSurfaces:
     def crossed(
         self, windings: npt.NDArray[np.int16], since: Integers, met: Met, directions: Array
     ) -> tuple[npt.NDArray[np.int16], Integers]:
-        """How often rays are in each object beyond surfaces, and when they came in."""
+        """Counts of how often rays are in each object beyond surfaces, and when they came in."""
         windings, since = windings.copy(), since.copy()
         time = since.max(axis=1, initial=0) + 1
         for i in np.flatnonzero(self._solid):
@@ -186,7 +186,7 @@ class PhotonSurfaces:
         power: Array,
         rng: np.random.Generator,
     ) -> Turn:
-        """What becomes of photons at surfaces, between the objects that decide on both sides, one branch by chance."""
+        """Fate of photons at surfaces, between the objects that decide on both sides, one branch by chance."""
         count = len(points)
         there = met.faces >= 0
         ended = (there & self._opaque).any(axis=1)

@@ -13,6 +13,7 @@ optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 19
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy import sparse
 
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
+from translucent.diffusion.densities import Densities, even_densities
 from translucent.diffusion.grid import BodyGrid, box_points, other_plane_points
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import (
@@ -44,6 +46,9 @@ MOST_SHARE = 0.99
 
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
+
+#: Over 1 / STRAIGHT reduced mean free paths light that leaves has been turned little by little, and not straight back.
+STRAIGHT = 1.0
 
 #: Reduced albedo below which what half-spaces give back is in proportion to it.
 _LEAST_ALBEDO = 1e-6
@@ -77,7 +82,7 @@ class _Layer:
 
     u is 1 at the surface, where it satisfies the condition; the fluence below is that at the depth over u there, and
     the flux to the surface D u' / u times it. All are given times exp(-k d), d the depth of reading, so that nothing
-    overflows however dense the medium.
+    overflows however dense the medium. Depths are integrals of the density.
     """
 
     depth: Array
@@ -119,16 +124,20 @@ class BodySystem:
         In channels in which it does not scatter nothing is found.
     roughness : float
         Of its surface.
+    dense : Densities, optional
+        Of the body; default: `even_densities`.
     """
 
     @np.errstate(under="ignore")
-    def __init__(self, grid: BodyGrid, medium: Medium, roughness: float) -> None:
+    def __init__(self, grid: BodyGrid, medium: Medium, roughness: float, dense: Densities | None = None) -> None:
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         ways = _first_ways(grid, medium.ior)
+        dense = dense or even_densities(grid)
+        deep = _DeepWays(dense, ways, dense.lengths(ways))
         self._channels = {
             channel: _Channel(
-                grid, medium.ior, roughness, float(absorption), float(scattering), ways, medium.anisotropy
+                grid, medium.ior, roughness, float(absorption), float(scattering), deep, medium.anisotropy
             )
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
             if scattering > 0.0
@@ -162,6 +171,15 @@ class BodySystem:
         return SurfaceLight(fluence, flux, cells, steps)
 
 
+@dataclass(frozen=True, eq=False)
+class _DeepWays:
+    """Ways (s, 3) of light below the samples of a body, and metres on them for integrals of its density (s,)."""
+
+    dense: Densities
+    directions: Array
+    length: Callable[[Array], Array]
+
+
 class _Channel:
     """The linear system of one channel."""
 
@@ -172,7 +190,7 @@ class _Channel:
         roughness: float,
         absorption: float,
         scattering: float,
-        ways: Array,
+        deep: _DeepWays,
         anisotropy: float = 0.0,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
@@ -181,26 +199,29 @@ class _Channel:
         extinction = absorption + scattering
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
-        self._read, depth = grid.below
+        self._read, depth = grid.below[0], deep.dense.depth
         layer = _Layer(depth, float(np.sqrt(absorption / d)), interface.conductance / d)
         self._relative = 1.0 / layer.u(depth)
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
-        # Media that scatter ahead turn back less of what enters: so much less of it is scattered here, to all sides.
-        self._scattered = self._albedo * _turned_back(self._albedo, ior, anisotropy)
-        # What of that light the exact half-space gives back less than diffusion would.
-        excess = _half_space_excess(self._albedo, ior) * self._scattered / self._albedo
-        self._excess = excess / diffuse_interface(ior).conductance
-        self._sources(layer, interface, extinction, ways, d)
+        # What of the entering light the exact half-space gives back less than diffusion would.
+        # In thin bodies light that is not turned back leaves on the far side. 4 V / S is the mean chord (Cauchy).
+        chord = 4.0 * float(deep.dense.cells @ grid.volumes) / (grid.area * len(depth))
+        self._straight = _straight_back(self._albedo, ior, anisotropy) * float(optics.opacity(extinction * chord))
+        self._excess = _half_space_excess(self._albedo, ior) / diffuse_interface(ior).conductance
+        self._sources(layer, interface, extinction, deep, d)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
         # the cells, by the solution phi_0 u + (1 - cosh(k z)) q / sigma_a in the layer.
         self._glow_near = layer.bend() / d * self._relative
         below = grid.area * (layer.rise(depth) + layer.condition * layer.bend()) * self._relative
-        self._glow_cells = grid.cores + self._read.T @ below
+        self._glow_cells = deep.dense.cells * grid.cores + self._read.T @ below
         lost = grid.area * d * layer.slope() * self._relative
         absorbing = np.maximum(grid.volumes - grid.layers, _LEAST_ABSORBING * grid.volumes)
-        self._cells = CellSystem(grid, np.full(grid.count, d), absorption * absorbing, lost)
+        absorbed = absorption * deep.dense.cells * absorbing
+        self._cells = CellSystem(grid, deep.dense.diffusion_coefficients(d), absorbed, lost)
 
-    def _sources(self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: Array, d: float) -> None:
+    def _sources(
+        self, layer: _Layer, interface: DiffuseInterface, extinction: float, ways: _DeepWays, d: float
+    ) -> None:
         """First events: their power in each cell, and the fluence that they make at the surface, for a unit of flux."""
         grid, count = self._grid, len(self._grid.points)
         # Shares of the light that is scattered above the depth of reading, and below it.
@@ -209,20 +230,26 @@ class _Channel:
         self._near, into_cells = np.zeros(count), np.zeros(count)
         for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
             depth = -np.log1p(-quantile * above) * interface.mean_cosine / extinction
-            share = self._scattered / EVENTS * above * self._relative
+            turned = self._turned(extinction / interface.mean_cosine * depth)
+            share = self._albedo / EVENTS * above * self._relative * turned
             into_cells += share * layer.u(depth)
             self._near += share * layer.rise(layer.depth - depth) / d
         deep = sparse.csr_array((count, grid.count))
         # Interpolation by chance: each place stands for the cell around it.
         spread = grid.cells.step * (box_points(count) - 0.5)
         for quantile in _tails(count) if below.max() > _NOTHING else ():
-            path = slant - np.log1p(-quantile) / extinction
+            length = slant - np.log1p(-quantile) / extinction
+            path = ways.length(length)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
-            cell, inside = grid.cell_at(grid.points + path[:, None] * ways + spread)
-            share = self._scattered / DEEP_EVENTS * below * inside
+            cell, inside = grid.cell_at(grid.points + path[:, None] * ways.directions + spread)
+            share = self._albedo / DEEP_EVENTS * below * inside * self._turned(extinction * length)
             deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
+
+    def _turned(self, path: Array) -> Array:
+        """Share of the first events after an optical path from the surface that count as if they were isotropic."""
+        return np.asarray(1.0 - self._straight * optics.transmittance(STRAIGHT * path))
 
     def solved(
         self, entering: Array, from_itself: sparse.csr_array, power: Array, emission: float
@@ -277,15 +304,25 @@ def _first_ways(grid: BodyGrid, ior: float) -> Array:
 
 def _half_space_excess(albedo: float, ior: float) -> float:
     """Share of the light entering a half-space that diffusion gives back beyond the exact one."""
+    return float(_diffused_share(albedo, ior) - half_space_reflectance(round(albedo, 6), ior))
+
+
+def _diffused_share(albedo: float, ior: float, dimmed: float = 0.0) -> float:
+    """Share of the light entering a half-space that diffusion gives back.
+
+    `dimmed`: of first events after an optical path t from the surface those count that exp(-dimmed t) leaves.
+    """
     interface = diffuse_interface(ior)
     d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance
-    attenuation = np.sqrt((1.0 - albedo) / d)
-    diffused = albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine))
-    return float(diffused - half_space_reflectance(round(albedo, 6), ior))
+    attenuation = float(np.sqrt((1.0 - albedo) / d))
+    return albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine + dimmed))
 
 
-def _turned_back(albedo: float, ior: float, anisotropy: float) -> float:
-    """Share that an exact half-space gives back, over that of the one which scatters alike to all sides.
+def _straight_back(albedo: float, ior: float, anisotropy: float) -> float:
+    """Share of the first events at the surface that do not count, as media that scatter ahead turn less light back.
+
+    After an optical path t it is exp(-STRAIGHT t) times as much: so much in all that a half-space gives back what the
+    exact one does.
 
     Parameters
     ----------
@@ -294,7 +331,8 @@ def _turned_back(albedo: float, ior: float, anisotropy: float) -> float:
     ior, anisotropy : float
     """
     if anisotropy == 0.0:
-        return 1.0
+        return 0.0
     reduced = max(round(albedo, 6), _LEAST_ALBEDO)
     own = reduced / (reduced + (1.0 - reduced) * (1.0 - anisotropy))
-    return half_space_reflectance(own, ior, anisotropy) / half_space_reflectance(reduced, ior)
+    less = half_space_reflectance(reduced, ior) - half_space_reflectance(own, ior, anisotropy)
+    return less / _diffused_share(reduced, ior, STRAIGHT)

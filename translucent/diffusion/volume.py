@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from translucent.arrays import Array
 from translucent.diffusion.cells import CellSystem
+from translucent.diffusion.densities import cell_means
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photon_fluence import FineCells
@@ -41,9 +42,6 @@ POINTS_A_CELL = 1.5
 
 #: Cells that count as none of a way.
 _STILL = 1e-9
-
-#: Points in each cell, along each axis, at which its density is looked at.
-_PLACES = (0.25, 0.75)
 
 #: Places in each cell, along each axis, at which it is looked for the light of a spot.
 _BEAM_PLACES = 4
@@ -109,7 +107,7 @@ class VolumeGrid:
 
     def __init__(self, body: Object, step: float) -> None:
         self.grid: BodyGrid = body_grid(body, step)
-        self.density = self.grid.cells.inside * _cell_means(body, self.grid)
+        self.density = self.grid.cells.inside * cell_means(body, self.grid)
         self.thickness = body.mean_thickness
 
     @property
@@ -232,18 +230,6 @@ def _system(volume: VolumeGrid, dense: Array, absorption: float, scattering: flo
     # Half of the fluence leaves, as much as gets there.
     lost = grid.area / (2.0 + depth / np.maximum(read @ d, np.finfo(np.float64).tiny))
     return CellSystem(grid, d, absorption * density * grid.cells.step**3, lost)
-
-
-def _cell_means(body: Object, grid: BodyGrid) -> Array:
-    """(x, y, z): mean density of the body in each cell."""
-    if body.density is None:
-        return np.ones(grid.number.shape)
-    corner = np.stack(np.meshgrid(*(np.arange(n) for n in grid.number.shape), indexing="ij"), axis=-1)
-    rows = body.to_unit_box(grid.cells.low)
-    total = np.zeros(grid.number.shape)
-    for place in np.stack(np.meshgrid(_PLACES, _PLACES, _PLACES), axis=-1).reshape(-1, 3):
-        total += body.density.at((corner + place) * grid.cells.step @ rows[:, :3].T + rows[:, 3])
-    return total / len(_PLACES) ** 3
 
 
 def _from_lights(

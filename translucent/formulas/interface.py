@@ -19,6 +19,9 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.formulas import optics
 
+#: Index of refraction of clear coats (KHR_materials_clearcoat).
+CLEARCOAT_IOR = 1.5
+
 
 @np.errstate(under="ignore")
 def reflected_direction(direction: npt.ArrayLike, normal: npt.ArrayLike) -> Array:

@@ -18,11 +18,11 @@ from translucent.gltf.fields import label, refused
 from translucent.gltf.file import GltfFile, read_gltf
 from translucent.gltf.left_out import LeftOut
 from translucent.gltf.lights import LIGHTS, scene_lights
-from translucent.gltf.materials import DISPERSION, EMISSIVE_STRENGTH, IOR, TRANSMISSION, VOLUME
+from translucent.gltf.materials import CLEARCOAT, DISPERSION, EMISSIVE_STRENGTH, IOR, IRIDESCENCE, TRANSMISSION, VOLUME
 from translucent.gltf.objects import scene_objects
 from translucent.gltf.scattering import DIFFUSE_TRANSMISSION, DRAFTS
 from translucent.gltf.scene_media import node_transforms
-from translucent.gltf.surfaces import LEFT_OUT, UNLIT
+from translucent.gltf.surfaces import UNLIT
 from translucent.gltf.textures import TEXTURE_TRANSFORM
 from translucent.gltf.variants import VARIANTS, variant_names
 from translucent.scene.environment import Environment
@@ -40,6 +40,8 @@ _READ = (
     DISPERSION,
     DIFFUSE_TRANSMISSION,
     EMISSIVE_STRENGTH,
+    IRIDESCENCE,
+    CLEARCOAT,
     UNLIT,
     TEXTURE_TRANSFORM,
     LIGHTS,
@@ -161,7 +163,7 @@ def check_extensions(file: GltfFile, left_out: LeftOut, known: Collection[str] =
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             raise refused(file, f"{key} is {names!r}, not a list of names")
         for name in names:
-            if name in _READ or name in LEFT_OUT or name in known:  # the latter is told of the materials that have it
+            if name in _READ or name in known:
                 continue
             if key == "extensionsRequired" and not name.startswith(_LOOKS):
                 do = "export it without compression" if name in _COMPRESSIONS else "export it without this extension"

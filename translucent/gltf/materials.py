@@ -11,6 +11,10 @@ KHR_materials_volume          thickness_texture: its G channel multiplies the fa
 KHR_texture_transform         thickness_transform: of the UVs of that texture          none
 KHR_materials_ior             ior: 0 or >= 1                                           1.5
 KHR_materials_dispersion      dispersion = 20 / Abbe number, >= 0                      0
+KHR_materials_iridescence     iridescence: share of the surface with a thin film, 0..1  0
+KHR_materials_iridescence     iridescence_ior: of the film, >= 1                       1.3
+KHR_materials_iridescence     iridescence_thickness: **metres** of the file's nm       400e-9
+KHR_materials_clearcoat       clearcoat, clearcoat_roughness: 0..1                     0
 KHR_materials_emissive_...    emissive: factor times strength, linear, of the surface  (0, 0, 0)
 ============================  =======================================================  =======================
 
@@ -21,10 +25,12 @@ A node's scale acts on the thickness and not on the distance; `translucent.gltf.
 
 Source: Khronos, glTF 2.0, and the ratified texts of the extensions above.
 
-Not carried into a `Medium`: emission of the surface, dispersion, base color, roughness, textures of transmission. Not
-known to ratified glTF: scattering, anisotropy and emission of the volume. A medium that scatters is written as its
-extinction, so that what passes straight on is the same; `translucent.gltf.write` says so in a warning. Drafts of
-extensions that know scattering: `translucent.gltf.scattering`.
+A film whose thickness varies by a texture has the mean of its least and its greatest here.
+
+Not carried into a `Medium`: emission of the surface, dispersion, films, clear coats, base color, roughness, textures of
+transmission. Not known to ratified glTF: scattering, anisotropy and emission of the volume. A medium that scatters is
+written as its extinction, so that what passes straight on is the same; `translucent.gltf.write` says so in a warning.
+Drafts of extensions that know scattering: `translucent.gltf.scattering`.
 """
 
 from __future__ import annotations
@@ -51,6 +57,8 @@ VOLUME = "KHR_materials_volume"
 IOR = "KHR_materials_ior"
 EMISSIVE_STRENGTH = "KHR_materials_emissive_strength"
 DISPERSION = "KHR_materials_dispersion"
+IRIDESCENCE = "KHR_materials_iridescence"
+CLEARCOAT = "KHR_materials_clearcoat"
 #: Extensions that must not be used with a volume.
 EXCLUDED = ("KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness")
 
@@ -100,6 +108,11 @@ class GltfMaterial:
     attenuation_distance: float = math.inf
     dispersion: float = 0.0
     emissive: Triple = (0.0, 0.0, 0.0)
+    iridescence: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness: float = 400e-9
+    clearcoat: float = 0.0
+    clearcoat_roughness: float = 0.0
     thickness_texture: int | None = None
     thickness_transform: TextureTransform = field(default_factory=TextureTransform)
     scatter: DraftScattering | None = None
@@ -152,6 +165,11 @@ class GltfMaterial:
             "attenuation_distance": self.attenuation_distance if math.isfinite(self.attenuation_distance) else None,
             "dispersion": self.dispersion,
             "emissive": list(self.emissive),
+            "iridescence": self.iridescence,
+            "iridescence_ior": self.iridescence_ior,
+            "iridescence_thickness": self.iridescence_thickness,
+            "clearcoat": self.clearcoat,
+            "clearcoat_roughness": self.clearcoat_roughness,
             "extinction": None if medium is None else medium.extinction.tolist(),
             "scattering": None if medium is None else np.asarray(medium.scattering).tolist(),
             "warnings": list(self.warnings),
@@ -181,14 +199,22 @@ def materials_of(file: GltfFile, *, draft_extensions: bool = False) -> list[Gltf
     return [_material(file, index, entry, draft_extensions) for index, entry in enumerate(file.items("materials"))]
 
 
+def _film_thickness(film: Fields) -> float:
+    """Thickness of a film in nanometres: the mean of both ends where a texture chooses between them."""
+    least, greatest = (
+        film.number(f"iridescenceThickness{end}", nm, 0.0) for end, nm in (("Minimum", 100.0), ("Maximum", 400.0))
+    )
+    return 0.5 * (least + greatest) if "iridescenceThicknessTexture" in film.values else greatest
+
+
 def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -> GltfMaterial:
     name = str(entry.get("name", ""))
     problems: list[str] = []
     told: list[str] = []
     extensions = Fields(entry.get("extensions", {}), "extensions", problems).values
-    transmission, volume, ior, strength, dispersion = (
+    transmission, volume, ior, strength, dispersion, film, coat = (
         Fields(extensions.get(key, {}), key, problems)
-        for key in (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, DISPERSION)
+        for key in (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, DISPERSION, IRIDESCENCE, CLEARCOAT)
     )
     surface = Fields(entry.get("pbrMetallicRoughness", {}), "pbrMetallicRoughness", problems).values
     problems += [
@@ -211,6 +237,11 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
         attenuation_color=volume.triple("attenuationColor", (1.0, 1.0, 1.0)),
         attenuation_distance=volume.number("attenuationDistance", math.inf, 0.0, above=True),
         dispersion=dispersion.number("dispersion", 0.0, 0.0),
+        iridescence=film.number("iridescenceFactor", 0.0, 0.0, 1.0),
+        iridescence_ior=film.number("iridescenceIor", 1.3, 1.0),
+        iridescence_thickness=1e-9 * _film_thickness(film),
+        clearcoat=coat.number("clearcoatFactor", 0.0, 0.0, 1.0),
+        clearcoat_roughness=coat.number("clearcoatRoughnessFactor", 0.0, 0.0, 1.0),
         emissive=(scale * red, scale * green, scale * blue),
         thickness_texture=texture,
         thickness_transform=transform,

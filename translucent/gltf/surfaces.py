@@ -33,7 +33,7 @@ radiance where a ray first enters a body, and occlusion dims the light of the en
 Of all that, textures are read as far as `translucent.gltf.images` does; normals are those of the mesh, smooth but at
 creases, and not the file's. What of a material has no meaning here is told by `LeftOut`.
 Source: glTF 2.0, section 3.9, and the extensions KHR_materials_transmission (infinitely thin), _volume, _ior,
-_dispersion, _diffuse_transmission, _emissive_strength and _unlit.
+_dispersion, _diffuse_transmission, _iridescence, _clearcoat, _emissive_strength and _unlit.
 """
 
 from __future__ import annotations
@@ -51,18 +51,25 @@ from translucent.gltf.fields import extension, label, number, refused, section, 
 from translucent.gltf.file import GltfFile, Json
 from translucent.gltf.images import Textures
 from translucent.gltf.left_out import LeftOut
-from translucent.gltf.materials import DEFAULT_IOR, TRANSMISSION, GltfMaterial, materials_of
+from translucent.gltf.materials import CLEARCOAT, DEFAULT_IOR, IRIDESCENCE, TRANSMISSION, GltfMaterial, materials_of
 from translucent.gltf.scattering import DIFFUSE_TRANSMISSION
 from translucent.media.color_distance import extinction_at
-from translucent.media.medium import Medium
+from translucent.media.medium import MAX_IOR, Medium
 from translucent.scene.scene import OPAQUE_COLOR
-from translucent.scene.surface import MAX_DISPERSION, Surface
+from translucent.scene.surface import MAX_DISPERSION, MAX_FILM, Surface
 from translucent.scene.texture import Texture
 
 UNLIT = "KHR_materials_unlit"
 
-#: Extensions of materials that are not rendered, and their names in messages.
-LEFT_OUT = {"KHR_materials_clearcoat": "clear coats", "KHR_materials_iridescence": "iridescence"}
+#: Textures of extensions that are not read, and their names in messages.
+UNREAD_TEXTURES = {
+    CLEARCOAT: (("clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"), "textures of clear coats"),
+    IRIDESCENCE: (("iridescenceTexture", "iridescenceThicknessTexture"), "textures of iridescence"),
+    DIFFUSE_TRANSMISSION: (
+        ("diffuseTransmissionTexture", "diffuseTransmissionColorTexture"),
+        "textures of diffuse transmission",
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +168,10 @@ class _Reader:
         """Finish of its objects; `metres` are per unit of the file."""
         found = self._finish(metres)
         opacity, mode = float(self.base_color[3]), self._alpha_mode()
-        for name, what in LEFT_OUT.items():
-            if name in section(self.file, self.where, self.entry, "extensions"):
-                self.left_out.add(what, self.name)
+        if found.surface is not None and not found.unlit:
+            for name, (keys, what) in UNREAD_TEXTURES.items():
+                if any(key in self._extension(name) for key in keys):
+                    self.left_out.add(what, self.name)
         return dataclasses.replace(
             found, hidden=self._hidden(), blends=mode == "BLEND", opacity=opacity, name=self.name
         )
@@ -218,12 +226,14 @@ class _Reader:
     def _common(self) -> Surface:
         """Surface parameters common to all kinds of objects."""
         file, where, diffuse = self.file, self.where, self._extension(DIFFUSE_TRANSMISSION)
-        for key in ("diffuseTransmissionTexture", "diffuseTransmissionColorTexture"):
-            if key in diffuse:
-                self.left_out.add("textures of diffuse transmission", self.name)
         steep = number(file, where, section(file, where, self.entry, "normalTexture"), "scale", 1.0)
         return Surface(
             roughness=share(file, where, self.base, "roughnessFactor", 1.0),
+            iridescence=self.material.iridescence,
+            iridescence_ior=min(self.material.iridescence_ior, MAX_IOR),
+            iridescence_thickness=min(self.material.iridescence_thickness, MAX_FILM),
+            clearcoat=self.material.clearcoat,
+            clearcoat_roughness=self.material.clearcoat_roughness,
             metallic=share(file, where, self.base, "metallicFactor", 1.0),
             diffuse_transmission=share(file, where, diffuse, "diffuseTransmissionFactor", 0.0),
             diffuse_transmission_color=shares(file, where, diffuse, "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),

@@ -12,6 +12,8 @@ from __future__ import annotations
 import copy
 import math
 import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -94,30 +96,58 @@ def write_medium(
     RenderError
         If the file cannot be written.
     """
-    check_gltf_output(Path(path_out))
-    check_draft(draft_extensions)
     if thickness is not None and not 0 < thickness < math.inf:
         raise InputError(f"thickness {thickness!r}", "not above 0 and finite", "give a length, for example 0.02")
+    filling = Filling(medium, distance, object_name, thickness, keep_ior)
+    return write_media(path_in, path_out, [filling], draft_extensions=draft_extensions, allow_outside=allow_outside)
+
+
+@dataclass(frozen=True)
+class Filling:
+    """Medium of some objects, with the choices of `write_medium`."""
+
+    medium: Medium
+    distance: float | None = None
+    object_name: str | None = None
+    thickness: float | None = None
+    keep_ior: bool = False
+
+
+def write_media(
+    path_in: str | Path,
+    path_out: str | Path,
+    fillings: Sequence[Filling],
+    *,
+    draft_extensions: Draft | None = None,
+    allow_outside: bool = False,
+) -> list[int]:
+    """Give media to objects of a glTF file one after the other, and write the file atomically, as `write_medium`."""
+    check_gltf_output(Path(path_out))
+    check_draft(draft_extensions)
     file = read_gltf(path_in, allow_outside)
     entered = {material.index for material in materials_of(file) if material.transmission > 0}
     tree = copy.deepcopy(file.tree)
     edited = GltfFile(file.path, tree, file.chunks, file.allow_outside)
-    targets = _own_materials(edited, object_name, entered)
-    for index, sizes in targets.items():
-        _give(edited, index, medium, distance, thickness, sizes, keep_ior)
-        if draft_extensions is not None:
-            _give_draft(edited, index, medium, draft_extensions)
+    held: set[int] = set()
+    for filling in fillings:
+        targets = _own_materials(edited, filling.object_name, entered)
+        for index, sizes in targets.items():
+            _give(edited, index, filling.medium, filling.distance, filling.thickness, sizes, filling.keep_ior)
+            if draft_extensions is not None:
+                _give_draft(edited, index, filling.medium, draft_extensions)
+        held |= targets.keys()
     used = tree.setdefault("extensionsUsed", [])
     if not isinstance(used, list):
         raise InputError(f"glTF {str(file.path)!r}", f"extensionsUsed is {used!r}, not a list", "export the file again")
     used += [name for name in (TRANSMISSION, VOLUME, IOR, *DRAFTS.values()) if name not in used and _uses(tree, name)]
-    if medium.emits or (medium.scatters and draft_extensions is None):
+    media = [filling.medium for filling in fillings]
+    if any(medium.emits or (medium.scatters and draft_extensions is None) for medium in media):
         lost = "glTF holds absorption only: scattering is written as extinction, emission is lost"
         if draft_extensions is not None:
             lost = "glTF holds no emission of volumes: it is lost"
-        warnings.warn(lost, TranslucentWarning, stacklevel=2)
+        warnings.warn(lost, TranslucentWarning, stacklevel=3)
     write_gltf(edited, path_out)
-    return sorted(targets)
+    return sorted(held)
 
 
 def _uses(tree: Json, extension: str) -> bool:

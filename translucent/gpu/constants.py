@@ -6,9 +6,20 @@ from typing import get_args
 
 from translucent.formulas.brdf_table import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import HAZE_MIRRORED, HAZE_ROUGHNESS
+from translucent.formulas.diffusion import HAZE_ROUGHNESS
+from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.spherical_harmonics import BAND_0, BAND_1, BAND_2, BAND_2_ZONAL
+from translucent.formulas.thin_film import (
+    FILM_BLUE_CENTER,
+    FILM_BLUE_SHARE,
+    FILM_BLUE_WIDTH,
+    FILM_CENTERS,
+    FILM_COHERENT,
+    FILM_ORDERS,
+    FILM_TO_RGB,
+    FILM_WIDTHS,
+)
 from translucent.formulas.tone import (
     AGX_DISPLAY,
     AGX_MIDDLE_GRAY,
@@ -69,7 +80,6 @@ CONSTANTS: dict[str, str] = {
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
     "HAZE_ROUGHNESS": repr(HAZE_ROUGHNESS),
-    "HAZE_MIRRORED": repr(HAZE_MIRRORED),
     "DENSITY_GRID": "1.0",
     "DENSITY_LINEAR": "2.0",
     "DENSITY_EXPONENTIAL": "3.0",
@@ -97,6 +107,16 @@ CONSTANTS: dict[str, str] = {
     "HARMONIC_1": repr(BAND_1),
     "HARMONIC_2": repr(BAND_2),
     "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
+    "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
+    "FILM_CENTERS": f"vec3{FILM_CENTERS}",
+    "FILM_WIDTHS": f"vec3{FILM_WIDTHS}",
+    "FILM_BLUE_CENTER": repr(FILM_BLUE_CENTER),
+    "FILM_BLUE_WIDTH": repr(FILM_BLUE_WIDTH),
+    "FILM_BLUE_SHARE": repr(FILM_BLUE_SHARE),
+    "FILM_TO_RGB": f"mat3{tuple(FILM_TO_RGB.T.ravel().tolist())}",
+    "FILM_SHORT": repr(FILM_COHERENT[0]),
+    "FILM_LONG": repr(FILM_COHERENT[1]),
+    "FILM_ORDERS": str(FILM_ORDERS),
     "HIERARCHY_WIDTH_BITS": str(HIERARCHY_WIDTH_BITS),
     "HIERARCHY_STEPS": "32767.5",  # of the grid of bounds, from the middle of a hierarchy to its end
     "RECORD_SIZE": "8",  # bodies that a ray can be in

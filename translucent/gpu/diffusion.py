@@ -46,6 +46,7 @@ class DiffusedLight:
         self.texture.filter = moderngl.LINEAR, moderngl.LINEAR
         self.texture.repeat_x = self.texture.repeat_y = self.texture.repeat_z = False
 
+    @np.errstate(under="ignore")
     def rows(self, center: Array) -> dict[int, dict[str, npt.ArrayLike]]:
         """Fields of a `SURFACE_ROW` of each object, for positions that count from `center`."""
         return {
@@ -60,7 +61,9 @@ class DiffusedLight:
                 "emergent_fluxes": field.fluxes,
                 "exit_share": field.exit_share,
                 "mean_cosine": field.mean_cosine,
-                "scattered_ahead": field.scattered_ahead,
+                "ahead": field.ahead,
+                "haze_far": field.haze[0].astype(np.float32),
+                "haze_near": field.haze[1].astype(np.float32),
             }
             for number, field in self.fields.surfaces.items()
         }

@@ -179,6 +179,9 @@ class SceneHierarchies:
             "metallic": surface.metallic,
             "one_sided": float(not surface.double_sided),
             "fading": _fading(body, packed.scale) if opaque else (0.0, 0.0, 0.0),
+            "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+            "clearcoat": surface.clearcoat,
+            "clearcoat_roughness": surface.clearcoat_roughness,
         }
 
     def release(self) -> None:

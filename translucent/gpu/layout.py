@@ -234,7 +234,12 @@ SURFACE_ROW = PackedTable(
         ("emergent_fluxes", "f4", (4,)),
         ("exit_share", "f4", ()),
         ("mean_cosine", "f4", ()),
-        ("scattered_ahead", "f4", (3,)),  # part of its extinction, in 1/m
+        ("clearcoat", "f4", ()),
+        ("clearcoat_roughness", "f4", ()),
+        ("ahead", "f4", (3,)),  # share of its extinction by light that is scattered ahead
+        ("haze_far", "f4", (3,)),  # share of that light which leaves where a ray does,
+        ("haze_near", "f4", (3,)),  # and on the other side
+        ("film", "f4", (3,)),  # share of the surface that has it, its ior, and metres
     ),
 )
 
@@ -274,6 +279,9 @@ TRACED_BODY = PackedTable(
         # Of paint around the middle of the mesh, in coordinates of the hierarchy: where it begins to get darker, where
         # it ends to, and how much of it is lost there; 0 for none.
         ("fading", "f4", (3,)),
+        ("clearcoat", "f4", ()),
+        ("film", "f4", (3,)),  # as in `SURFACE_ROW`
+        ("clearcoat_roughness", "f4", ()),
     ),
 )
 

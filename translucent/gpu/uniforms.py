@@ -282,7 +282,9 @@ _NO_DIFFUSION: dict[str, npt.ArrayLike] = {
     "emergent_fluxes": 0.0,
     "exit_share": 0.0,
     "mean_cosine": 1.0,
-    "scattered_ahead": 0.0,
+    "ahead": 0.0,
+    "haze_far": 0.0,
+    "haze_near": 0.0,
 }
 
 
@@ -304,5 +306,8 @@ def _surface_row(
         "stream_absorption": np.minimum(stream[0], limit),
         "inner_mirror": diffuse_interface(medium.ior).reflected,
         "stream_scattering": np.minimum(stream[1], limit),
+        "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+        "clearcoat": surface.clearcoat,
+        "clearcoat_roughness": surface.clearcoat_roughness,
         **(_NO_DIFFUSION if diffused is None else diffused),
     }

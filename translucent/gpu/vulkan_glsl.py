@@ -59,7 +59,7 @@ def in_vulkan(name: str, texts: Iterable[str], code: str) -> Iterator[str]:
 
 
 class _Places:
-    """Where the declarations of one shader go."""
+    """Places where the declarations of one shader go."""
 
     def __init__(self, stage: str, code: str) -> None:
         self.stage = stage

@@ -150,4 +150,5 @@ def _samples(
         )
     if not (np.isfinite(w).all() and (w >= 0).all() and (w > 0).any()):
         raise InputError("weights of a fit", "negative, not finite or all 0", "give numbers of 0 and above")
-    return d, t, w / w.max()
+    with np.errstate(under="ignore"):
+        return d, t, w / w.max()

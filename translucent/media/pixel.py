@@ -1,11 +1,12 @@
-"""The color of one pixel of an image file, as a color picker shows it."""
+"""Pixels of image files, one as a color picker shows it, or all."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import InputError
@@ -46,7 +47,7 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
         If there is no such file or pixel, it is no such image, or the pixel is wholly transparent.
     """
     what = f"pixel {x},{y} of {str(path)!r}"
-    image, channels = _read(what, path)
+    image, channels = _read(what, path, "give an image file and a pixel, for example photo.png@120,45")
     if not (0 <= x < image.width and 0 <= y < image.height):
         raise InputError(what, f"the image has {image.width} x {image.height} pixels", "count from 0 at the top left")
     if image.mode.startswith("I;16"):
@@ -59,13 +60,30 @@ def pixel_color(path: str | Path, x: int, y: int) -> Array:
     return srgb_to_linear(np.array(straight) / 255.0)
 
 
-def _read(what: str, path: str | Path) -> tuple[Image, list[Image]]:
+def read_encoded(path: str | Path, what: str) -> npt.NDArray[Any]:
+    """All pixels of an image, (h, w, 3) uint8 or uint16 as the file has them; files and errors as for `pixel_color`.
+
+    Parameters
+    ----------
+    path : str or Path
+    what : str
+        What the error says was asked for.
+    """
+    image, channels = _read(what, path, "give an image file", per_pixel=40)
+    if image.mode.startswith("I;16"):
+        return np.repeat(np.asarray(image, dtype=np.uint16)[..., None], 3, axis=-1)
+    if channels:
+        return np.stack([np.asarray(channel, dtype=np.uint16) for channel in channels], axis=-1)
+    return np.asarray(image.convert("RGB"))
+
+
+def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Image, list[Image]]:
     """Read an image, and each of its three channels if they have 16 bits, all turned as a camera notes."""
     from PIL import ImageOps
 
-    do, data = "give an image file and a pixel, for example photo.png@120,45", read_bytes(path, what)
+    data = read_bytes(path, what)
     try:
-        with open_picture(data, what, per_pixel=16, do=do) as image:
+        with open_picture(data, what, per_pixel=per_pixel, do=do) as image:
             deep = _is_deep(image, data)
             if not (image.mode.startswith("I;16") or image.mode in _EIGHT_BITS) or (deep and image.format != "PNG"):
                 kind = f"{image.mode} of 16 bits" if deep else image.mode

@@ -57,7 +57,7 @@ def _renderer() -> Renderer:
 
 
 def _takes_long(scene: Scene) -> str:
-    """Why a scene is not drawn unasked; nothing if it is."""
+    """Reason why a scene is not drawn unasked; nothing if it is."""
     faces = sum(len(item.mesh.faces) for item in scene.objects)
     if faces > MANY_TRIANGLES:
         return f"it has {faces / 1e6:.1f} million triangles"

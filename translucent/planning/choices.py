@@ -13,7 +13,7 @@ from translucent.planning.shadow_maps import ShadowMaps
 
 @dataclass(frozen=True)
 class RenderChoices:
-    """How a scene is asked to be rendered; see `Renderer.render`.
+    """Choices with which a scene is asked to be rendered; see `Renderer.render`.
 
     Parameters
     ----------

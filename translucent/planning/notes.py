@@ -44,6 +44,7 @@ class NoteKind(StrEnum):
     LAYERS = "layers"
     GLOW = "glow"
     TEXTURES = "textures"
+    COATS = "coats"
     HOLES = "holes"
     INVISIBLE = "invisible"
     UNUSED_PRIORITIES = "unused priorities"

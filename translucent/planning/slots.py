@@ -119,7 +119,7 @@ def _fillings(scene: Scene) -> list[Hashable]:
 
 
 def _told(medium: Medium | None, lit: bool) -> Hashable:
-    """What matters of a medium that fills a point; None for one that is like no other."""
+    """Properties that matter of a medium that fills a point; None for one that is like no other."""
     if medium is None or isinstance(medium, DiffusedVolume):
         return None
     told = [*medium.extinction, *np.asarray(medium.emission)]

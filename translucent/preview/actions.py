@@ -52,6 +52,13 @@ class Assign:
 
 
 @dataclass(frozen=True)
+class Hide:
+    """Hide these objects, and show all others."""
+
+    objects: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class Adopt:
     """Take over the material that a model came with; no step of undo."""
 
@@ -97,7 +104,7 @@ class Zoom:
     down: float = 0.0
 
 
-Action = Change | Open | ChoosePreset | Assign | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
+Action = Change | Open | ChoosePreset | Assign | Hide | Adopt | Replace | SetOrbit | Turn | Pan | Zoom
 
 #: Actions that move the camera: they are no undo steps, and undo leaves the camera where it is.
 CAMERA_ACTIONS = (SetOrbit, Turn, Pan, Zoom)
@@ -125,6 +132,8 @@ def apply(document: Document, action: Action) -> Document:
             return dataclasses.replace(document, material=preset_material(document.material, action.name))
         case Assign():
             return _assigned(document, action)
+        case Hide():
+            return dataclasses.replace(document, hidden=tuple(sorted(set(action.objects))))
         case Adopt():
             return dataclasses.replace(document, material=action.material)
         case Replace():
@@ -202,7 +211,7 @@ def _opened(document: Document, action: Open) -> Document:
     # A glTF file shows its own media; on a mesh, which has none, a material of the user's own stays.
     if Path(action.path).suffix.lower() in SUFFIXES or material.source == "file":
         material = Material()
-    return dataclasses.replace(document, model=model, material=material, orbit=None, assigned=())
+    return dataclasses.replace(document, model=model, material=material, orbit=None, assigned=(), hidden=())
 
 
 def preset_material(material: Material, name: str) -> Material:

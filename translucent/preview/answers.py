@@ -6,7 +6,7 @@ from pathlib import Path
 
 from translucent.errors import InputError, TranslucentError
 from translucent.gltf.load import SUFFIXES
-from translucent.gltf.write import write_medium
+from translucent.gltf.write import Filling, write_media
 from translucent.planning.caustics import Caustics
 from translucent.preview.actions import Change
 from translucent.preview.browser import with_recent
@@ -128,11 +128,5 @@ def _save_medium(desk: Desk, path: str) -> None:
     named = [(desk.objects[one.object].mesh.name, one.material) for one in document.assigned]
     whole = [] if named and material.source == "file" else [(None, material)]
 
-    def write(to: str) -> None:
-        begun = source
-        for name, one in (*whole, *named):
-            medium = medium_of(one)
-            write_medium(begun, to, medium, distance=one.distance, object_name=name, allow_outside=outside)
-            begun = to
-
-    return desk.work.write(path, write)
+    fillings = [Filling(medium_of(one), one.distance, name) for name, one in (*whole, *named)]
+    return desk.work.write(path, lambda to: write_media(source, to, fillings, allow_outside=outside))

@@ -137,6 +137,11 @@ class _Window:
         self.desk: Any = None
         self._drops: object = None
 
+    @property
+    def remembers(self) -> bool:
+        """Whether files opened lately, folders and the places of panels are read, and kept for the next window."""
+        return self.script is None or self.script.remembers
+
     def params(self, size: tuple[int, int], scale: float) -> Any:
         """Parameters of the window."""
         from imgui_bundle import hello_imgui, imgui
@@ -144,8 +149,8 @@ class _Window:
         params = hello_imgui.RunnerParams()
         window = params.app_window_params
         window.window_title, window.window_geometry.size = TITLE, size
-        window.restore_previous_geometry = self.script is None
-        if self.script is not None:
+        window.restore_previous_geometry = self.remembers
+        if not self.remembers:
             params.ini_folder_type = hello_imgui.IniFolderType.temp_folder
             params.ini_disable = True
             window.window_geometry.size_auto = False
@@ -203,6 +208,7 @@ class _Window:
         from translucent.preview.panels.material import material_panel
         from translucent.preview.panels.messages import messages_panel
         from translucent.preview.panels.method import method_panel
+        from translucent.preview.panels.tree import scene_panel
         from translucent.preview.panels.viewport import viewport_panel
 
         docking = hello_imgui.DockingParams()
@@ -216,6 +222,7 @@ class _Window:
             ("Viewport", "MainDockSpace", viewport_panel),
             ("Material", "Left", material_panel),
             ("Library", "Left", library_panel),
+            ("Scene", "Left", scene_panel),
             ("Method", "Right", method_panel),
             ("Look", "Right", look_panel),
             ("Environments", "Right", environments_panel),
@@ -266,7 +273,7 @@ class _Window:
         implot.create_context()
         self.desk = Desk(self.work, Stage(open_context("window").gl, self.work.compiler))
         self._drops = accept_drops(self._dropped)
-        if self.script is None:
+        if self.remembers:
             self.work.recent = read_recent()
             self.desk.folders = read_folders()
             self.desk.environments.take(read_environments())
@@ -282,10 +289,10 @@ class _Window:
 
         from translucent.preview.preferences import write_environments, write_folders, write_recent, write_stage
 
-        if self.script is None and self.desk is not None:
+        if self.remembers and self.desk is not None:
             write_folders(self.desk.folders)
             write_environments(self.desk.environments.path)
-        if self.script is None:
+        if self.remembers:
             write_recent(self.work.recent)
             write_stage(self.work.document.look.stage)
         if self.desk is not None:

@@ -52,7 +52,8 @@ SMOOTHED_AT_ONCE = 50_000
 #: Largest number of directions of the environment that throw shadows.
 SHADOWS = 16
 
-#: Number of nested boxes that stand in for a mesh: rays then cross as many layers as methods can tell apart.
+#: Number of nested boxes that stand in for a mesh: rays then cross as many layers as methods can tell apart. For a
+#: convex mesh it is one, since lights go straight on to a convex body, and have to be followed to others.
 BOXES = 4
 
 Result = TypeVar("Result")
@@ -257,9 +258,10 @@ def _object_like(item: Object) -> Object:
 def _boxes(mesh: Mesh) -> Mesh:
     box = Box().tessellate()
     size = np.maximum(mesh.bounds[1] - mesh.bounds[0], 0.1 * mesh.diagonal)  # a leaf may be flat
-    shares = np.linspace(1.0, 0.5, BOXES)
+    # Nothing of a convex body is between a light and its interface.
+    shares = np.linspace(1.0, 0.5, 1 if mesh.diagnosis.convex else BOXES)
     vertices = (mesh.center + shares[:, None, None] * size * box.vertices).reshape(-1, 3)
-    faces = (box.faces + len(box.vertices) * np.arange(BOXES)[:, None, None]).reshape(-1, 3)
+    faces = (box.faces + len(box.vertices) * np.arange(len(shares))[:, None, None]).reshape(-1, 3)
     uv = None if mesh.uv is None else np.zeros((len(vertices), 2))
     colors = None if mesh.colors is None else np.ones((len(vertices), 4))
     return Mesh(vertices, faces, uv, mesh.name, colors=colors)

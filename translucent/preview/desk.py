@@ -111,8 +111,8 @@ class Desk:
 
     @property
     def target_text(self) -> str:
-        """What a material is assigned to."""
-        return "fills the model" if self.target is None else f"assigns to {self.objects[self.target].mesh.name}"
+        """Target that a material is assigned to."""
+        return "fills the model" if self.target is None else f"assigns to {self.name_of(self.target)}"
 
     @property
     def material(self) -> Material:
@@ -154,8 +154,10 @@ class Desk:
         if scene is None:
             return
 
+        shown = self.work.document.shown_among(len(self.objects))  # before the ground of a stage
+
         def take(found: int | None) -> None:
-            then(found if found is not None and found < len(self.objects) else None)
+            then(shown[found] if found is not None and found < len(shown) else None)
 
         x, y = (min(max(int(share * side), 0), side - 1) for share, side in zip(position, size, strict=True))
         if self.work.loaded is not None and self.work.loaded.triangles <= PICKED_AT_ONCE:
@@ -166,6 +168,10 @@ class Desk:
     def select(self, number: int | None) -> None:
         """Select an object, or none."""
         self.selected = number
+
+    def name_of(self, number: int) -> str:
+        """Name of an object."""
+        return self.objects[number].mesh.name or f"object {number}"
 
     def _assign(self, number: int, change: Callable[[Material], Material], drag: int | None = None) -> None:
         try:

@@ -220,7 +220,8 @@ class Orbit:
 class Document:
     """Document: everything that a session holds. No orbit: the model is to be framed.
 
-    Bodies have the material, except those that are assigned one of their own.
+    Bodies have the material, except those that are assigned one of their own. Objects are told by their numbers in
+    the model, `hidden` ones too.
     """
 
     model: Model = field(default_factory=Model)
@@ -229,6 +230,11 @@ class Document:
     display: Display = field(default_factory=Display)
     orbit: Orbit | None = None
     assigned: tuple[Assigned, ...] = ()
+    hidden: tuple[int, ...] = ()
+
+    def shown_among(self, count: int) -> tuple[int, ...]:
+        """Numbers of the objects on show of a model with so many."""
+        return tuple(number for number in range(count) if number not in self.hidden)
 
     def own_material(self, number: int | None) -> Material | None:
         """Material that is assigned to an object, if any."""

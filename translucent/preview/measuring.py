@@ -24,6 +24,8 @@ from translucent.reference.hits import camera_hits
 from translucent.renderer import Renderer
 from translucent.scene.camera import Camera
 from translucent.scene.scene import Object, Scene
+from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 Size = tuple[int, int]
 
@@ -122,7 +124,7 @@ def measure(report: Report, scene: Scene, method: Method | None, size: Size) -> 
         warnings.simplefilter("ignore", TranslucentWarning)  # invalid pixels are counted, below
         frame = _renderer(newest_shader()).render(plain, small, method)
     report(None, "float64 reference")
-    truth = reference.render(plain, small, method)
+    truth = _reference(plain, small, method)
     errors: tuple[Errors, ...] = ()
     doubt = ""
     try:
@@ -152,7 +154,29 @@ def _index_matched(item: Object) -> Object:
     if not item.has_interface:
         return item
     medium = dataclasses.replace(item.medium, ior=1.0)
-    return dataclasses.replace(item, medium=medium, surface=None)
+    return dataclasses.replace(item, medium=medium, surface=_holes(item))
+
+
+def _holes(item: Object) -> Surface | None:
+    """Surface that has the holes of a thin sheet, and changes no light beside them."""
+    surface = item.surface
+    if not item.has_holes or surface is None or surface.color_texture is None or item.mesh.colors is not None:
+        return None
+    return Surface(color_texture=_only_alpha(surface.color_texture), alpha_cutoff=surface.alpha_cutoff)
+
+
+@lru_cache(maxsize=8)
+def _only_alpha(texture: Texture) -> Texture:
+    pixels = np.ones((*texture.pixels.shape[:2], 4), dtype=np.float32)
+    if texture.pixels.shape[2] == 4:
+        pixels[..., 3] = texture.pixels[..., 3]
+    return dataclasses.replace(texture, pixels=pixels)
+
+
+def _reference(scene: Scene, size: Size, method: Method | None = None) -> Frame:
+    """Reference of a scene, which follows rays through interfaces; straight on where sheets have holes."""
+    holes = any(item.has_holes for item in scene.objects)
+    return reference.render(scene, size, method, refraction=False if holes else None)
 
 
 def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Scene, tuple[int, ...]]:
@@ -173,14 +197,14 @@ def truth_plan(scene: Scene, levels: tuple[int, ...] | None = None) -> tuple[Sce
 
 def truth_frame(report: Report, scene: Scene, method: Method | None, size: Size) -> Frame:
     """Render the reference of a picture."""
-    return reference.render(scene, size, method)
+    return _reference(scene, size, method)
 
 
 def crossing(report: Report, scene: Scene, size: Size, pixel: Size) -> Crossing:
     """Trace the ray through a pixel's center in the reference."""
     camera = pixel_camera(scene.camera, size, pixel)
     one = dataclasses.replace(straight(scene), camera=camera)
-    frame = reference.render(one, (1, 1))
+    frame = _reference(one, (1, 1))
     layers, nearest, body = 0, math.inf, None
     for i, item in enumerate(scene.objects):
         hits = camera_hits(item.mesh, item.matrix, camera, (1, 1))

@@ -1,4 +1,4 @@
-"""What one window leaves to the next: recently opened files and used folders, and the stage."""
+"""Preferences that one window leaves to the next: recently opened files and used folders, and the stage."""
 
 from __future__ import annotations
 

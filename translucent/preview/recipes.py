@@ -96,6 +96,7 @@ def command_line(shot: Shot) -> tuple[str, list[str]]:
     words += ["--caustics", str(shot.caustics.photons)] if shot.caustics else []
     left_out += ["the orthographic camera"] if orbit.orthographic else []
     left_out += ["the directional light"] if look.light else []
+    left_out += ["hidden objects"] if document.hidden else []
     return shlex.join(words), left_out
 
 
@@ -142,6 +143,9 @@ def python_code(shot: Shot) -> str:
     else:
         lines += [f"scene = tl.load_scene({path}{unit})"]
     lines += _material_lines(shot) + _camera_lines(shot) + _stage_lines(shot)
+    if hidden := [i for i in document.hidden if i < len(shot.loaded.scene.objects)]:
+        shown = f"[item for i, item in enumerate(scene.objects) if i not in {hidden}]"
+        lines += [f"scene = dataclasses.replace(scene, objects={shown})"]
     if look.light:
         way = tuple(-value for value in towards_light(look))
         light = f"tl.DirectionalLight(({_numbers(way, ', ')}), {look.light_irradiance:.12g})"

@@ -31,7 +31,9 @@ def material_of(scene: Scene, number: int | None = None) -> Material:
     diagonal = scene.diagonal or 1.0
     body = fillable(scene)[0] if number is None else scene.objects[number]
     if body.medium is None or body.covers:
-        return Material(color=DEFAULT_COLOR, distance=DEFAULT_REACH * diagonal, thickness=0.1 * diagonal)
+        reach = DEFAULT_REACH * diagonal
+        red, green, blue = np.asarray(Medium.from_color(DEFAULT_COLOR, reach).absorption).tolist()
+        return Material(color=DEFAULT_COLOR, distance=reach, absorption=(red, green, blue), thickness=0.1 * diagonal)
     medium, surface = body.medium or Medium(), body.surface or Surface()
     reach = DEFAULT_REACH * diagonal
     # Where the showcase states it; if that is too dark or too bright to tell, where 1/e is left.
@@ -74,7 +76,7 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
         raise InputError("a picture", "nobody has framed the model", "frame it first")
     scene, look = loaded.scene, document.look
     light = _light(look.light_yaw, look.light_pitch, look.light_irradiance) if look.light else None
-    objects, camera = _objects(document.material, document.assigned, scene), camera_of(document.orbit)
+    objects, camera = _shown(document.material, document.assigned, document.hidden, scene), camera_of(document.orbit)
     if (name := stage_name(look, loaded)) != NO_STAGE and document.display.pictured:
         on = standing(loaded, name, look.environment, look.background, look.rotation)
         ground = tuple(item for item in on.objects if item.shadow_catcher)
@@ -91,8 +93,17 @@ def scene_of(document: Document, loaded: Loaded) -> Scene:
 
 
 @lru_cache(maxsize=2)
+def _shown(
+    material: Material, assigned: tuple[Assigned, ...], hidden: tuple[int, ...], scene: Scene
+) -> tuple[Object, ...]:
+    """Objects of the scene on show with their materials; cached, so that turning the camera makes none anew."""
+    objects = _objects(material, assigned, scene)
+    return tuple(item for number, item in enumerate(objects) if number not in hidden)
+
+
+@lru_cache(maxsize=2)
 def _objects(material: Material, assigned: tuple[Assigned, ...], scene: Scene) -> tuple[Object, ...]:
-    """Objects of the scene with their materials; cached, so that turning the camera makes none anew."""
+    """Objects of the scene with their materials; cached, so that the others stay as one is hidden."""
     objects = list(_objects_alike(material, scene))
     for one in assigned:
         if one.object < len(objects):

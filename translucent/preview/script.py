@@ -5,10 +5,10 @@ Every ``[[action]]`` has a verb in ``do``. Of documents: ``change`` (field, valu
 ``undo``, ``redo``, ``frame``. Of the library: ``library`` (search), ``drop`` (preset, x, y: shares of the viewport),
 ``save_preset`` (name), ``environments`` (folder). Of files: ``ask`` (kind: as of ``save``), in our own browser, and
 ``answer`` (file). Of the keyboard: ``key`` (name, such as escape or ctrl+z), ``type`` (text). Of objects: ``pick`` (x,
-y: shares of the viewport), ``object`` (number; -1: none). Of the window: ``probe`` (x, y: shares of the viewport),
-``select`` (panel), ``wait`` (seconds; without them, until nothing is under way), ``reload``, ``bake`` (mode, size,
-rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point`` (x, y: shares of the window), ``press``,
-``release`` (button), ``wheel`` (steps).
+y: shares of the viewport), ``object`` (number; -1: none), ``hide``, ``isolate`` (number). Of the window: ``probe`` (x,
+y: shares of the viewport), ``select`` (panel), ``wait`` (seconds; without them, until nothing is under way),
+``reload``, ``bake`` (mode, size, rays), ``save`` (kind, file), ``session`` (file). Of the mouse: ``point`` (x, y:
+shares of the window), ``press``, ``release`` (button), ``wheel`` (steps).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from translucent.errors import InputError
 from translucent.preview.actions import Pan, Turn, Zoom
@@ -38,7 +38,7 @@ PAUSE = 0.03
 FRAMES = 2
 
 #: Names of panels.
-PANELS = ("Material", "Library", "Method", "Look", "Environments", "Files", "Messages")
+PANELS = ("Material", "Library", "Scene", "Method", "Look", "Environments", "Files", "Messages")
 
 _WORDS: dict[str, dict[str, Any]] = {
     "change": {"field": str, "value": object},
@@ -50,6 +50,8 @@ _WORDS: dict[str, dict[str, Any]] = {
     "library": {"search": ""},
     "pick": {"x": 0.5, "y": 0.5},
     "object": {"number": -1},
+    "hide": {"number": int},
+    "isolate": {"number": int},
     "drop": {"preset": str, "x": 0.5, "y": 0.5},
     "save_preset": {"name": str},
     "ask": {"kind": str},
@@ -90,9 +92,12 @@ class Script:
     ----------
     steps : list of Step
         Those that are still to be done, the next one last.
+    remembers : bool
+        Whether the window remembers what windows without a script remember.
     """
 
     steps: list[Step]
+    remembers: ClassVar[bool] = False
     _frames: int = 0
     _waiting: float | None = None
     _until: float = 0.0
@@ -186,6 +191,8 @@ def perform(desk: Desk, step: Step) -> None:
         "library": lambda: setattr(work.library, "search", v["search"]),
         "pick": lambda: desk.pick((v["x"], v["y"]), desk.select),
         "object": lambda: desk.select(None if v["number"] < 0 else v["number"]),
+        "hide": lambda: _hide(desk, v["number"], alone=False),
+        "isolate": lambda: _hide(desk, v["number"], alone=True),
         "drop": lambda: desk.drop_preset(v["preset"], (v["x"], v["y"])),
         "save_preset": lambda: _save_preset(desk, v["name"]),
         "ask": lambda: _ask(desk, v["kind"]),
@@ -211,6 +218,14 @@ def perform(desk: Desk, step: Step) -> None:
         "wheel": lambda: _io().add_mouse_wheel_event(0.0, v["steps"]),
     }
     verbs[step.do]()
+
+
+def _hide(desk: Desk, number: int, *, alone: bool) -> None:
+    from translucent.preview.hiding import hide, isolate
+
+    if not 0 <= number < len(desk.objects):
+        raise InputError(f"object {number}", f"the model has {len(desk.objects)}", "give a number from 0 on")
+    (isolate if alone else hide)(desk, number)
 
 
 def _use_file(desk: Desk, kind: str, path: str) -> None:
@@ -278,7 +293,5 @@ def _select(panel: str) -> None:
 
     window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(panel)
     if window is None:
-        raise InputError(
-            f"panel {panel!r}", "there is none", "use Material, Library, Method, Look, Environments, Files or Messages"
-        )
+        raise InputError(f"panel {panel!r}", "there is none", f"use {', '.join(PANELS)}")
     window.focus_window_at_next_frame = True

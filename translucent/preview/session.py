@@ -31,6 +31,8 @@ def to_table(document: Document) -> dict[str, Any]:
             table[section] = _listed(value)
     if document.assigned:
         table["assigned"] = [{"object": one.object, "material": _listed(one.material)} for one in document.assigned]
+    if document.hidden:
+        table["hidden"] = list(document.hidden)
     return table
 
 
@@ -58,6 +60,9 @@ def from_table(table: dict[str, Any], where: str) -> Document:
         if section == "assigned":
             sections[section] = tuple(_assigned(entry, where) for entry in fields)
             continue
+        if section == "hidden":
+            sections[section] = _hidden(fields, where)
+            continue
         if section not in _SECTIONS or not isinstance(fields, dict):
             raise InputError(where, f"an unknown [{section}]", f"use {', '.join(_SECTIONS)}")
         default = Orbit() if section == "orbit" else getattr(Document(), section)
@@ -71,6 +76,12 @@ def _assigned(entry: Any, where: str) -> Assigned:
     if type(number) is not int or number < 0 or not isinstance(fields, dict) or len(entry) != 2:
         raise InputError(f"{where}, [[assigned]]", "no object and material", "give object = 0, and [assigned.material]")
     return Assigned(number, dataclasses.replace(Material(), **_fields("material", Material(), fields, where)))
+
+
+def _hidden(numbers: Any, where: str) -> tuple[int, ...]:
+    if not isinstance(numbers, list) or not all(type(one) is int and one >= 0 for one in numbers):
+        raise InputError(where, f"hidden = {numbers!r}", "list numbers of objects, such as [0, 2]")
+    return tuple(sorted(set(numbers)))
 
 
 def _fields(section: str, default: Any, fields: dict[str, Any], where: str) -> dict[str, Any]:

@@ -89,7 +89,7 @@ TIPS = {
     "display.split": "Position of the split, 0 to 1 from the left. Or drag the line.",
     "display.inset": (
         "The float64 reference as a small picture in the corner, while the view is still. It has straight "
-        "rays and plain media, and shows neither textures nor leaves' cutouts."
+        "rays, plain media and the holes of leaves, and shows no other textures."
     ),
     "display.antialias": "More samples of a pixel while the view is still.",
     "display.converge": (

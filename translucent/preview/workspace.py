@@ -177,7 +177,8 @@ class Workspace:
         """Frame the whole model, or one of its objects, from the side of the camera."""
         if self.loaded is not None:
             objects = self.loaded.scene.objects
-            chosen = [objects[number]] if number is not None and number < len(objects) else objects
+            shown = [objects[i] for i in self.document.shown_among(len(objects))]
+            chosen = [objects[number]] if number is not None and number < len(objects) else shown
             self.do(SetOrbit(orbiting.framed(self.document.orbit, chosen, self.size)))
 
     def reframe(self) -> None:
@@ -203,7 +204,9 @@ class Workspace:
             return bake.seen_from(self.document.orbit)
         if self._scene is not None:
             known, model, scene = self._scene
-            same = all(getattr(known, name) == getattr(document, name) for name in ("material", "assigned", "orbit"))
+            same = all(
+                getattr(known, name) == getattr(document, name) for name in ("material", "assigned", "hidden", "orbit")
+            )
             if same and model is loaded and _lit_alike(known, document):
                 return scene
         scene = scene_of(document, loaded)
@@ -378,6 +381,10 @@ class Workspace:
         """Complete the document from the model: its own material, and the camera."""
         if self.loaded is None:
             return
+        if not self.document.shown_among(len(self.loaded.scene.objects)):
+            self.tell("warning", "all objects of the model were hidden: they are shown")
+            shown = dataclasses.replace(self.document, hidden=())
+            self.history = dataclasses.replace(self.history, present=shown)
         present = self.document
         own = own_material(self._lighting.lit(present, self.loaded).look, self.loaded)
         if present.material.source == "file" and present.material != own:

@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array, Integers, Mask
-from translucent.formulas.interface import channel_iors
+from translucent.formulas.interface import CLEARCOAT_IOR, channel_iors
+from translucent.formulas.optics import fresnel_dielectric
+from translucent.formulas.thin_film import thin_film_reflectance
 from translucent.geometry.normals import corner_normals
 from translucent.reference.compositing import _layers
 from translucent.reference.hits import Hits, world_normals
@@ -120,6 +122,11 @@ class Optics:
         #: Sheets with an optical effect beyond absorption along the path.
         self.walls = [i for i, body in enumerate(scene.objects) if sheets[i] is not None and body.has_interface]
         _, self._rank = np.unique([body.priority for body in scene.objects], return_inverse=True)
+        self._films = np.array(
+            [(s.iridescence, s.iridescence_ior, s.iridescence_thickness) for s in self.surfaces], dtype=np.float64
+        )
+        #: (objects,): share of each that has a clear coat.
+        self.coats = np.array([s.clearcoat for s in self.surfaces])
         self._corner_normals: dict[int, Array] = {}
 
     def corner_normals(self, item: int) -> Array:
@@ -127,6 +134,26 @@ class Optics:
         if item not in self._corner_normals:
             self._corner_normals[item] = corner_normals(self.scene.objects[item].mesh)
         return self._corner_normals[item]
+
+    def filmed(self, bare: Array, item: Integers, before: Integers, cosine: Array, ior: Array) -> Array:
+        """(k, 3): reflectance of interfaces that reflect `bare` (k,) without the films of their objects on them.
+
+        `before` are the objects that light comes from, or `AIR`; the cosine of incidence and the relative index
+        `ior` are (k,).
+        """
+        share = np.repeat(bare[:, None], 3, axis=1)
+        some = np.flatnonzero(self._films[item, 0])
+        if some.size:
+            covered, film, metres = self._films[item[some]].T
+            inside = film / self.iors[before[some]]
+            colored = thin_film_reflectance(cosine[some], ior[some], inside, film * metres)
+            share[some] += covered[:, None] * (colored - share[some])
+        return share
+
+    def coated(self, item: Integers, outside: Mask, cosine: Array) -> Array:
+        """(k,): share of light that clear coats mirror, which only comes from outside."""
+        coat = np.where(outside, self.coats[item], 0.0)
+        return coat * fresnel_dielectric(cosine, CLEARCOAT_IOR) if coat.any() else coat
 
     @property
     def tolerance(self) -> float:

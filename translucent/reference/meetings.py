@@ -14,8 +14,8 @@ from translucent.formulas.interface import (
     reflected_direction,
     refracted_direction,
     slab_reflectance,
-    slab_transmittance,
 )
+from translucent.formulas.thin_film import film_slab_reflectance, film_slab_transmittance
 from translucent.reference.interfaces import Inside, Interfaces, Optics, interface_normals
 from translucent.reference.legs import Legs
 from translucent.reference.microfacets import lit_at_interface, scattered_at_interface
@@ -81,7 +81,11 @@ class Meetings:
         self.alpha = self._table("roughness") ** 2
         self.transmission = self._table("transmission")[:, None]
         self.color = self._table("color")
-        self.reflectance = optics.fresnel_dielectric(self.cosine, self.ior)
+        self.bare = optics.fresnel_dielectric(self.cosine, self.ior)
+        #: (k, 3): with the films on the interfaces, of sheets that of their side towards the light.
+        self.reflectance = own.filmed(self.bare, interfaces.item, interfaces.before, self.cosine, self.ior)
+        outside = self.is_sheet | (interfaces.item == interfaces.after)
+        self.coated = own.coated(interfaces.item, outside, self.cosine)[:, None]
 
     def outcome(self) -> Outcome:
         """Outcome of all ray segments."""
@@ -118,16 +122,16 @@ class Meetings:
         directions, normals = legs.rays.directions, self.normals[chosen]
         back_way = reflected_direction(directions, normals)
         on_way = refracted_direction(directions, normals, self.ior[chosen])
-        share_back = self.reflectance[chosen, None]
+        share_back = self._under_coat(chosen, self.reflectance[chosen])
         share_on = 1.0 - share_back
         if self.rng is not None:
-            passed = self.rng.random(len(chosen)) >= share_back[:, 0]
+            chance = share_back.mean(axis=1)
+            passed = self.rng.random(len(chosen)) >= chance
             rough = np.flatnonzero((self.alpha[chosen] > 0) & (self.ior[chosen] != 1.0))
             back_way[rough], passed[rough] = self._at_microfacets(chosen[rough], self.rng)
             on_way[rough] = back_way[rough]
-            share_on = passed[:, None].astype(np.float64)
-            share_back = 1.0 - share_on
-        back, on = np.flatnonzero(share_back[:, 0] > 0.0), np.flatnonzero(share_on[:, 0] > 0.0)
+            share_back, share_on = _by_chance(share_back, chance, passed, rough)
+        back, on = np.flatnonzero((share_back > 0.0).any(axis=1)), np.flatnonzero((share_on > 0.0).any(axis=1))
         passing = (share_on * self._passing(chosen))[on]
         back_way, on_way = _towards(back_way, self.faces[chosen]), _towards(on_way, -self.faces[chosen])
         reflected = legs.where(back).turned(
@@ -169,14 +173,17 @@ class Meetings:
         """Branches at polished sheets, as `_at_interfaces`: both sides of each at once."""
         legs, inside = self.legs.where(chosen), self.interfaces.here.where(chosen)
         metres, extinction, emission = self._matter(chosen)
-        share, ior = self.reflectance[chosen], self.ior[chosen]
+        front, behind, ior = self.reflectance[chosen], self.bare[chosen], self.ior[chosen]
         path = optics.thin_layer_thickness(metres, self.cosine[chosen], ior)[:, None]
         with np.errstate(over="ignore", under="ignore"):
             depth = extinction * path
-            back, on = slab_reflectance(share[:, None], depth), slab_transmittance(share[:, None], depth)
-            kept = 1.0 - share[:, None] * optics.transmittance(depth)
+            back = self._under_coat(chosen, film_slab_reflectance(front, behind, depth))
+            on = (1.0 - self.coated[chosen]) * film_slab_transmittance(front, behind, depth)
+            again = behind[:, None] * optics.transmittance(depth)
+            kept = 1.0 - front * optics.transmittance(depth) * again
             # What a sheet emits goes back and forth in it, too.
-            leaving = np.where(kept > 0.0, (1.0 - share[:, None]) / np.where(kept > 0.0, kept, 1.0), 0.0)
+            leaving = np.where(kept > 0.0, (1.0 - front) * (1.0 + again) / np.where(kept > 0.0, kept, 1.0), 0.0)
+            leaving = (1.0 - self.coated[chosen]) * leaving
             self.radiance[chosen] += leaving * optics.emitted_radiance(emission, extinction, path)
         mirrored = _towards(reflected_direction(legs.rays.directions, self.normals[chosen]), self.faces[chosen])
         branches = [
@@ -214,6 +221,10 @@ class Meetings:
         with np.errstate(under="ignore"):
             share = weight * np.where(passed[:, None], self._passing(chosen), 1.0)
         return [legs.turned(way, share, inside, bent=True, reflected=~passed)], weight * passed[:, None]
+
+    def _under_coat(self, chosen: Integers, share: Array) -> Array:
+        """(k, 3): what interfaces that reflect a `share` (k, 3) do with the clear coats on them."""
+        return np.asarray(share + self.coated[chosen] * (1.0 - share))
 
     def _matter(self, chosen: Integers) -> tuple[Array, Array, Array]:
         """Thickness (k,) in metres, extinction and emission (k, 3) of sheets."""
@@ -262,6 +273,17 @@ class Meetings:
                 mirrored = share * (density * visible)[:, None] * light.irradiance_on(points, normals)
                 lit = np.flatnonzero(mirrored.any(axis=1))
                 self.radiance[rough[lit]] += mirrored[lit] * self.light.to_interfaces(light, points[lit])
+
+
+def _by_chance(back: Array, chance: Array, passed: Mask, rough: Integers) -> tuple[Array, Array]:
+    """Shares (k, 3) of light that is reflected, or has `passed`; it was reflected with a `chance` (k,) for all colors.
+
+    Walks among `rough` interfaces lose nothing.
+    """
+    share_back = np.where(passed[:, None], 0.0, back / np.where(chance > 0.0, chance, 1.0)[:, None])
+    share_on = np.where(passed[:, None], (1.0 - back) / np.where(chance < 1.0, 1.0 - chance, 1.0)[:, None], 0.0)
+    share_back[rough], share_on[rough] = ~passed[rough, None], passed[rough, None]
+    return share_back, share_on
 
 
 def _towards(directions: Array, side: Array) -> Array:

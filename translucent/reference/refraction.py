@@ -102,13 +102,24 @@ def _check(scene: Scene, bounces: int, paths: int) -> None:
 
 
 def check_untextured(scene: Scene, instead: str) -> None:
-    """Check that interfaces are the same all over each body; errors say what to do `instead`."""
+    """Check that interfaces are the same all over each body, and what lies on them is polished.
+
+    Errors say what to do `instead`.
+    """
     for body in scene.bodies:
         if body.covers or not body.has_interface:
             continue
         if body.surface is not None and any(texture is not None for texture in body.surface.textures):
             what = f"reference of {body.mesh.name!r}"
             raise InputError(what, "its surface has textures", f"give it a surface without, or {instead}")
+        surface = body.surface
+        if surface is not None and (surface.iridescence or surface.clearcoat):
+            rough = surface.clearcoat_roughness if surface.clearcoat else 0.0
+            if max(surface.roughness, rough) > 0.0:
+                what = f"reference of {body.mesh.name!r}"
+                raise InputError(
+                    what, "a film or a clear coat on it that is rough", f"give it a polished one, or {instead}"
+                )
         if body.mesh.colors is not None:
             what = f"reference of {body.mesh.name!r}"
             raise InputError(what, "its vertices have colors", f"give it a mesh without, or {instead}")

@@ -44,12 +44,16 @@ def read_environment_map(path: str | Path) -> EnvironmentMap:
     return EnvironmentMap(read(path))
 
 
-def _read_exr(path: Path) -> Pixels:
-    _, channels = read_exr(path, f"environment {str(path)!r}")
+def read_linear(path: Path) -> Pixels:
+    """Linear values (h, w, 3) of a ``.exr`` file, or else of one of Radiance; raises as `read_environment_map`."""
+    if path.suffix.lower() != ".exr":
+        return read_radiance(path)
+    asked = f"picture {str(path)!r}"
+    _, channels = read_exr(path, asked)
     for names in ("RGB", "YYY"):
         if set(names) <= channels.keys():
             return np.stack([channels[name] for name in names], axis=-1)
-    raise InputError(f"environment {str(path)!r}", f"channels {', '.join(channels)}", "give channels R, G and B")
+    raise InputError(asked, f"channels {', '.join(channels)}", "give channels R, G and B")
 
 
 def _read_encoded(path: Path) -> Pixels:
@@ -65,9 +69,9 @@ def _read_encoded(path: Path) -> Pixels:
 
 
 READERS: dict[str, Callable[[Path], Pixels]] = {
-    ".hdr": read_radiance,
-    ".pic": read_radiance,
-    ".exr": _read_exr,
+    ".hdr": read_linear,
+    ".pic": read_linear,
+    ".exr": read_linear,
     ".png": _read_encoded,
     ".jpg": _read_encoded,
     ".jpeg": _read_encoded,

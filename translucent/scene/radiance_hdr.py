@@ -46,7 +46,7 @@ def read_radiance(path: str | Path) -> npt.NDArray[np.float32]:
     InputError
         If there is no such file, it is no RGBE picture, or it ends early.
     """
-    data = read_bytes(path, f"environment {str(path)!r}")
+    data = read_bytes(path, f"picture {str(path)!r}")
     header = _header(path, data)
     stored = _pixels(path, np.frombuffer(data, dtype=np.uint8)[header.start :], header.rows, header.columns)
     # What an exponent means, looked up: no array of the picture's size in between.
@@ -77,7 +77,7 @@ def _header(path: str | Path, data: bytes) -> _Header:
     rows, columns = int(match[3]), int(match[6])
     if not rows * columns:
         raise _refused(path, f"{columns}x{rows} pixels", "save it again")
-    require_room(f"environment {str(path)!r}", f"{columns}x{rows} pixels", 28 * rows * columns, len(data))
+    require_room(f"picture {str(path)!r}", f"{columns}x{rows} pixels", 28 * rows * columns, len(data))
     start = len(text) + len(blank) + len(line) + len(end)
     return _Header(rows, columns, match[1] + match[2], match[4] + match[5], exposure, start)
 
@@ -159,4 +159,4 @@ def _upright(pixels: npt.NDArray[np.float32], header: _Header) -> npt.NDArray[np
 
 
 def _refused(path: str | Path, found: str, do: str) -> InputError:
-    return InputError(f"environment {str(path)!r}", found, do)
+    return InputError(f"picture {str(path)!r}", found, do)

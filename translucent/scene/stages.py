@@ -35,7 +35,7 @@ class KeyLight:
 
 @dataclass(frozen=True)
 class Stage:
-    """What a model stands on and before.
+    """Stages: what a model stands on and before.
 
     Attributes
     ----------

@@ -14,6 +14,9 @@ from translucent.media.medium import MAX_IOR
 from translucent.scene.lights import MAX_RADIANCE
 from translucent.scene.texture import Texture
 
+#: Thickest film in metres: the colors of one that is thicker than a tenth of it can no more be told apart.
+MAX_FILM = 1e-4
+
 #: Largest dispersion, 20 / Abbe number: beyond it the index of red would fall below 1 for any glass.
 MAX_DISPERSION = 10.0
 
@@ -24,6 +27,11 @@ _RANGES = (
     ("dispersion", 0.0, MAX_DISPERSION),
     ("metallic", 0.0, 1.0),
     ("ior", 1.0, MAX_IOR),
+    ("iridescence", 0.0, 1.0),
+    ("iridescence_ior", 1.0, MAX_IOR),
+    ("iridescence_thickness", 0.0, MAX_FILM),
+    ("clearcoat", 0.0, 1.0),
+    ("clearcoat_roughness", 0.0, 1.0),
     ("alpha_cutoff", 0.0, 1.0),
     ("opacity", 0.0, 1.0),
 )
@@ -47,8 +55,8 @@ class Surface(Frozen):
     """Interface between a medium and the air around it, or the surface of an opaque object.
 
     What does not pass the interface by refraction (``1 - transmission``) is reflected and transmitted diffusely, as by
-    paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission and
-    _dispersion).
+    paint. Names and meanings are glTF's (2.0, section 3.9.2; KHR_materials_transmission, _diffuse_transmission,
+    _dispersion, _iridescence and _clearcoat).
 
     An opaque object is a metal, or a coat with `ior` over paint, or between the two (glTF 2.0, Appendix B). The index
     of refraction of a body is its medium's, and what is said to be of opaque objects has no effect on it.
@@ -90,6 +98,18 @@ class Surface(Frozen):
         over what is behind (Porter and Duff's ``over``). Its medium should be clear, and its interfaces bend nothing.
     double_sided : bool
         Whether an opaque object is seen from the inside, too.
+    iridescence : float
+        Share of the surface that has a thin film on it, 0 to 1, whose interference colors what is mirrored. A sheet has
+        it on the side that light comes from: a soap bubble is a sheet with a medium of ior 1 and such a film.
+    iridescence_ior : float
+        Of the film, >= 1: soapy water 1.33, oxides up to 2.7.
+    iridescence_thickness : float
+        Of the film, in metres, up to 1e-4: 100e-9 to 1000e-9 show colors.
+    clearcoat : float
+        Share of the surface that has a clear coat of ior 1.5 on it, 0 to 1. It mirrors light that comes from outside,
+        and what is below gets the rest.
+    clearcoat_roughness : float
+        Of the clear coat, 0 to 1.
 
     Raises
     ------
@@ -115,6 +135,11 @@ class Surface(Frozen):
     double_sided: bool = True
     occlusion_texture: Texture | None = None
     opacity: float | None = None
+    iridescence: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness: float = 400e-9
+    clearcoat: float = 0.0
+    clearcoat_roughness: float = 0.0
 
     def __post_init__(self) -> None:
         for field, least, most in _RANGES:
@@ -141,6 +166,8 @@ class Surface(Frozen):
             and self.color_texture is None
             and bool((np.asarray(self.color) == 1.0).all())
             and not self.glows
+            and not self.iridescence
+            and not self.clearcoat
         )
 
     @property

@@ -34,7 +34,7 @@ _Told = tuple[str, Severity, str, str]
 
 
 def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterator[_Told]:
-    """How light gets in at all."""
+    """Rules of how light gets in at all."""
     surface = entry.get("pbrMetallicRoughness", {})
     metallic = surface.get("metallicFactor", 1.0)
     if material.transmission > 0 and metallic == 1 and "metallicRoughnessTexture" not in surface:

@@ -36,7 +36,7 @@ _SIZE, _LINE = (620, 400), 19
 
 
 def shadow_section(shadows: Shadows) -> dict[str, Any] | None:
-    """What the template shows of the part; None where nothing was measured."""
+    """Values that the template shows of the part; None where nothing was measured."""
     from markupsafe import Markup
 
     if not shadows.measured:

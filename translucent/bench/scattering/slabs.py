@@ -14,7 +14,7 @@ from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
-from translucent.formulas.diffusion import HAZE_MIRRORED
+from translucent.formulas.diffusion import haze_shares
 from translucent.formulas.two_stream import (
     mirrored_reflectance,
     mirrored_transmittance,
@@ -65,7 +65,7 @@ def _measured(albedo: float, depths: Array, anisotropy: float, ior: float) -> li
     for i, depth in enumerate(depths.tolist()):
         whole = slabs.whole_shares(albedo, depth, ior, anisotropy)
         passing = slabs.unscattered_shares(depth, ior)
-        hazy = _hazy_shares(depth, depth * (1.0 - albedo * anisotropy), ior)
+        hazy = _hazy_shares(albedo, depth, anisotropy, ior)
         ways = [
             (float(way[0, i]) + passing[0] + more[0], float(way[1, i]) + passing[1] + more[1])
             for way, more in ((diffused, hazy), (layer, (0.0, 0.0)))
@@ -102,7 +102,7 @@ def _diffused(medium: Medium) -> Array:
     return diffuse_interface(medium.ior).exit_share * leaving
 
 
-def _hazy_shares(depth: float, reduced: float, ior: float) -> tuple[float, float]:
+def _hazy_shares(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[float, float]:
     """What pictures with `Diffusion` show beside unscattered light: what is scattered ahead on each way across.
 
     The same as in ``shaders/transport/traced_interfaces.frag``: it leaves where the way ends, or is mirrored there.
@@ -110,12 +110,13 @@ def _hazy_shares(depth: float, reduced: float, ior: float) -> tuple[float, float
     mu, weight = slabs.cosines(ior)
     mirror = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
     flux = mu * weight * (1.0 - mirror)
-    ahead = np.exp(-reduced / mu) - np.exp(-depth / mu)
+    ahead = np.exp(-depth * (1.0 - albedo * anisotropy) / mu) - np.exp(-depth / mu)
     again = mirror * np.exp(-depth / mu)
     across = ahead / (1.0 - again**2)
     back, on = (float((flux * way).sum() / flux.sum()) for way in (across * again, across))
-    mirrored = 0.5 * HAZE_MIRRORED * diffuse_interface(ior).reflected
-    return (1.0 - mirrored) * back + mirrored * on, (1.0 - mirrored) * on + mirrored * back
+    # On the mean way of diffuse light across a slab, twice its thickness.
+    far, near = map(float, haze_shares(diffuse_interface(ior).reflected, np.exp(-2.0 * depth * (1.0 - albedo))))
+    return far * back + near * on, far * on + near * back
 
 
 def _body(medium: Medium) -> Object:
@@ -134,7 +135,7 @@ def _grid() -> BodyGrid:
 
 
 def _planned(albedo: float, depth: float, anisotropy: float, ior: float) -> _Way:
-    """What the planner takes for such a slab of one optical depth."""
+    """Method that the planner takes for such a slab of one optical depth."""
     body = _body(Medium((1.0 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=ior))
     scene = Scene([body], Camera.look_at((0.0, 5.0, 5.0), (0.0, 0.0, 0.0)))
     back = given_back(scene, None)

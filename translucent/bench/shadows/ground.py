@@ -90,7 +90,7 @@ class Ground:
         return self._shared(self._radiance(self.scene, size))
 
     def unblocked(self, objects: Sequence[int]) -> Array:
-        """What opaque shadow maps of these objects leave of the light."""
+        """Share of the light that opaque shadow maps of these objects leave."""
         stones = [dataclasses.replace(self.scene.objects[i], medium=None, surface=None, density=None) for i in objects]
         return self._shared(self._radiance(self._with(stones), USUAL))
 

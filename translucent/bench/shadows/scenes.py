@@ -90,7 +90,7 @@ def _box(low: Array, high: Array) -> Array:
 
 
 def _shadow(points: Array, light: Light, height: float) -> Array:
-    """Where points throw their shadows on a ground."""
+    """Places on a ground where points throw their shadows."""
     if isinstance(light, DirectionalLight):
         ways = np.broadcast_to(np.asarray(light.direction), points.shape)
     else:

@@ -15,7 +15,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.ledger import before_making
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps, OpaquePass, shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed
-from translucent.gpu.passes.variants import Variants, look_switches
+from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.shaders import build_program, set_uniform
 from translucent.gpu.uniforms import media_center
 from translucent.planning.passes import PassSpec
@@ -186,13 +186,17 @@ class CausticsPass:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<="
         unshadowed = shadow_switches(False, job.resources)
+        bare = unshadowed | coat_switches(())
         for i in objects[::-1]:
-            if (surface := job.scene.objects[i].surface) is None:
+            body = job.scene.objects[i]
+            if (surface := body.surface) is None:
                 program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **unshadowed
+                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **bare
                 )
             else:
-                program = self._finished.program(SURFACE=1, **look_switches(job.scene.objects[i]), **unshadowed)
+                program = self._finished.program(
+                    SURFACE=1, **look_switches(body), **unshadowed, **coat_switches([body])
+                )
                 self._maps.bind(job)
                 self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
             job.draw(program, (i,))

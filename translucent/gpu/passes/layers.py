@@ -8,7 +8,7 @@ import numpy as np
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import FINISH_UNITS, FinishMaps
-from translucent.gpu.passes.variants import Variants, look_switches
+from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.planning.passes import PassSpec
 from translucent.scene.scene import Object
@@ -78,6 +78,7 @@ class LayersPass:
             SHADOW_MAPS=0,
             SHADOW_SPECTRAL=0,
             **look_switches(body),
+            **coat_switches([body]),
         )
         self._maps.set_finish(job, program, surface, surface.alpha_cutoff or (LEAST_COVER if body.covers else 0.0))
         if body.covers:

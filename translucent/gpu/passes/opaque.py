@@ -7,7 +7,7 @@ import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.variants import Variants, look_switches
+from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
 from translucent.gpu.scene_view import SceneView
 from translucent.gpu.shaders import set_uniform
@@ -54,10 +54,16 @@ class OpaquePass:
         for i in spec.objects[::-1]:
             if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **common
+                    WITH_NORMAL=1,
+                    WITH_POSITION=1,
+                    SURFACE=0,
+                    VERTEX_COLORS=0,
+                    OCCLUSION=0,
+                    **common,
+                    **coat_switches(()),
                 )
             else:
-                looks = look_switches(job.scene.objects[i])
+                looks = look_switches(job.scene.objects[i]) | coat_switches([job.scene.objects[i]])
                 program = self._finished.program(SURFACE=1, **common, **looks)
                 self._maps.bind(job)
                 self._maps.set_finish(job, program, surface, surface.alpha_cutoff)
@@ -74,7 +80,7 @@ class OpaquePass:
         framebuffer.use()
         view.gl.enable_only(moderngl.DEPTH_TEST)
         common = {"LIGHT_MAP": False, "DEPTH_ONLY": True, "PROJECTED_DEPTH": projected}
-        common |= {"SHADOW_MAPS": False, "SHADOW_SPECTRAL": False}
+        common |= {"SHADOW_MAPS": False, "SHADOW_SPECTRAL": False} | coat_switches(())
         for i in objects:
             surface = view.scene.objects[i].surface
             if surface is None or not surface.alpha_cutoff:
@@ -124,6 +130,8 @@ class FinishMaps:
             "opaque_emissive": tuple(np.asarray(surface.emissive)),
             "opaque_passed": (*passed, surface.double_sided),
             "opaque_passed_share": surface.diffuse_transmission,
+            "opaque_film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
+            "opaque_clearcoat": (surface.clearcoat, surface.clearcoat_roughness),
         }
         for name, value in values.items():
             if name in program:  # not all are where an object only glows, or only its depth is needed

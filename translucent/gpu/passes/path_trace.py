@@ -16,7 +16,7 @@ from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import interface_shadow_switches
 from translucent.gpu.passes.traced_interfaces import all_closed, bodies_radius, record_at_eye
-from translucent.gpu.passes.variants import Variants
+from translucent.gpu.passes.variants import Variants, coat_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center
@@ -263,6 +263,7 @@ class PathTracer:
             DIMMED=job.features.dims_interfaces,
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
+            **coat_switches(scene.objects),
         )
 
     def _bind(

@@ -317,7 +317,7 @@ def _sky_lights(scene: Scene) -> list[Light]:
 
 
 def _seen(job: FrameJob) -> Seen:
-    """What lights see in a frame; keeps nothing alive."""
+    """Maps of what lights see in a frame; keeps nothing alive."""
     scene = job.scene
     inside = tuple(item.medium is None and holds_eye(item, scene) for item in scene.objects)
     media = tuple(

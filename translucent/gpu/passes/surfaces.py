@@ -8,7 +8,7 @@ from translucent.gpu.drivers import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
-from translucent.gpu.passes.variants import Variants
+from translucent.gpu.passes.variants import Variants, coat_switches
 from translucent.gpu.textures import reflectance_table
 from translucent.planning.passes import PassSpec
 
@@ -70,6 +70,7 @@ class SurfacesPass:
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and seen is job.scene.environment,
             SINGLE_SCATTERING=job.features.scatters,
+            **coat_switches(job.scene.bodies),
             DIFFUSED=job.diffused_light is not None,
         )
         finishes = self._bind_finishes(job)

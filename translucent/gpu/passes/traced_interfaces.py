@@ -14,7 +14,7 @@ from translucent.gpu.hierarchies import SceneHierarchies
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.no_interface import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
-from translucent.gpu.passes.variants import Variants
+from translucent.gpu.passes.variants import Variants, coat_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.gpu.textures import reflectance_table
 from translucent.gpu.uniforms import media_center
@@ -163,7 +163,7 @@ class TracedInterfacesPass:
             EMISSION=job.features.emits and not job.features.scatters,
             LAYERED=any(isinstance(body.medium, LayeredMedium) for body in scene.bodies),
             DIFFUSED=job.diffused_light is not None,
-            MICROFACETS=mirror or any(surface.roughness > 0 for surface in surfaces),
+            MICROFACETS=mirror or any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces),
             MIRROR=mirror,
             ADAPTIVE=job.bending,
             DISPERSION=any(surface.dispersion > 0 for surface in surfaces),
@@ -174,6 +174,7 @@ class TracedInterfacesPass:
             SEEN_MAP=seen_map,
             SEEN_LIGHTS=seen_map and environment.seen is environment,
             SINGLE_SCATTERING=job.features.scatters,
+            **coat_switches(scene.objects),
         )
 
     def _bind(

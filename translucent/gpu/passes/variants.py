@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import moderngl
 import numpy as np
 import numpy.typing as npt
@@ -126,6 +128,15 @@ def look_switches(body: Object) -> dict[str, bool]:
     """Switches of ``geometry/interface.vert`` and ``shade/surface_textures.glsl``: features that few objects have."""
     occluded = body.surface is not None and body.surface.occlusion_texture is not None
     return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
+
+
+def coat_switches(objects: Iterable[Object]) -> dict[str, bool]:
+    """Switches of what lies on the surfaces of objects: thin films and clear coats."""
+    surfaces = [body.surface for body in objects if body.surface is not None]
+    return {
+        "THIN_FILM": any(surface.iridescence > 0 for surface in surfaces),
+        "CLEAR_COAT": any(surface.clearcoat > 0 for surface in surfaces),
+    }
 
 
 def _is_gray(values: npt.NDArray[np.float64]) -> bool:

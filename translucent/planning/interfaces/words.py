@@ -25,6 +25,10 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
         effects.append("rough ones blur both")
     if bends and any(surface.dispersion > 0 for surface in surfaces):
         effects.append("dispersion bends each channel on its own")
+    if any(surface.iridescence for surface in surfaces):
+        effects.append("thin films color what is mirrored")
+    if any(surface.clearcoat for surface in surfaces):
+        effects.append("clear coats mirror over them")
     if any(surface.transmission < 1 for surface in surfaces):
         effects.append("paint reflects what does not enter")
     if any((np.asarray(surface.color) != 1).any() or surface.color_texture for surface in surfaces):

@@ -124,7 +124,7 @@ def given_back(
     }
     refused = {i: why for i, body in bodies.items() if (why := wanted.refusal(body)) is not None}
     if not volumes:
-        refused |= {i: _NO_STEPS for i, body in bodies.items() if body.density is not None}
+        refused |= {i: _NO_STEPS for i, body in bodies.items() if _is_cloud(body)}
     if asked is None and len(bodies) - len(refused) > MOST_DIFFUSED:
         many = f"light would diffuse in more than {MOST_DIFFUSED} bodies, which takes long"
         refused = dict.fromkeys(bodies, many) | refused
@@ -151,11 +151,15 @@ def given_back(
 
 def _volumes(scene: Scene, solved: list[int], wanted: Diffusion) -> tuple[int, ...]:
     """Those of the bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
-    varying = tuple(i for i in solved if scene.objects[i].density is not None)
+    varying = tuple(i for i in solved if _is_cloud(scene.objects[i]))
     even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], wanted))
     if not (fogs := tuple(sorted(varying + even))):
         return ()
     return fogs if len(medium_slots(shown(scene, GivenBack(volumes=fogs)))) <= MAX_SLOTS else varying
+
+
+def _is_cloud(body: Object) -> bool:
+    return body.density is not None and not body.has_interface
 
 
 def _is_deep(body: Object, medium: Medium) -> bool:

@@ -29,8 +29,8 @@ class Diffusion(Scattering):
     The diffusion equation on cells that the mesh cuts, lit by what enters: the environment and lights, shadowed by the
     body and by opaque objects, and light of the body that falls on it again. Solved on the CPU where the light, the
     medium or the mesh changes; a picture then takes two look-ups. Light that passes unscattered is seen along rays as
-    ever. Where the density varies, as in clouds, rays gather what is scattered into them on their way, from a solution
-    by discrete ordinates that diffusion accelerates.
+    ever. Where the density varies, it does so from cell to cell. Without an interface, as in clouds, rays gather what
+    is scattered into them on their way, from a solution by discrete ordinates that diffusion accelerates.
 
     Parameters
     ----------
@@ -59,11 +59,9 @@ class Diffusion(Scattering):
         return float(np.cbrt(4.0 * volume) / self.resolution)
 
     def refusal(self, body: Object) -> str | None:
-        """Reason: no closed solid wound outwards, thinner than a cell everywhere, or a density behind an interface."""
+        """Reason: no closed solid wound outwards, or thinner than a cell everywhere."""
         if body.sheet_thickness is not None:
             return "it is a sheet"
-        if body.density is not None and body.has_interface:
-            return "its density varies, and it has an interface"
         if not body.mesh.diagnosis.sound:
             return "its mesh is not closed"
         if not body.mesh.volume > 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from translucent.preview.desk import FAINT, Desk, em
+from translucent.preview.hiding import hide, isolate, show_all
 
 #: What mouse and keys do.
 KEYS = (
@@ -13,6 +14,8 @@ KEYS = (
     ("wheel", "zoom to the cursor"),
     ("click", "select an object, whose material the panels then change"),
     ("F", "frame the model, or the selected object"),
+    ("H, Alt H", "hide the selected object; show all"),
+    ("I", "isolate the selected object; all again"),
     ("O", "orthographic or perspective"),
     ("C", "converge: path trace the still picture"),
     ("P", "photons: caustics in the still picture"),
@@ -67,19 +70,25 @@ def handle_keys(desk: Desk) -> None:
         desk.keys_shown = not desk.keys_shown
     if desk.keys_shown:
         return
-    if imgui.is_key_pressed(imgui.Key.f):
+    if imgui.is_key_pressed(imgui.Key.f, False):
         desk.frame()
-    if imgui.is_key_pressed(imgui.Key.c) and not io.key_ctrl:
+    if imgui.is_key_pressed(imgui.Key.h, False) and io.key_alt:
+        show_all(desk)
+    elif imgui.is_key_pressed(imgui.Key.h, False) and desk.target is not None:
+        hide(desk, desk.target)
+    if imgui.is_key_pressed(imgui.Key.i, False) and desk.target is not None:
+        isolate(desk, desk.target)
+    if imgui.is_key_pressed(imgui.Key.c, False) and not io.key_ctrl:
         desk.change("display.converge", not desk.get("display.converge"), step=True)
-    if imgui.is_key_pressed(imgui.Key.p):
+    if imgui.is_key_pressed(imgui.Key.p, False):
         desk.change("display.caustics", not desk.get("display.caustics"), step=True)
     if io.key_ctrl and imgui.is_key_pressed(imgui.Key.z):
         (desk.work.redo if io.key_shift else desk.work.undo)()
     elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.y):
         desk.work.redo()
-    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o):
+    elif io.key_ctrl and imgui.is_key_pressed(imgui.Key.o, False):
         desk.ask_file("open")
-    elif imgui.is_key_pressed(imgui.Key.o) and desk.work.document.orbit is not None:
+    elif imgui.is_key_pressed(imgui.Key.o, False) and desk.work.document.orbit is not None:
         desk.change("orbit.orthographic", not desk.get("orbit.orthographic"), step=True)
 
 

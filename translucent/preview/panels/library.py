@@ -91,10 +91,14 @@ def _card(desk: Desk, one: Preset, size: ImVec2) -> None:
     over.pop_clip_rect()
 
 
+def seen_color(one: Preset) -> str:
+    """Color that a preset is seen in: what it gives back, or what is left of white light after a centimeter."""
+    return one.diffuse_color() if one.regime == "scattering dominated" else one.colors()["1 cm"]
+
+
 def _swatch(over: imgui.ImDrawList, one: Preset, low: ImVec2, high: ImVec2) -> None:
     """Draw what a centimeter of the medium looks like, until there is a picture."""
-    text = one.diffuse_color() if one.regime == "scattering dominated" else one.colors()["1 cm"]
-    red, green, blue = (int(text[i : i + 2], 16) for i in (1, 3, 5))
+    red, green, blue = (int(seen_color(one)[i : i + 2], 16) for i in (1, 3, 5))
     over.add_rect_filled(low, high, 0xFF303030)
     middle, radius = ImVec2(0.5 * (low.x + high.x), 0.5 * (low.y + high.y)), 0.42 * (high.x - low.x)
     over.add_circle_filled(middle, radius, 0xFF000000 | blue << 16 | green << 8 | red)

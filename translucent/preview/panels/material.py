@@ -124,7 +124,7 @@ def _object(desk: Desk) -> None:
 
 def _object_name(desk: Desk, number: int) -> str:
     own = " *" if desk.work.document.own_material(number) is not None else ""
-    return f"{desk.objects[number].mesh.name or f'object {number}'}{own}"
+    return f"{desk.name_of(number)}{own}"
 
 
 def _color(desk: Desk, material: Material) -> None:

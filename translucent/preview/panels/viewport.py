@@ -105,7 +105,7 @@ def _mouse(desk: Desk, corner: ImVec2, room: ImVec2) -> None:
 def _selected(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) -> None:
     """Draw the corners of the selected object's box, and its name."""
     orbit = desk.work.document.orbit
-    if desk.target is None or orbit is None:
+    if desk.target is None or orbit is None or desk.target in desk.work.document.hidden:
         return
     item, camera = desk.objects[desk.target], camera_of(orbit)
     places = on_screen(camera, item.bounds, (room.x, room.y))
@@ -119,7 +119,7 @@ def _selected(desk: Desk, over: imgui.ImDrawList, corner: ImVec2, room: ImVec2) 
             for color, wide in ((BLACK, 0.25), (WHITE, 0.1)):
                 over.add_line(at, ImVec2(at.x + right * side, at.y), color, em(wide))
                 over.add_line(at, ImVec2(at.x, at.y + down * side), color, em(wide))
-    _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), item.mesh.name or f"object {desk.target}")
+    _label(over, ImVec2(corner.x + low[0], corner.y + low[1] - em(1.4)), desk.name_of(desk.target))
 
 
 def on_screen(camera: Camera, bounds: Array, size: tuple[float, float]) -> Array | None:

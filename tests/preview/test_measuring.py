@@ -1,0 +1,30 @@
+"""What is compared with the float64 reference, and how."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import translucent as tl
+from translucent.preview.measuring import crossing, measure
+from translucent.scene.texture import Texture
+
+
+def leaf() -> tl.Scene:
+    """A painted leaf with an interface, whose upper half is cut out."""
+    pixels = np.full((8, 8, 4), 0.5, dtype=np.float32)
+    pixels[:4, :, 3], pixels[4:, :, 3] = 0.0, 1.0
+    square = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)]
+    mesh = tl.Mesh(square, [(0, 1, 2), (1, 3, 2)], uv=[place[:2] for place in square])
+    surface = tl.Surface(color_texture=Texture(pixels), alpha_cutoff=0.5)
+    cut = tl.Object(mesh, tl.Medium(50.0, ior=1.3), surface=surface, sheet_thickness=0.01)
+    return tl.Scene([cut], tl.Camera.look_at((0.5, 0.5, 3), (0.5, 0.5, 0)))
+
+
+def test_the_reference_has_the_holes_of_a_leaf() -> None:
+    thickness = [crossing(lambda *_: None, leaf(), (60, 60), (30, y)).thickness for y in (22, 38)]
+    assert sorted(thickness)[0] == 0.0
+    assert 0.01 < sorted(thickness)[1] < 0.0102
+    found = measure(lambda *_: None, leaf(), None, (30, 30))
+    seen, float32 = found.errors[0], 1e-6 * 0.01
+    assert (seen.coverage_mismatch, seen.max < float32) == (0.0, True)
+    assert (found.truth.min(axis=(1, 2)) < 250).mean() < 0.3, "half of the leaf is seen"
