@@ -228,6 +228,22 @@ def test_wide_slabs_reflect_and_transmit(slab: BodyGrid, albedo: float, ior: flo
     assert off[:, 2].max() < 0.007  # as deep as a half-space, of which diffusion has the exact share
 
 
+@pytest.mark.parametrize("anisotropy", [0.5, 0.9])
+def test_deep_slabs_that_scatter_ahead_reflect(slab: BodyGrid, anisotropy: float) -> None:
+    """Against layers that are added and doubled; similar ones that scatter to all sides alike reflect up to twice that.
+
+    Measured: up to 1.9 % more, at g = 0.9 and an albedo of 0.6, where four depths stand for all first events.
+    """
+    albedo = np.array([0.6, 0.95, 0.0])
+    depth = 60 / (1 - albedo * anisotropy)
+    medium = tl.Medium((1 - albedo) * depth, albedo * depth, anisotropy=anisotropy, ior=1.33)
+    top = slab.face_normals[:, 1] > 0.9
+    middle = np.abs(slab.points[:, [0, 2]]).max(axis=1) < 1
+    fluence = lit(slab, medium, np.where(top, 1.0, 0.0)[:, None]).fluence[top & middle].mean(axis=0)
+    exact = [slabs.shares(w, d, 1.33, anisotropy)[0] for w, d in zip(albedo.tolist(), depth.tolist(), strict=True)]
+    np.testing.assert_allclose(diffuse_interface(1.33).exit_share * fluence, exact, rtol=0.025)
+
+
 def test_exact_slabs_are_exact() -> None:
     """Two layers on one another are one, deep ones are half-spaces, and where nothing is absorbed nothing is lost."""
     mu, weight = slabs.cosines(1.5)
@@ -322,10 +338,17 @@ def test_channels_without_scattering_stay_dark() -> None:
 
 @pytest.mark.parametrize("anisotropy", [-0.5, 0.8])
 def test_anisotropy_counts_by_similarity(anisotropy: float) -> None:
+    """Where nothing is absorbed; else less light is turned back the more it is scattered ahead."""
     grid = ball_grid(10)
-    plain = lit(grid, tl.Medium(0.1, 5.0)).fluence
-    ahead = lit(grid, tl.Medium(0.1, 5.0 / (1 - anisotropy), anisotropy=anisotropy)).fluence
-    np.testing.assert_allclose(ahead, plain, rtol=1e-9)
+    absorption = np.array([0.0, 0.1, 5.0])
+    plain = lit(grid, tl.Medium(absorption, 5.0, ior=1.4)).fluence.mean(axis=0)
+    ahead = lit(grid, tl.Medium(absorption, 5.0 / (1 - anisotropy), anisotropy=anisotropy, ior=1.4)).fluence.mean(
+        axis=0
+    )
+    # Modes conserve light to the root of the rounding.
+    assert ahead[0] == pytest.approx(plain[0], rel=1e-4)
+    more = (ahead[1:] / plain[1:] - 1) * -np.sign(anisotropy)
+    assert (more > [1e-5, 0.05]).all()
 
 
 def test_size_does_not_matter() -> None:

@@ -47,6 +47,12 @@ MOST_SHARE = 0.99
 #: Least share of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
+#: Over 1 / STRAIGHT reduced mean free paths light that leaves has been turned little by little, and not straight back.
+STRAIGHT = 1.0
+
+#: Reduced albedo below which what half-spaces give back is in proportion to it.
+_LEAST_ALBEDO = 1e-6
+
 
 @dataclass(frozen=True)
 class SurfaceLight:
@@ -130,7 +136,9 @@ class BodySystem:
         dense = dense or even_densities(grid)
         deep = _DeepWays(dense, ways, dense.lengths(ways))
         self._channels = {
-            channel: _Channel(grid, medium.ior, roughness, float(absorption), float(scattering), deep)
+            channel: _Channel(
+                grid, medium.ior, roughness, float(absorption), float(scattering), deep, medium.anisotropy
+            )
             for channel, (absorption, scattering) in enumerate(zip(np.asarray(medium.absorption), reduced, strict=True))
             if scattering > 0.0
         }
@@ -183,6 +191,7 @@ class _Channel:
         absorption: float,
         scattering: float,
         deep: _DeepWays,
+        anisotropy: float = 0.0,
     ) -> None:
         self._grid, interface = grid, diffuse_interface(ior, roughness)
         self._exit_share = interface.exit_share
@@ -195,6 +204,9 @@ class _Channel:
         self._relative = 1.0 / layer.u(depth)
         self._attenuated = optics.transmittance(layer.attenuation * depth) * self._relative
         # What of the entering light the exact half-space gives back less than diffusion would.
+        # In thin bodies light that is not turned back leaves on the far side. 4 V / S is the mean chord (Cauchy).
+        chord = 4.0 * float(deep.dense.cells @ grid.volumes) / (grid.area * len(depth))
+        self._straight = _straight_back(self._albedo, ior, anisotropy) * float(optics.opacity(extinction * chord))
         self._excess = _half_space_excess(self._albedo, ior) / diffuse_interface(ior).conductance
         self._sources(layer, interface, extinction, deep, d)
         # Of light that is emitted everywhere: what the layers send to the surface, and what they and the rest send to
@@ -218,20 +230,26 @@ class _Channel:
         self._near, into_cells = np.zeros(count), np.zeros(count)
         for quantile in (np.arange(EVENTS) + 0.5) / EVENTS:
             depth = -np.log1p(-quantile * above) * interface.mean_cosine / extinction
-            share = self._albedo / EVENTS * above * self._relative
+            turned = self._turned(extinction / interface.mean_cosine * depth)
+            share = self._albedo / EVENTS * above * self._relative * turned
             into_cells += share * layer.u(depth)
             self._near += share * layer.rise(layer.depth - depth) / d
         deep = sparse.csr_array((count, grid.count))
         # Interpolation by chance: each place stands for the cell around it.
         spread = grid.cells.step * (box_points(count) - 0.5)
         for quantile in _tails(count) if below.max() > _NOTHING else ():
-            path = ways.length(slant - np.log1p(-quantile) / extinction)
+            length = slant - np.log1p(-quantile) / extinction
+            path = ways.length(length)
             # Where the path has left the body nothing is scattered; near its end, as much as is inside of the cell.
             cell, inside = grid.cell_at(grid.points + path[:, None] * ways.directions + spread)
-            share = self._albedo / DEEP_EVENTS * below * inside
+            share = self._albedo / DEEP_EVENTS * below * inside * self._turned(extinction * length)
             deep = deep + sparse.csr_array((share, (np.arange(count), cell)), deep.shape)
         sources = deep + sparse.diags_array(into_cells) @ self._read
         self._into_cells = sparse.csr_array((grid.area * sources).T)
+
+    def _turned(self, path: Array) -> Array:
+        """Share of the first events after an optical path from the surface that count as if they were isotropic."""
+        return np.asarray(1.0 - self._straight * optics.transmittance(STRAIGHT * path))
 
     def solved(
         self, entering: Array, from_itself: sparse.csr_array, power: Array, emission: float
@@ -286,8 +304,35 @@ def _first_ways(grid: BodyGrid, ior: float) -> Array:
 
 def _half_space_excess(albedo: float, ior: float) -> float:
     """Share of the light entering a half-space that diffusion gives back beyond the exact one."""
+    return float(_diffused_share(albedo, ior) - half_space_reflectance(round(albedo, 6), ior))
+
+
+def _diffused_share(albedo: float, ior: float, dimmed: float = 0.0) -> float:
+    """Share of the light entering a half-space that diffusion gives back.
+
+    `dimmed`: of first events after an optical path t from the surface those count that exp(-dimmed t) leaves.
+    """
     interface = diffuse_interface(ior)
     d, c = float(diffusion_coefficient(1.0 - albedo, albedo)), interface.conductance
-    attenuation = np.sqrt((1.0 - albedo) / d)
-    diffused = albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine))
-    return float(diffused - half_space_reflectance(round(albedo, 6), ior))
+    attenuation = float(np.sqrt((1.0 - albedo) / d))
+    return albedo * c / ((d * attenuation + c) * (1.0 + attenuation * interface.mean_cosine + dimmed))
+
+
+def _straight_back(albedo: float, ior: float, anisotropy: float) -> float:
+    """Share of the first events at the surface that do not count, as media that scatter ahead turn less light back.
+
+    After an optical path t it is exp(-STRAIGHT t) times as much: so much in all that a half-space gives back what the
+    exact one does.
+
+    Parameters
+    ----------
+    albedo : float
+        The reduced one, which both have.
+    ior, anisotropy : float
+    """
+    if anisotropy == 0.0:
+        return 0.0
+    reduced = max(round(albedo, 6), _LEAST_ALBEDO)
+    own = reduced / (reduced + (1.0 - reduced) * (1.0 - anisotropy))
+    less = half_space_reflectance(reduced, ior) - half_space_reflectance(own, ior, anisotropy)
+    return less / _diffused_share(reduced, ior, STRAIGHT)
