@@ -226,6 +226,7 @@ class _Worker:
         assert self._process.pid is not None
         self._channel = Channel(pipe, self._process.pid)
         self._kept, self._sent = kept, set[int]()
+        self._closing = threading.Lock()
         self._known: dict[int, object] = {}
         self._number = 0
         self.modules: set[str] = set()
@@ -307,9 +308,10 @@ class _Worker:
         """End the worker process; it has some seconds to remove unfinished files."""
         self._process.terminate()
         self._process.join(patience)
-        self._process.kill()
-        self._process.join()  # only then it lets go of the file that it has half written
-        self._channel.pipe.close()
+        with self._closing:  # whoever waits for its work, and whoever closes the pool, may do so at the same time
+            self._process.kill()
+            self._process.join()  # only then it lets go of the file that it has half written
+            self._channel.pipe.close()
 
 
 def _run(pipe: Connection, niceness: int) -> None:
