@@ -170,7 +170,7 @@ def test_a_match_shows_what_was_asked_for_and_what_is_found() -> None:
     assert match.color == (0.5, 0.6, 0.7)
     found = color_at_distance((3.0, 1.0, 0.0), match.distance)
     assert f"asked for<br>{to_hex((0.5, 0.6, 0.7))}" in html
-    assert f"after {match.distance:.4g} m<br>{to_hex(found)}" in html
+    assert f"after {1e3 * match.distance:.3g} mm<br>{to_hex(found)}" in html
 
 
 def test_labels_of_swatches_are_escaped() -> None:
@@ -223,7 +223,7 @@ def test_a_medium_tells_its_paths_and_shows_swatches() -> None:
     assert medium.half_value_thickness == pytest.approx([math.log(2) / 2, math.log(2) / 2, math.inf])
     html = medium._repr_html_()
     assert html.count("background:#") == 5
-    assert "0.75 m<br>" in html  # 1 / mean extinction
+    assert "750 mm<br>" in html  # 1 / mean extinction
     for extreme in (0.0, 1e-310, 1e300):
         assert "background:#" in tl.Medium(absorption=extreme)._repr_html_()
 

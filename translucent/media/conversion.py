@@ -16,7 +16,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.formulas import optics
 from translucent.media.swatches import html_swatches
-from translucent.units import metres_per_unit
+from translucent.units import length_text, metres_per_unit
 
 #: Value to which a channel of 0 is clamped if that is asked for: an optical depth of 9.2.
 CLAMP = 1e-4
@@ -144,7 +144,7 @@ class DistanceMatch:
         """Swatches of the color that was asked for and of the one that is found, for notebooks."""
         with np.errstate(under="ignore"):
             found = np.array(self.color) * np.exp(self.residual)
-        return html_swatches([(self.color, "asked for"), (found, f"after {self.distance:.4g} m")])
+        return html_swatches([(self.color, "asked for"), (found, f"after {length_text(self.distance)}")])
 
 
 def distance_for_color(extinction: npt.ArrayLike, color: npt.ArrayLike) -> DistanceMatch:
@@ -289,5 +289,5 @@ def html_strip(extinction: npt.ArrayLike, distance: float | None = None) -> str:
         mean = float(sigma.mean())
         distance = min(1.0 / mean, 1e300) if mean > 1e-300 else 1.0
     return html_swatches(
-        (color_at_distance(sigma, factor * distance), f"{factor * distance:.4g} m") for factor in FACTORS
+        (color_at_distance(sigma, factor * distance), length_text(factor * distance)) for factor in FACTORS
     )

@@ -13,7 +13,7 @@ from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
 from translucent.media.medium import Medium
-from translucent.media.swatches import html_swatches
+from translucent.media.swatches import html_card
 
 Kind = Literal["measured", "estimated"]
 Regime = Literal["absorbing", "single scattering", "scattering dominated"]
@@ -85,12 +85,11 @@ class Preset:
 
     def _repr_html_(self) -> str:
         """Name and swatches, for notebooks: of light that passes, and of slabs on a white and a black card."""
-        slabs = [
-            (color, f"{thickness} on {card}")
+        cards = [
+            html_card(card, zip(row, SLABS, strict=True))
             for card, row in zip(CARDS, self.slab_reflectance, strict=True)
-            for thickness, color in zip(SLABS, row, strict=True)
         ]
-        return f"<div>{self.name} ({self.kind})</div>{self.medium._repr_html_()}{html_swatches(slabs)}"
+        return f"<div>{self.name} ({self.kind})</div>{self.medium._repr_html_()}{''.join(cards)}"
 
     @property
     def absorption(self) -> Array:

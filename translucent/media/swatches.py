@@ -31,3 +31,12 @@ def html_swatches(swatches: Iterable[tuple[npt.ArrayLike, str]]) -> str:
             f"</div>{escape(label)}<br>{text}</div>"
         )
     return f'<div style="display:flex">{"".join(cells)}</div>'
+
+
+def html_card(card: str, swatches: Iterable[tuple[npt.ArrayLike, str]]) -> str:
+    """HTML of linear colors (3,) that lie on a white or a black card, each with its label and its hex color below."""
+    text = {"white": "black", "black": "white"}[card]
+    return (
+        f'<div style="display:inline-block;background:{card};color:{text};border:1px solid gray;padding:4px 8px;'
+        f'margin:4px 8px 4px 0;font:11px monospace">on {card}{html_swatches(swatches)}</div>'
+    )
