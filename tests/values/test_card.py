@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.special import expn
 
 import translucent as tl
+from translucent.formulas import optics
 from translucent.formulas.card import reflectance_on_card
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
 from translucent.media.preset import CARDS, SLABS
@@ -34,6 +35,27 @@ def test_a_thick_slab_hides_its_card(ior: float, card: float) -> None:
     for albedo in (0.5, 0.9, 0.99):
         expected = half_space_reflectance(albedo, ior) * diffuse_interface(ior).entering
         assert reflectance_on_card(albedo, 1e5, ior, card) == pytest.approx(expected, abs=QUADRATURE)
+
+
+@pytest.mark.parametrize("ior", [1.0, 1.33, 1.5])
+@pytest.mark.parametrize(("albedo", "depth"), [(0.6, 0.5), (0.99, 3.0), (0.999, 20.0)])
+def test_any_slab_is_that_of_the_reference_between_its_interface_and_its_card(
+    albedo: float, depth: float, ior: float
+) -> None:
+    """Radiance down and up at both faces: the upper mirrors by Fresnel's equations, the lower by Lambert's law."""
+    mu, weight = slabs.cosines(ior)
+    back, on = slabs.bare(albedo, depth, mu, weight)
+    mirror = optics.fresnel_dielectric(mu, 1 / ior) if ior > 1 else np.zeros_like(mu)
+    one = np.eye(len(mu))
+    for card in (0.0, 0.5, 1.0):
+        lambert = np.outer(np.ones_like(mu), 2 * card * mu * weight)
+        # Down at the top, up at the bottom: d = n^2 (1 - F) + F u, with u = R d + T b, and b = C (T d + R b).
+        system = np.block(
+            [[one - mirror[:, None] * back, -mirror[:, None] * on], [-lambert @ on, one - lambert @ back]]
+        )
+        down, below = np.split(np.linalg.solve(system, np.concatenate([ior**2 * (1 - mirror), np.zeros_like(mu)])), 2)
+        out = float((2 * mu * weight * (1 - mirror) * (back @ down + on @ below)).sum())
+        assert reflectance_on_card(albedo, depth, ior, card) == pytest.approx(out, abs=QUADRATURE)
 
 
 def test_what_absorbs_alone_is_an_exponential_integral() -> None:
