@@ -67,6 +67,8 @@ def test_the_command_writes_what_slicers_read(run: Run, tmp_path: Path) -> None:
     assert str(mesh.diagnosis) == "closed, 1 component"
     assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.039, 0.020, 0.0025], rel=1e-5)
     seen = srgb_to_linear(np.asarray(Image.open(f"{out}.check.png"), dtype=np.float64) / 255)
+    assert seen.shape[1] == 2 * 39
+    seen = seen[-20:]  # below the captions
     assert seen[:, :39] == pytest.approx(seen[:, 39:], abs=0.02)
     words = run(*how, "--color", "#7b1e3a", "--distance", "2mm").out
     assert "rendered before an even white light" in words

@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
+from translucent.bake.check_picture import labeled, look
 from translucent.errors import InputError
-from translucent.files.images import write_png
 from translucent.files.paths import require_output, write_atomically
-from translucent.formulas.color import linear_to_srgb, luminance
+from translucent.formulas.color import luminance
 from translucent.frames.picture import read_picture
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
@@ -91,9 +91,9 @@ class Lithophane:
     def save_check(self, path: str | Path) -> None:
         """Write a .png of what is asked for, and beside it of what the relief shows; as bright as its colors allow."""
         asked = np.repeat(self.target[..., None], 3, axis=-1)
-        both = np.concatenate([asked, self.shown], axis=1)
-        pixels = np.round(255.0 * linear_to_srgb(both / max(1.0, float(both.max())))).astype(np.uint8)
-        write_atomically(Path(path), lambda temporary: write_png(temporary, pixels))
+        most = max(1.0, float(asked.max()), float(self.shown.max()))
+        both = labeled(("asked for", look(asked / most)), ("as the relief shows it", look(self.shown / most)))
+        write_atomically(Path(path), lambda temporary: both.save(temporary, format="PNG"))
 
 
 def check_lithophane_output(path: Path) -> Path:
