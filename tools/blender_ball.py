@@ -1,7 +1,7 @@
 """Render a mesh with a material in Cycles: what `measure_blender` starts in Blender. Its only argument is a JSON file.
 
 It holds ``snippet`` (the text that makes the material), ``mesh`` (an .npz file of vertices and faces), ``pose`` (camera
-to world) and ``fov`` (radians), ``side`` (pixels), ``samples``, ``bounces`` (null: as Blender has them), ``environment``
+to world) and ``fov`` (radians), ``side`` (pixels), ``samples``, ``environment``
 (three numbers, or a picture of all directions) and ``result``, an .npy file to be written: (2, side, side, 3)
 radiance with two seeds, row 0 at the top. Coordinates are Blender's, +Z up.
 """
@@ -55,17 +55,14 @@ def world(environment: list[float] | str) -> None:
     links.new(texture.outputs["Color"], background.inputs["Color"])
 
 
-def settings(side: int, samples: int, bounces: int | None) -> None:
-    """Set Cycles to what has no bias but that of its bounces: nothing clamped, blurred or denoised."""
+def settings(side: int, samples: int) -> None:
+    """Set Cycles to what has no bias but that of its bounces, which are left: nothing clamped, blurred or denoised."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device, cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = "CPU", samples, False, False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = cycles.light_sampling_threshold = 0
     cycles.pixel_filter_type, cycles.filter_width = "GAUSSIAN", 0.01  # the centers of pixels
-    if bounces is not None:
-        for kind in ("max", "diffuse", "glossy", "transmission", "volume", "transparent_max"):
-            setattr(cycles, f"{kind}_bounces", bounces)
     scene.render.resolution_x = scene.render.resolution_y = side
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
 
@@ -84,7 +81,7 @@ def pixels(path: Path, seed: int) -> Any:
 def main(job: dict[str, Any]) -> None:
     """Render one picture."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    settings(job["side"], job["samples"], job["bounces"])
+    settings(job["side"], job["samples"])
     body(job["mesh"], job["snippet"])
     camera(job["pose"], job["fov"])
     world(job["environment"])

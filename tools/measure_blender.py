@@ -1,10 +1,10 @@
 """Mean color of a ball of exported material in Blender's Cycles, against our path-traced truth.
 
 ``python tools/measure_blender.py [NAME ...]`` writes ``docs/presets/blender.json``. Each material is what ``extinction
---as blender`` prints. Blender runs it, and Cycles renders it on the toolkit's ball (4 cm), before the same camera, lit by a
-white world and by the studio, without bias but the number of bounces. The truth is `PathTraced`. Both see the ball at the
-same points, the centers of pixels. Needs Blender: the module ``bpy`` in this Python or in that of BLENDER_PYTHON, or the
-program.
+--as blender`` prints. Blender runs it, and Cycles renders it on the toolkit's ball (4 cm), before the same camera, lit by
+a white world and by the studio, without bias but that of the number of bounces, which is Blender's or the material's.
+The truth is `PathTraced`. Both see the ball at the same points, the centers of pixels. Needs Blender: the module ``bpy``
+in this Python or in that of BLENDER_PYTHON, or the program.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ ABSENT = (
     "pip install bpy, and set BLENDER_PYTHON to that Python)"
 )
 
-#: Pixels along a side; bounces, Cycles's most; samples of a pixel with a seed in Cycles; paths of one in a round of ours, the
+#: Pixels along a side; samples of a pixel with a seed in Cycles; paths of one in a round of ours, the
 #: relative standard error at which there are enough, and the seconds.
-SIDE, BOUNCES, SAMPLES, PATHS, ENOUGH, SECONDS = 32, 1024, 128, 64, 0.005, 30.0
+SIDE, SAMPLES, PATHS, ENOUGH, SECONDS = 32, 128, 64, 0.005, 30.0
 
 #: Columns are the axes of glTF in Blender.
 AXES = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
@@ -70,16 +70,14 @@ ENVIRONMENTS = {
 def blender_command() -> list[str] | None:
     """How a script is started in Blender: by a Python that has its module, or by the program; None without it."""
     if python := os.environ.get("BLENDER_PYTHON"):
-        return [python]
+        return [python, "-W", "error"]
     if importlib.util.find_spec("bpy") is not None:
-        return [sys.executable]
+        return [sys.executable, "-W", "error"]
     program = shutil.which("blender")
     return program and [program, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
 
 
-def in_cycles(
-    command: list[str], scene: tl.Scene, snippet: str, side: int, samples: int, bounces: int | None = BOUNCES
-) -> npt.NDArray[np.float64]:
+def in_cycles(command: list[str], scene: tl.Scene, snippet: str, side: int, samples: int) -> npt.NDArray[np.float64]:
     """(2, side, side, 3): radiance of a scene of one body, with the material of a snippet, by Cycles with two seeds."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -95,7 +93,7 @@ def in_cycles(
             light = str(folder / "world.exr")
         job = {
             "snippet": snippet, "mesh": str(folder / "mesh.npz"), "pose": pose.tolist(),
-            "fov": float(np.radians(scene.camera.fov_y)), "side": side, "samples": samples, "bounces": bounces,
+            "fov": float(np.radians(scene.camera.fov_y)), "side": side, "samples": samples,
             "environment": light, "result": str(folder / "result.npy"),
         }  # fmt: skip
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
@@ -139,9 +137,7 @@ def measure(
     inside, outside = tl.interior(counts) & (counts > 0), tl.interior(counts) & (counts == 0)
     distance = 1.0 / max(float(medium.extinction.max()), 1.0)
     snippet = text_block("blender", medium, medium.transmittance(distance), distance, roughness)
-    began = time.perf_counter()
     halves = in_cycles(command, scene, snippet, SIDE, SAMPLES)
-    seconds = time.perf_counter() - began
     seen, noise = halves.mean(axis=0), np.diff(halves, axis=0)[0] / 2
     mean, error, paths = truth_of(renderer, scene, inside)
     error = np.hypot(error, noise)
@@ -152,7 +148,6 @@ def measure(
         "truth": mean[inside].mean(axis=0).tolist(),
         "error": (np.sqrt((error[inside] ** 2).sum(axis=0)) / inside.sum()).tolist(),
         "paths": paths,
-        "seconds": round(seconds, 1),
     }
 
 

@@ -255,6 +255,8 @@ def test_photographs_are_fitted(run: Run, here: Path) -> None:
     assert (code, err) == (0, "")
     assert "to either side hold the extinction with 95 %" in out
     assert "6, 6, 6 patches in 2 photographs" in out
+    assert "plates about" not in out
+    assert "plates about 2 m thick: lengths that name no unit are in metres" in run(*how, "--patch", "20,0,60,20=1,2,4").out
     assert "--patch is missing; say where" in one_error_line(run(*how))
     assert "outside of the picture" in one_error_line(run(*how, "--patch", "70,0,60,20=1mm"))
     assert "--white; only --fit PHOTO takes it" in one_error_line(run("gray", "1cm", "--white", "0,0,1,1"))

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
-import shutil
+import runpy
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -69,21 +66,15 @@ with open(result, "w") as stream:
 Render = Callable[[str, float, int], np.ndarray]
 
 
+TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "measure_blender.py"))
+
+
 @pytest.fixture(scope="session")
 def blender() -> list[str]:
     """How a script is started in Blender: by a Python that has its module, or by the program."""
-    for python, found in (
-        (os.environ.get("BLENDER_PYTHON", ""), bool(os.environ.get("BLENDER_PYTHON"))),
-        (sys.executable, importlib.util.find_spec("bpy") is not None),
-    ):
-        if found:
-            return [python, "-W", "error"]
-    if program := shutil.which("blender"):
-        return [program, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
-    pytest.skip(
-        "Blender is absent: no program of that name, and no module bpy (it may be in a Python of its own: "
-        "pip install bpy, and set BLENDER_PYTHON to that Python)"
-    )
+    if (command := TOOL["blender_command"]()) is None:
+        pytest.skip(TOOL["ABSENT"])
+    return list(command)
 
 
 @pytest.fixture
@@ -148,3 +139,21 @@ def test_glass_around_the_volume_in_cycles_is_ours(slab: Render, thickness: floa
     noise = seen.std(axis=0) / SIDE
     assert (noise < 2e-3).all()  # without the surface all would be off by 0.01 to 0.05
     assert (np.abs(seen.mean(axis=0) - expected) <= 5 * noise + length_error(medium)).all()
+
+
+def test_a_ball_that_scatters_in_cycles_is_ours(blender: list[str]) -> None:
+    """All that the material has: an interface that bends and mirrors, absorption, and scattering many times ahead."""
+    side, samples = 8, 64
+    medium = tl.Medium(absorption=(1, 4, 9), scattering=(120, 100, 80), anisotropy=0.4, ior=1.4)
+    down, right = np.mgrid[:16, :32] / 16
+    sky = np.stack([1 + 0.5 * np.sin(np.pi * right), 1.5 - down, 0.6 + 0.4 * np.cos(np.pi * right)], axis=-1)
+    scene = TOOL["ball"](medium, 0.0, tl.Environment.image(sky), side)
+    first, second = TOOL["in_cycles"](blender, scene, blender_snippet(medium), side, samples)
+    frame, error = tl.reference.path_trace(scene, (side, side), samples)
+    body = tl.reference.hit_counts(scene, (side, side)) > 0
+    np.testing.assert_allclose(first[~body], frame.radiance[~body], rtol=1e-3)  # the same camera and the same sky
+    noise = np.sqrt((error[body] ** 2 + (first - second)[body] ** 2 / 4).sum(axis=0))
+    total, seen = frame.radiance[body].sum(axis=0), 0.5 * (first + second)[body].sum(axis=0)
+    assert (noise <= 0.02 * total).all()
+    # What Cycles leaves out after its bounces is less than the noise. Without those of the material it is half.
+    assert (np.abs(seen - total) <= 4 * noise).all()

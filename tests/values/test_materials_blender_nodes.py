@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import translucent as tl
 from tests.values.media import CLEAR, GLOW, JADE, MILK, close
 from translucent.materials.blender import (
+    BOUNCES,
     absorption_node,
     blender_snippet,
     from_absorption_node,
@@ -86,7 +87,10 @@ def test_the_blender_snippet_runs_and_sets_the_sockets(
             assert (version, key, value) == (4, "use_nodes", True)
             Material.node_tree = tree
 
-    bpy = SimpleNamespace(data=SimpleNamespace(materials=SimpleNamespace(new=lambda name: Material())))
+    light = {"max_bounces": 12, "volume_bounces": 0, "glossy_bounces": 4, "transmission_bounces": 2048}
+    scene = SimpleNamespace(cycles=SimpleNamespace(**light))
+    materials = SimpleNamespace(new=lambda name: Material())
+    bpy = SimpleNamespace(data=SimpleNamespace(materials=materials), context=SimpleNamespace(scene=scene))
     monkeypatch.setitem(__import__("sys").modules, "bpy", bpy)
     exec(compile(blender_snippet(medium), "snippet", "exec"), {})
     absorbing = "ShaderNodeVolumeAbsorption" in made
@@ -103,3 +107,7 @@ def test_the_blender_snippet_runs_and_sets_the_sockets(
         np.testing.assert_allclose(q, medium.emission, rtol=1e-15)
     close(found, medium)
     assert "link" in made
+    raised = {kind: max(BOUNCES, count) for kind, count in light.items()} if medium.scatters else light
+    assert vars(scene.cycles) == raised
+    del scene.cycles  # another renderer alone
+    exec(compile(blender_snippet(medium), "snippet", "exec"), {})

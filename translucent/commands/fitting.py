@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 #: Suffixes of tables; all else but .toml are pictures.
 TABLES = (".csv", ".json")
 
+#: Metres from which plates are told to be thick: millimetres without their unit.
+_THICK = 0.3
+
 
 class Fitted(NamedTuple):
     """A medium fitted to files: it, the distance at which its color is told, what is told, and the same in words."""
@@ -97,6 +100,7 @@ def _of_photographs(
         read_photographs,
     )
     from translucent.media.conversion import summary
+    from translucent.units import length_text
 
     if fits[0].suffix.lower() == ".toml":
         shots = read_photographs(fits[0], unit)
@@ -110,6 +114,9 @@ def _of_photographs(
     fit = fit_photographs(shots, ior)
     told = summary(fit.medium.transmittance(fit.distance), fit.distance, fit.medium.extinction, unit_out)
     told["warnings"][:0] = fit.warnings
+    if fit.distance >= _THICK:
+        doubt = "lengths that name no unit are in metres, unless --unit mm is given"
+        told["warnings"].insert(0, f"plates about {length_text(fit.distance)} thick: {doubt}")
     told |= {
         "samples": fit.samples.tolist(),
         "standard_error": fit.standard_error.tolist(),

@@ -12,8 +12,11 @@ Inverted: Density is the largest channel of sigma_a (absorption) or of sigma_t (
 colors are in 0..1. Colors are linear, as sockets store them.
 The surface is a white Glass BSDF with the IOR and the Roughness, the square root of the GGX alpha as here; none where
 the index is 1 and nothing is rough, since light then enters as it comes.
-Source: Blender manual, Glass BSDF, Volume Absorption, Principled Volume and "Volume Coefficients". The tests render the
-snippet in Cycles where Blender is installed.
+Where the medium scatters, the bounces of the scene are raised to `BOUNCES`: Blender starts with none in volumes, and 4
+among mirror images inside. A ball of 4 cm of whole milk (mean free path 0.4 mm) then shows no more than the mirror
+image on it, 3 % of white instead of 95 %; it is 7 % too dark with 256, and 1 % with 1024.
+Source: Blender manual, Glass BSDF, Volume Absorption, Principled Volume, "Volume Coefficients", Light Paths. The tests
+render the snippet in Cycles where Blender is installed; ``tools/measure_blender.py`` compares balls with our truth.
 
 Not carried over: heterogeneous density.
 """
@@ -27,6 +30,9 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.materials.snippet import stated
 from translucent.media.medium import Medium
+
+#: Largest number of bounces in Cycles.
+BOUNCES = 1024
 
 
 def absorption_node(medium: Medium) -> tuple[Array, float]:
@@ -117,6 +123,13 @@ def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translu
             f'surface.inputs["IOR"].default_value = {float(medium.ior)!r}',
             f'surface.inputs["Roughness"].default_value = {roughness!r}',
             'links.new(surface.outputs["BSDF"], output.inputs["Surface"])',
+        ]
+    if medium.scatters:
+        lines += [
+            "# As Cycles is set up, light ends in volumes, and what scatters is black. Here more bounces, for the whole scene.",
+            'cycles = getattr(bpy.context.scene, "cycles", None)',
+            'for kind in ("max", "volume", "glossy", "transmission") if cycles else ():',
+            f'    setattr(cycles, f"{{kind}}_bounces", max({BOUNCES}, getattr(cycles, f"{{kind}}_bounces")))',
         ]
     return "\n".join(lines) + "\n"
 
