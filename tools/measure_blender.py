@@ -1,10 +1,10 @@
 """Mean color of a ball of exported material in Blender's Cycles, against our path-traced truth.
 
 ``python tools/measure_blender.py [NAME ...]`` writes ``docs/presets/blender.json``. Each material is what ``extinction
---as blender`` prints. Blender runs it, and Cycles renders it on the toolkit's ball (4 cm), before the same camera, lit by
-a white world and by the studio, without bias but that of the number of bounces, which is Blender's or the material's.
-The truth is `PathTraced`. Both see the ball at the same points, the centers of pixels. Needs Blender: the module ``bpy``
-in this Python or in that of BLENDER_PYTHON, or the program.
+--as blender`` prints. Blender runs it, and Cycles renders it on the toolkit's ball (4 cm), before the same camera, lit
+by a white world and by the studio, without bias but that of the number of bounces: Blender's, or the material's. The
+truth is `PathTraced`. Both see the ball at the same points, the centers of pixels. Needs Blender: the module ``bpy`` in
+this Python or in that of BLENDER_PYTHON, or the program.
 """
 
 from __future__ import annotations
@@ -164,12 +164,12 @@ def main() -> None:
     with tl.Renderer() as renderer:
         for name in asked:
             medium, roughness = known[name]
-            found[name] = {}
+            found[name] = {"colors": {}}
             for environment in ENVIRONMENTS:
-                found[name][environment] = one = measure(command, renderer, medium, roughness, environment)
+                found[name]["colors"][environment] = one = measure(command, renderer, medium, roughness, environment)
                 mean, error, seen = (np.array(one[key]) for key in ("truth", "error", "cycles"))
                 ratio, doubt = np.round(seen / mean, 3), np.round(error / mean, 4)
-                print(f"{name:18} {environment:7} {ratio} +- {doubt} {np.round(mean, 4)} {one}", flush=True)
+                print(f"{name:18} {environment:7} {ratio} +- {doubt} {np.round(mean, 4)}", flush=True)
             data = {"materials": {name: found[name] for name in known if name in found}}
             write_text_atomically(FILE, json.dumps(data, indent=1) + "\n")
 

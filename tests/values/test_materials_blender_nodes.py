@@ -61,8 +61,9 @@ def test_blender_values_out_of_range_are_refused() -> None:
 
 @pytest.mark.parametrize("version", [4, 5])
 @pytest.mark.parametrize("medium", [JADE, MILK, GLOW, CLEAR], ids=["jade", "milk", "glow", "clear"])
+@pytest.mark.parametrize("roughness", [0.0, 0.3])
 def test_the_blender_snippet_runs_and_sets_the_sockets(
-    medium: tl.Medium, version: int, monkeypatch: pytest.MonkeyPatch
+    medium: tl.Medium, version: int, roughness: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: dict[str, Any] = {}
 
@@ -92,7 +93,7 @@ def test_the_blender_snippet_runs_and_sets_the_sockets(
     materials = SimpleNamespace(new=lambda name: Material())
     bpy = SimpleNamespace(data=SimpleNamespace(materials=materials), context=SimpleNamespace(scene=scene))
     monkeypatch.setitem(__import__("sys").modules, "bpy", bpy)
-    exec(compile(blender_snippet(medium), "snippet", "exec"), {})
+    exec(compile(blender_snippet(medium, roughness), "snippet", "exec"), {})
     absorbing = "ShaderNodeVolumeAbsorption" in made
     volume = made["ShaderNodeVolumeAbsorption" if absorbing else "ShaderNodeVolumePrincipled"]
     values = {key: socket.default_value for key, socket in volume.inputs.items()}
@@ -107,7 +108,7 @@ def test_the_blender_snippet_runs_and_sets_the_sockets(
         np.testing.assert_allclose(q, medium.emission, rtol=1e-15)
     close(found, medium)
     assert "link" in made
-    raised = {kind: max(BOUNCES, count) for kind, count in light.items()} if medium.scatters else light
+    raised = {kind: max(BOUNCES, count) for kind, count in light.items()} if medium.scatters or roughness else light
     assert vars(scene.cycles) == raised
     del scene.cycles  # another renderer alone
-    exec(compile(blender_snippet(medium), "snippet", "exec"), {})
+    exec(compile(blender_snippet(medium, roughness), "snippet", "exec"), {})
