@@ -136,6 +136,8 @@ def test_a_material_has_its_surface_and_is_read_again(run: Run, here: Path, targ
     assert again.code == 0
     assert json.loads(again.out)["ior"] == 1.45
     assert json.loads(again.out)["absorption"] == pytest.approx(-np.log(parse_color("#7b1e3a")) / 0.01, rel=1e-12)
+    assert "  roughness: 0.25," in run("--from", f"a{suffix}", "--as", "threejs").out
+    assert "  roughness: 0.5," in run("--from", f"a{suffix}", "--as", "threejs", "--roughness", "0.5").out
     assert "0.15" in run("--preset", "jade", "--as", target).out
 
 
@@ -214,7 +216,7 @@ def test_a_table_shows_swatches_and_errors(here: Path) -> None:
     (here / "in.csv").write_text("name,color,distance\n<wine>,#7b1e3a,1cm\nmist,gray,<far>\n")
     html = convert_table("in.csv")._repr_html_()
     assert "<div>&lt;wine&gt;</div>" in html
-    assert "0.01 m<br>#7b1e3a" in html
+    assert "10 mm<br>#7b1e3a" in html
     assert "error: in.csv line 3: length &#x27;&lt;far&gt;&#x27;" in html
     rows = "".join(f"row {i},gray,1cm\n" for i in range(MOST_SHOWN + 2))
     (here / "long.csv").write_text("name,color,distance\n" + rows)
@@ -256,7 +258,8 @@ def test_photographs_are_fitted(run: Run, here: Path) -> None:
     assert "to either side hold the extinction with 95 %" in out
     assert "6, 6, 6 patches in 2 photographs" in out
     assert "plates about" not in out
-    assert "plates about 2 m thick: lengths that name no unit are in metres" in run(*how, "--patch", "20,0,60,20=1,2,4").out
+    thick = run(*how, "--patch", "20,0,60,20=1,2,4").out
+    assert "plates about 2 m thick: lengths that name no unit are in metres" in thick
     assert "--patch is missing; say where" in one_error_line(run(*how))
     assert "outside of the picture" in one_error_line(run(*how, "--patch", "70,0,60,20=1mm"))
     assert "--white; only --fit PHOTO takes it" in one_error_line(run("gray", "1cm", "--white", "0,0,1,1"))

@@ -21,6 +21,7 @@ from translucent.gltf.materials import materials_of
 from translucent.materials import TARGETS, TITLES, load_medium, text_block
 from translucent.materials.blender import read_blender
 from translucent.materials.godot import read_godot
+from translucent.materials.roughness import load_roughness
 from translucent.materials.threejs import LARGEST_IOR, read_threejs
 from translucent.materials.unity import read_unity
 from translucent.materials.unreal import read_unreal
@@ -77,6 +78,7 @@ def test_what_is_written_is_read_back(
     # A color near white has lost digits of the extinction, which a logarithm does not bring back.
     close(found, expected, max(rtol, 1e-8 if target == "unity" else 1e-15) / min(1.0, depth) ** 2)
     assert found.ior == pytest.approx(expected.ior, rel=1e-8)
+    assert load_roughness(tmp_path / f"a{suffix}") == pytest.approx(0.0 if target == "json" else roughness, abs=1e-8)
     if FILES[target][2] and medium.scatters:
         assert found.anisotropy == medium.anisotropy
 
@@ -88,6 +90,38 @@ def test_named_media_are_read_back(tmp_path: Path, target: str, medium: tl.Mediu
     path.write_text(text_block(target, medium, medium.transmittance(1e-4), 1e-4))
     close(load_medium(path), carried(medium, target), 1e-7)
     assert load_medium(path).ior == medium.ior
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "expected"),
+    [
+        ("openpbr.mtlx", '<input name="specular_roughness" type="float" value="0.4" />', "", 0.3),
+        ("standard_surface.mtlx", '<input name="specular_roughness" type="float" value="0.4" />', "", 0.2),
+        ("openpbr.mtlx", 'specular_roughness" type="float" value="0.4"', 'specular_roughness" nodename="a"', 0.0),
+        ("usd.usda", "float inputs:specular_roughness = 0.4", "", 0.3),
+        ("usd.usda", "specular_roughness = 0.4", "specular_roughness.connect = </a>", 0.0),
+        ("gltf.json", '"roughnessFactor": 0.4', '"a": 0', 1.0),
+        ("gltf.json", '"roughnessFactor": 0.4', '"metallicRoughnessTexture": {"index": 0}', 0.0),
+        ("gltf.json", "0.4", '"rough"', None),
+        ("openpbr.mtlx", 'value="0.4"', 'value="rough"', None),
+        ("usd.usda", "roughness = 0.4", "roughness = 0.4.4", None),
+        ("threejs.js", "roughness: 0.4", "roughness: 1.5", None),
+        ("unity.cs", '"_Smoothness", 0.6', '"_Smoothness", 2', None),
+        ("unreal.txt", "= 0.4", "=", None),
+    ],
+)
+def test_a_roughness_that_is_changed_missing_or_wrong(
+    tmp_path: Path, name: str, old: str, new: str, expected: float | None
+) -> None:
+    text = text_block(name.partition(".")[0], JADE, COLOR, 0.02, 0.4)
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new))
+    if expected is None:
+        with pytest.raises(tl.InputError, match=r"roughness|without a number"):
+            load_roughness(tmp_path / name)
+    else:
+        assert load_roughness(tmp_path / name) == expected
+        assert load_medium(tmp_path / name).ior == 1.6
 
 
 def test_blender_carries_a_glow() -> None:

@@ -67,7 +67,7 @@ _DEFAULT = click.core.ParameterSource.DEFAULT
     "--roughness",
     type=click.FloatRange(0.0, 1.0),
     metavar="R",
-    help="Of --as: of its surface, 0 (polished) to 1. Default: the preset's, or 0.",
+    help="Of --as: of its surface, 0 (polished) to 1. Default: that of --preset or --from, or 0.",
 )
 @click.option("--batch", type=click.Path(path_type=Path), metavar="FILE", help="Convert rows of name,color,distance.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Of --batch: a .json or .csv file.")
@@ -146,7 +146,9 @@ def extinction(
     for option, value in (("--ior", None if of_photographs else ior), ("--roughness", roughness)):
         if value is not None and target is None:
             raise InputError(f"{option} {value:g}", "only a material for an engine has it", "add --as, or leave it out")
-    wanted = _Wanted(target, ior, read_roughness(roughness, preset_name) or 0.0, td_transmittance, as_json)
+    finish = _given_roughness(source) if roughness is None and target is not None else None
+    finish = read_roughness(roughness, preset_name) if finish is None else finish
+    wanted = _Wanted(target, ior, finish or 0.0, td_transmittance, as_json)
     if output is not None and batch is None:
         raise InputError(f"-o {output}", "only --batch writes a file", "leave it out")
     if eye is not None and model is None:
@@ -191,6 +193,16 @@ def _given_medium(source: str | None, preset_name: str | None, unit: str) -> Med
     from translucent.materials import load_medium
 
     return read_medium(None, None, preset_name) if source is None else load_medium(source, unit)
+
+
+def _given_roughness(source: str | None) -> float | None:
+    from translucent.materials import load_medium
+    from translucent.materials.roughness import load_roughness
+
+    if source is None:
+        return None
+    load_medium(source)  # which tells what is wrong with the file
+    return load_roughness(source)
 
 
 def _filament(td: str, unit: str, transmittance: float | None) -> Medium:

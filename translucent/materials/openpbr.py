@@ -32,7 +32,7 @@ def write_openpbr(
     unit : str
         Unit of the scene's lengths, for the depth.
     roughness : float
-        Of the surface, 0 to 1; it is not read.
+        Of the surface, 0 to 1.
     """
     return write_shader(SHADER, medium, distance, name, unit, roughness)
 
