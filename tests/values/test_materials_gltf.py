@@ -111,7 +111,7 @@ def test_a_material_shows_its_name_and_its_colors() -> None:
     assert [material.kind for material in found] == ["volume", "thin wall", "opaque", "volume"]
     html = [material._repr_html_() for material in found]
     assert html[0].startswith("<div>0 &#x27;&lt;i&gt;Wine&lt;/i&gt;&#x27;: volume</div>")
-    assert "0.5 m<br>#ff0000" in html[0]
+    assert "500 mm<br>#ff0000" in html[0]
     assert [text.count("background:#") for text in html] == [5, 0, 0, 5]
     assert "1 m<br>#ffffff" in html[3]
 
