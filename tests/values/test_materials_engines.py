@@ -135,7 +135,7 @@ def test_blender_carries_a_glow() -> None:
 
 def test_blender_has_glass_around_the_volume() -> None:
     text = text_block("blender", JADE, COLOR, 0.02, 0.3)
-    assert 'surface = nodes.new("ShaderNodeBsdfGlass")' in text
+    assert 'surface = nodes.new("ShaderNodeBsdfGlass")\nsurface.distribution = "MULTI_GGX"' in text
     assert 'surface.inputs["IOR"].default_value = 1.6' in text
     assert 'surface.inputs["Roughness"].default_value = 0.3' in text
     assert 'links.new(surface.outputs["BSDF"], output.inputs["Surface"])' in text

@@ -11,7 +11,8 @@ Strength times Emission Color; Anisotropy = g.
 Inverted: Density is the largest channel of sigma_a (absorption) or of sigma_t (principled), the smallest for which all
 colors are in 0..1. Colors are linear, as sockets store them.
 The surface is a white Glass BSDF with the IOR and the Roughness, the square root of the GGX alpha as here; none where
-the index is 1 and nothing is rough, since light then enters as it comes.
+the index is 1 and nothing is rough, since light then enters as it comes. Of its distributions Multiscatter GGX loses
+least: a frosted ball (roughness 0.4) in a white world sends on 99 % of the light, and 90 % by GGX alone.
 Where the medium scatters or the surface is rough, the bounces of the scene are raised to `BOUNCES`: Blender starts
 with none in volumes, and 4 among mirror images inside. A ball of 4 cm of whole milk (mean free path 0.4 mm) then shows
 no more than the mirror image on it, 3 % of white instead of 95 %; it is 7 % too dark with 256, and 1 % with 1024.
@@ -120,6 +121,7 @@ def blender_snippet(medium: Medium, roughness: float = 0.0, name: str = "translu
     if medium.ior > 1.0 or roughness > 0.0:
         lines += [
             'surface = nodes.new("ShaderNodeBsdfGlass")',
+            'surface.distribution = "MULTI_GGX"',
             'surface.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)',
             f'surface.inputs["IOR"].default_value = {float(medium.ior)!r}',
             f'surface.inputs["Roughness"].default_value = {roughness!r}',
