@@ -321,8 +321,8 @@ def _throwing(scene: Scene) -> Sequence[Object]:
 
 
 def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
-    """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and a medium of
-    each of the first two, or two at least.
+    """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and the medium
+    of each slot, two at least.
     """
     throwing, found = set(map(id, _throwing(scene))), dict[bytes, Medium | None]()
     slots = []
