@@ -321,8 +321,8 @@ def _throwing(scene: Scene) -> Sequence[Object]:
 
 
 def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
-    """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and the medium
-    of each slot, two at least.
+    """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and the
+    medium of each slot, two at least.
     """
     throwing, found = set(map(id, _throwing(scene))), dict[bytes, Medium | None]()
     slots = []
@@ -337,7 +337,7 @@ def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
 
 
 def _has_two_media(scene: Scene, chosen: RenderPlan) -> bool:
-    """Whether paths in two media tell all that light goes through."""
+    """Tell whether paths in two media are all that light goes through."""
     names = {step.name for step in chosen.passes}
     return PassName.SIGNED_DEPTH in names and names.issubset(_SUMS) and len(_slots(scene)[1]) == 2
 
