@@ -1,8 +1,9 @@
 """Caustics in media against random paths of light: fog, wax and milk below a ball of glass, and a ball of milk, in a
 wide sun.
 
-No path finds a lamp behind an interface: the truth has a disc of the environment 24 degrees wide, and the picture under test
-lamps spread over it. Errors count where the ball's light and shadow fall.
+No path finds a lamp behind an interface: the truth has a disc of the environment 24 degrees wide, and the picture
+under test lamps spread over it. Errors count where the light and the shadow of a ball fall, or in it, below the
+image of the sun on it.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ SCENES = (
     MediumScene("wax", "Block of wax", "what falls on it spreads inside", wax, 192, _BELOW),
     MediumScene("milk", "Milk", "the same, in a medium that scatters ahead and absorbs blue", milk, 128, _BELOW),
     MediumScene(
-        "ball", "Ball of thin milk", "its own interface gathers light in it", ball, 768, (slice(2, 22), slice(2, 22))
+        "ball", "Ball of thin milk", "its own interface gathers light in it", ball, 768, (slice(6, 22), slice(2, 22))
     ),
 )
 

@@ -33,6 +33,7 @@ from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
+from translucent.planning.caustic_plan import darkened
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.paths import straight_scene
@@ -45,9 +46,6 @@ from translucent.scene.shadow_directions import shadow_directions
 
 #: Most shares of the directions of the environment where one sample of a pixel may have to do.
 _FEW_SHARES = 16
-
-#: Optical depth across a body whose light photons carry.
-_DENSE = 1e4
 
 #: Largest ratio of distances from a lamp that a projected depth buffer resolves: its step at the far end is
 #: 2^-24 far^2 / near, so at most 1e-6 of the distance.
@@ -167,7 +165,7 @@ class ShadowMapsPass:
         scene, atlas = job.scene, job.resources.shadows
         # Where all bodies are drawn as sheets, these throw the shadows, too.
         method = job.plan.method if job.plan.method.makes_sheets else None
-        dark = _darkened(scene, job.plan.opaque_to_shadows)
+        dark = darkened(scene, job.plan.opaque_to_shadows)
         opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
         everything = self._planned(dark, method, opaque)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
@@ -300,19 +298,6 @@ _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass 
     PassName.FRAGMENT_LISTS: FragmentListsPass,
     PassName.DEPTH_PEELING: DepthPeelingPass,
 }
-
-
-def _darkened(scene: Scene, opaque: frozenset[int]) -> Scene:
-    """The scene with these of its bodies so dense that no light passes; the scene itself if there are none."""
-    if not opaque:
-        return scene
-
-    def dense(body: Object) -> Object:
-        return replace(
-            body, medium=Medium(_DENSE / float(np.linalg.norm(body.bounds[1] - body.bounds[0]))), surface=None
-        )
-
-    return replace(scene, objects=[dense(body) if i in opaque else body for i, body in enumerate(scene.objects)])
 
 
 def _throwing(scene: Scene) -> Sequence[Object]:
