@@ -1,4 +1,4 @@
-"""Light of photons in media against random paths of light: fog, wax and milk below a ball of glass, and a ball of milk.
+"""Light of photons in media against random paths of light: fog, wax and milk below a ball of glass in a wide sun.
 
 The scenes and errors are those of the report (`translucent.bench.shadows.caustic_media`).
 

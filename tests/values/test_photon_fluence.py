@@ -81,32 +81,6 @@ def test_a_body_has_what_its_interface_lets_in() -> None:
     assert at_samples[~beside & (grid.points[:, 1] > -1.6)].min() > 2.0 * at_samples[beside].mean()
 
 
-def test_a_ball_that_scatters_has_the_light_that_its_own_interface_bends() -> None:
-    """Of parallel light, for all ways inside: mirrored or not, on the mean each ray goes one chord, 2 cos(t) R."""
-    ior = 1.5
-    milk = tl.Object(BALL, tl.Medium(scattering=1e-6, ior=ior))
-    grid = body_grid(milk, 0.1)
-    light = bent_light(scene(milk), tl.Caustics(1), {}, (), {0: FineCells.alike(grid)}).inside[0][..., 0]
-    chords = 4.0 / 3.0 * np.pi * ior**2 * (1.0 - (1.0 - ior**-2) ** 1.5)
-    assert light.sum() == pytest.approx(chords, rel=0.01)
-    half = grid.number.shape[1] // 2
-    assert light[:, :half].max() > 4.0 * light[:, half:].max(), "a bright spot opposite of the light"
-
-
-def test_light_that_a_body_bends_is_counted_once() -> None:
-    """Lamps light a body by its photons alone, where its cells are fine enough, and then as brightly on the whole."""
-    asked, fine = tl.Caustics(1), tl.Diffusion(12)
-    means = []
-    for scattering in (3.0, 300.0):
-        one = scene(tl.Object(BALL, tl.Medium(scattering=scattering, ior=1.5)))
-        marked, fields = shown(one, plan(one).given_back), cache.FieldCache()
-        found = [fields.of(marked, fine, photons).surfaces[0] for photons in (None, asked)]
-        means.append([field.fluence.mean() for field in found])
-        assert (found[1].entering.max() == 0.0) == (scattering == 3.0)
-    assert means[0][1] == pytest.approx(means[0][0], rel=0.1)
-    assert means[1][1] == means[1][0]
-
-
 def test_a_ball_gathers_light_at_its_focus() -> None:
     """n R / (2 (n - 1)) from its center, for rays near the axis: of a lamp far away, with a narrow cone."""
     cone = float(np.degrees(np.arctan2(0.1, 400.0)))

@@ -71,14 +71,6 @@ def test_photons_light_bodies_that_scatter_behind_interfaces() -> None:
     assert "caustics in media that scatter: 'box'" in str(alone)
 
 
-def test_a_body_of_fine_cells_lights_itself() -> None:
-    """Where a cell is one optical depth at most; denser ones take light at their surface."""
-    for scattering, lit in ((5.0, True), (50.0, False)):
-        alone = plan(scene(body(tl.Medium(scattering=scattering, ior=1.4)), body(None, 3.0)), caustics=FEW)
-        assert ("followed on the processor" in str(alone)) == lit
-        assert ("caustics in media that scatter: 'box'" in str(alone)) != lit
-
-
 def test_without_opengl_photons_land_where_opaque_objects_are_shaded() -> None:
     found = plan(scene(), capabilities=Capabilities(shader_storage=False, opengl=False), caustics=FEW)
     assert "photons from 1 light" in found.passes[-1].reason

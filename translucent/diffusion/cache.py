@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.diffusion.entering import opaque_surfaces
-from translucent.diffusion.field import BodyPhotons, DiffusingBody, DiffusionField, LitBody, lit_body
-from translucent.diffusion.photon_fluence import FineCells, bent_light
+from translucent.diffusion.field import DiffusingBody, DiffusionField, LitBody, lit_body
+from translucent.diffusion.photon_fluence import EnteringPhotons, FineCells, bent_light
 from translucent.diffusion.volume import DiffusingVolume, PhotonLight, VolumeField, VolumeGrid
 from translucent.geometry.embree import EmbreeMesh
 from translucent.media.given_back import DiffusedMedium, DiffusedVolume
 from translucent.media.medium import Medium
-from translucent.planning.caustic_plan import lights_itself, lit_by_photons, opaque_to_shadows
+from translucent.planning.caustic_plan import lit_by_photons, opaque_to_shadows
 from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.scene.scene import Object, Scene
@@ -77,12 +77,12 @@ class FieldCache:
             places = tuple(_place(item) for item in scene.opaque)
             opaque = _kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             surfaces, volumes = {}, {}
-            bent = self._bent(scene, diffusion, caustics, places, opaque)
+            bent = self._bent(scene, diffusion, caustics)
             for i, body in enumerate(scene.objects):
                 if isinstance(body.medium, DiffusedMedium):
                     medium = body.medium.original
                     own = self._body(body, medium, places, opaque, diffusion)
-                    surfaces[i] = own.field(scene, i, bent.surfaces.get(i))
+                    surfaces[i] = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
                 elif isinstance(body.medium, DiffusedVolume):
                     volumes[i] = self._volume(body, body.medium, diffusion).field(scene, bent.volumes.get(i))
             return Fields(surfaces, volumes)
@@ -124,51 +124,36 @@ class FieldCache:
         place = _density_place(body, diffusion)
         return _kept(self._grids, place, lambda: VolumeGrid(body, diffusion.cell_size(body)), KEPT_BODIES)
 
-    def _bent(
-        self,
-        scene: Scene,
-        diffusion: Diffusion,
-        caustics: Caustics | None,
-        places: Hashable,
-        opaque: EmbreeMesh | None,
-    ) -> _Bent:
+    def _bent(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None) -> _Bent:
         """Light that photons carry into bodies."""
-        if caustics is None or not (lit := _lit(scene, diffusion)):
-            return _Bent({}, {})
+        if caustics is None or not (lit := _lit(scene)):
+            return _Bent({}, {}, {})
         fogs = [i for i in lit if isinstance(scene.objects[i].medium, DiffusedVolume)]
         grids = {i: self._grid(scene.objects[i], diffusion).grid for i in fogs}
         cells = {i: FineCells.of(own.cells.low, own.cells.step, own.number.shape) for i, own in grids.items()}
-        themselves = {}
-        for i in lit:
-            body = scene.objects[i]
-            if isinstance(body.medium, DiffusedMedium) and lights_itself(body, diffusion):
-                grid = self._body(body, body.medium.original, places, opaque, diffusion).grid
-                themselves[i] = FineCells.alike(grid)
-        bodies = [i for i in lit if i not in fogs and i not in themselves]
-        found = bent_light(scene, caustics, cells, bodies, themselves)
+        found = bent_light(scene, caustics, cells, [i for i in lit if i not in fogs])
         bending = opaque_to_shadows(scene)
         stops = {i: opaque_surfaces([scene.objects[k] for k in sorted(bending - {i})]) for i in lit}
-        volumes = {i: PhotonLight(cells[i], found.fluence[i], stops[i]) for i in fogs}
-        surfaces = {i: BodyPhotons(found.entering.get(i), found.inside.get(i), stops[i]) for i in lit if i not in fogs}
-        return _Bent(volumes, surfaces)
+        return _Bent({i: PhotonLight(cells[i], found.fluence[i], stops[i]) for i in fogs}, found.entering, stops)
 
 
 @dataclass(frozen=True, eq=False)
 class _Bent:
-    """Light of photons in bodies without an interface, and in others."""
+    """Light of photons in bodies without an interface, in others, and what stops straight light to each."""
 
     volumes: dict[int, PhotonLight]
-    surfaces: dict[int, BodyPhotons]
+    entering: dict[int, EnteringPhotons]
+    stops: dict[int, EmbreeMesh | None]
 
 
-def _lit(scene: Scene, diffusion: Diffusion) -> tuple[int, ...]:
+def _lit(scene: Scene) -> tuple[int, ...]:
     """Numbers of the bodies into which photons carry light."""
-    return lit_by_photons(scene, sorted(_marked(scene)), diffusion)
+    return lit_by_photons(scene, sorted(_marked(scene)))
 
 
 def diffusion_key(scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> Hashable:
     """Everything that the diffused light of a scene depends on; the camera is no part of it."""
-    followed = caustics is not None and _lit(scene, diffusion)
+    followed = caustics is not None and _lit(scene)
     bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
     bodies = tuple(
         (

@@ -180,25 +180,6 @@ def lit_body(body: Object, opaque: EmbreeMesh | None, step: float) -> LitBody:
     return LitBody(grid, casters, sky_of(grid, casters))
 
 
-@dataclass(frozen=True, eq=False)
-class BodyPhotons:
-    """Light of lamps that photons carry into a body.
-
-    Attributes
-    ----------
-    entering : EnteringPhotons, optional
-        What other bodies bend to its interface; none of it goes straight through these.
-    inside : (x, y, z, 3) float64, optional
-        Power times length of all of it in the cells, in W m, in place of what goes straight.
-    stops : EmbreeMesh, optional
-        Surfaces of bodies that bend.
-    """
-
-    entering: EnteringPhotons | None
-    inside: Array | None
-    stops: EmbreeMesh | None
-
-
 class DiffusingBody:
     """A body with its medium, ready for any light.
 
@@ -218,44 +199,29 @@ class DiffusingBody:
         self._system = BodySystem(lit.grid, medium, roughness, lit.densities)
 
     @np.errstate(under="ignore")
-    def field(self, scene: Scene, body: int, photons: BodyPhotons | None = None) -> DiffusionField:
+    def field(
+        self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: EmbreeMesh | None = None
+    ) -> DiffusionField:
         """Light that the body gives back in a scene, of which it has this number, for its environment and lights.
 
-        `photons` carry what other bodies bend of the light of lamps, or all of it.
+        `photons` carry what other bodies, whose surfaces are `stops`, bend of the light of lamps; none of it goes
+        straight through these.
         """
         dimming = dimming_bodies(scene, body)
         grid = self._lit.grid
         entering = self._entrance.seen @ environment_parts(scene.environment, self._lit.sky.directions)
         inside = np.zeros((grid.count, 3))
-        stops = None if photons is None else photons.stops
-        if photons is not None and photons.inside is not None:
-            inside += self._scattered_first(photons.inside)
-        for light in scene.lights if photons is None or photons.inside is None else ():
+        for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, np.asarray(light.position))) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
                 entering = entering + from_light(
                     grid, self._lit.casters, light, self._medium.ior, self._interface, dimming, stops
                 )
-        if photons is not None and photons.entering is not None:
-            entering = entering + flux_of(photons.entering, grid)
+        if photons is not None:
+            entering = entering + flux_of(photons, grid)
         found = self._system.solved(entering, self._entrance.itself, inside)
         return _field(self._lit, self._medium, self._roughness, found)
-
-    @property
-    def grid(self) -> BodyGrid:
-        """Cells of the body."""
-        return self._lit.grid
-
-    def _scattered_first(self, light: Array) -> Array:
-        """(cells, 3): power in W that light loses in each cell, for its power times length in those of the grid."""
-        medium, number = self._medium, self._lit.grid.number
-        reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
-        kept = (light * reduced)[number >= 0]
-        found = np.zeros((self._lit.grid.count, 3))
-        found[number[number >= 0]] = kept
-        # Slivers at the surface are no cells.
-        return np.asarray(found * ((light * reduced).sum(axis=(0, 1, 2)) / np.maximum(kept.sum(axis=0), 1e-300)))
 
 
 def _cell_at(grid: BodyGrid, point: Array) -> int:

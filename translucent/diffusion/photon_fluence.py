@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.photon_flights import Flights, photon_flights
 from translucent.formulas import optics
 from translucent.planning.caustics import Caustics
@@ -59,12 +58,6 @@ class FineCells:
         finer = int(min(max(room, 1.0), FINER))
         return cls(low, step / finer, (shape[0] * finer, shape[1] * finer, shape[2] * finer), finer)
 
-    @classmethod
-    def alike(cls, grid: BodyGrid) -> FineCells:
-        """The cells of a grid."""
-        x, y, z = grid.number.shape
-        return cls(grid.cells.low, grid.cells.step, (x, y, z), 1)
-
     def coarse(self, values: Array) -> Array:
         """Means (x, y, z, 3) of values (x, y, z, 3) over the cells of the coarse grid."""
         k = self.finer
@@ -99,40 +92,25 @@ class BentLight:
         `translucent.diffusion.volume` has it; what it scatters else is not in it.
     entering : dict of int to EnteringPhotons
         Of other objects in which light diffuses, what had been turned before it came there.
-    inside : dict of int to (x, y, z, 3) float64
-        Power times length in the cells of objects that light themselves, in W m: all light of lamps that is in them.
     """
 
     fluence: dict[int, Array]
     entering: dict[int, EnteringPhotons]
-    inside: dict[int, Array]
 
 
-def bent_light(
-    scene: Scene,
-    caustics: Caustics,
-    grids: Mapping[int, FineCells],
-    bodies: Sequence[int],
-    themselves: Mapping[int, FineCells] | None = None,
-) -> BentLight:
-    """Light that interfaces of a scene turn into these cells of objects, through the interfaces of bodies, and into the
-    cells of bodies that light themselves.
-    """
-    own = themselves or {}
-    sums = {body: np.zeros((int(np.prod(cells.shape)), 3)) for body, cells in (*grids.items(), *own.items())}
+def bent_light(scene: Scene, caustics: Caustics, grids: Mapping[int, FineCells], bodies: Sequence[int]) -> BentLight:
+    """Light that interfaces of a scene turn into these cells of objects, and through the interfaces of bodies."""
+    sums = {body: np.zeros((int(np.prod(cells.shape)), 3)) for body, cells in grids.items()}
     parts: dict[int, list[Flights]] = {body: [] for body in bodies}
     rng = np.random.default_rng((caustics.seed, len(grids)))
     for flights in photon_flights(scene, caustics.in_media, caustics.seed):
         turned = flights.where(flights.bent)
         for body, cells in grids.items():
-            _add(sums[body], turned.where(turned.filling[:, body] > 0.0), body, cells, rng, BEYOND)
-        for body, cells in own.items():
-            _add(sums[body], flights.where(flights.filling[:, body] > 0.0), body, cells, rng, 0.0)
+            _add(sums[body], turned.where(turned.filling[:, body] > 0.0), body, cells, rng)
         for body, found in parts.items():
             found.append(turned.where((turned.entered == body) & turned.bent_before))
     fluence = {body: sums[body].reshape(*cells.shape, 3) / cells.step**3 for body, cells in grids.items()}
-    entering = {body: _entering(found) for body, found in parts.items()}
-    return BentLight(fluence, entering, {body: sums[body].reshape(*cells.shape, 3) for body, cells in own.items()})
+    return BentLight(fluence, {body: _entering(found) for body, found in parts.items()})
 
 
 def _entering(parts: list[Flights]) -> EnteringPhotons:
@@ -143,10 +121,10 @@ def _entering(parts: list[Flights]) -> EnteringPhotons:
     )
 
 
-def _add(sums: Array, flights: Flights, body: int, cells: FineCells, rng: np.random.Generator, beyond: float) -> None:
-    """Add power times length of flights in a body, and so many cells beyond it, to its cells (n, 3)."""
-    first = np.where(flights.before[:, body] == 0.0, beyond * cells.step, 0.0)
-    last = flights.length + np.where(flights.after[:, body] == 0.0, beyond * cells.step, 0.0)
+def _add(sums: Array, flights: Flights, body: int, cells: FineCells, rng: np.random.Generator) -> None:
+    """Add power times length of flights in a body to its cells (n, 3)."""
+    first = np.where(flights.before[:, body] == 0.0, BEYOND * cells.step, 0.0)
+    last = flights.length + np.where(flights.after[:, body] == 0.0, BEYOND * cells.step, 0.0)
     length = first + last
     parts = np.ceil(length / (PART * cells.step)).astype(np.int64)
     ends = np.cumsum(parts)

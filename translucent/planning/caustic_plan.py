@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from translucent.errors import InputError
-from translucent.media.given_back import DiffusedMedium
 from translucent.media.medium import Medium
 from translucent.planning.bodies import count_of, indices
 from translucent.planning.caustics import Caustics
@@ -16,7 +15,6 @@ from translucent.planning.methods import Method
 from translucent.planning.notes import Note, NoteKind
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.render_plan import Capabilities, RenderPlan
-from translucent.planning.scattering.diffusion import Diffusion
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Time of a photon in media for each object of the scene, which are searched one after the other, in seconds of a
@@ -25,9 +23,6 @@ SECONDS_OF_A_PHOTON = 2.5e-5
 
 #: Optical depth across a body whose light photons carry.
 DENSE = 1e4
-
-#: Largest optical depth of a cell, by what is scattered aside and absorbed, in which it matters where in it light is.
-DEEPEST_CELL = 1.0
 
 #: Passes that show light of media, of which the first that a plan has tells of photons in them.
 _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
@@ -51,19 +46,10 @@ def darkened(scene: Scene, bodies: frozenset[int]) -> Scene:
     return replace(scene, objects=[dense(body) if i in bodies else body for i, body in enumerate(scene.objects)])
 
 
-def lit_by_photons(scene: Scene, solved: Iterable[int], diffusion: Diffusion) -> tuple[int, ...]:
-    """Numbers of those bodies in which light diffuses, into which others or their own interface bend some."""
+def lit_by_photons(scene: Scene, solved: Iterable[int]) -> tuple[int, ...]:
+    """Those of bodies in which light diffuses, by their numbers, into which others bend some."""
     bending = opaque_to_shadows(scene)
-    return tuple(i for i in solved if bending - {i} or lights_itself(scene.objects[i], diffusion))
-
-
-def lights_itself(body: Object, diffusion: Diffusion) -> bool:
-    """Tell whether photons are followed inside a body in which light diffuses, as its cells tell how deep they come."""
-    medium = body.medium.original if isinstance(body.medium, DiffusedMedium) else body.medium
-    if medium is None or not _turns_light(body) or body.density is not None:
-        return False
-    reduced = np.asarray(medium.absorption) + np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
-    return bool(reduced.max() * diffusion.cell_size(body) <= DEEPEST_CELL)
+    return tuple(i for i in solved if bending - {i})
 
 
 def with_caustics(
@@ -78,7 +64,7 @@ def with_caustics(
     """
     _check(method)
     back = found.given_back
-    lit = lit_by_photons(scene, sorted((*back.volumes, *back.diffused)), back.diffusion)
+    lit = lit_by_photons(scene, sorted((*back.volumes, *back.diffused)))
     _check_ways(scene, lit)
     carries = next((one for one in _CARRYING if found.has(one)), None)
     steps: list[PassSpec] = []

@@ -113,7 +113,7 @@ class Photons:
         """Whether the light of photons in media is known, if there is any; else it is searched for."""
         assert self.plan is not None
         back, caustics, cache = self.plan.given_back, self.plan.caustics, renderer.gpu.diffusion
-        if not lit_by_photons(scene, (*back.volumes, *back.diffused), back.diffusion):
+        if not lit_by_photons(scene, (*back.volumes, *back.diffused)):
             return True
         assert caustics is not None
         marked = shown(scene, back).with_ambient_emitted

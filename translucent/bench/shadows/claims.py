@@ -110,7 +110,7 @@ def shadow_claims(shadows: Shadows) -> tuple[Claim, ...]:
             map(_sharp, caustics),
         ),
         _over(
-            f"In fog, wax and milk, light that interfaces bend is within {CAUSTIC_ERROR:g} of the mean, with photons",
+            f"In fog, wax and milk, light behind glass is within {CAUSTIC_ERROR:g} of the mean, with photons",
             (_near_in_medium(case) for case in shadows.media if not case.failure),
         ),
     )
