@@ -80,7 +80,7 @@ def wax() -> Scene:
 
 def milk() -> Scene:
     """A ball above milk, which scatters ahead."""
-    return _above(Medium(absorption=(0.02, 0.05, 0.2), scattering=40.0, anisotropy=0.8, ior=1.34))
+    return _above(Medium(absorption=(0.02, 0.05, 0.2), scattering=20.0, anisotropy=0.6, ior=1.34))
 
 
 def _above(medium: Medium) -> Scene:
@@ -94,7 +94,7 @@ SCENES = (
         "fog", "Thin fog", "a bright cone behind the ball, and its shadow", fog, 3072, (slice(14, 23), slice(5, 19))
     ),
     MediumScene("wax", "Block of wax", "what falls on it spreads inside", wax, 192, _BELOW),
-    MediumScene("milk", "Milk", "the same, in a medium that scatters ahead and absorbs blue", milk, 128, _BELOW),
+    MediumScene("milk", "Milk", "the same, in a medium that scatters ahead and absorbs blue", milk, 64, _BELOW),
 )
 
 
