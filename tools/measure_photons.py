@@ -1,80 +1,22 @@
-"""Light of photons in media against random paths of light: fog and a block of wax below a ball of glass in a wide sun.
+"""Light of photons in media against random paths of light: fog, wax and milk below a ball of glass in a wide sun.
 
-No path finds a lamp behind glass: the truth has a disc of the environment 24 degrees wide, and the picture under
-test lamps spread over it. Errors are root mean squares over the mean, freed of the noise of the truth, below the ball.
+The scenes and errors are those of the report (`translucent.bench.shadows.caustic_media`).
 
-    python tools/measure_photons.py [--share 0.1]
+    python tools/measure_photons.py [--share 0.1] [--only wax]
     python tools/measure_photons.py --picture docs/caustics-in-media.png
 """
 
 from __future__ import annotations
 
 import argparse
-import time
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 import translucent as tl
-from translucent.arrays import Array
-from translucent.geometry.solids import Box, Sphere
-from translucent.scene.environment_map import row_solid_angles, texel_directions
-
-SIZE, MAP_HEIGHT, RADIUS, LAMPS, AT_ONCE = (24, 24), 128, np.radians(12.0), 32, 8
-GLASS = tl.Object(Sphere().tessellate(48), tl.Medium(ior=1.5), priority=1)
-NIGHT = tl.Environment.constant((0.0, 0.0, 0.0))
-
-
-@dataclass(frozen=True)
-class Case:
-    """Scene without lights, paths of each pixel, and the rows and columns that count."""
-
-    scene: tl.Scene
-    paths: int
-    counted: tuple[slice, slice]
-
-
-def fog() -> Case:
-    """A ball in thin fog."""
-    medium = tl.Medium(absorption=0.02, scattering=0.2)
-    box = tl.Object(Box((-2.0, -3.5, -1.5), (2.0, 1.5, 1.5)).tessellate(), medium)
-    camera = tl.Camera.look_at((0, -1, 12), (0, -1, 0), fov_y=24.0)
-    return Case(tl.Scene([box, GLASS], camera, [], NIGHT, "priority"), 3072, (slice(14, 23), slice(5, 19)))
-
-
-def wax() -> Case:
-    """A ball above a block."""
-    medium = tl.Medium(absorption=0.1, scattering=8.0, ior=1.4)
-    block = tl.Object(Box((-2.2, -2.5, -2.2), (2.2, -1.3, 2.2)).tessellate(), medium)
-    camera = tl.Camera.look_at((0, 6, 5), (0, -1.3, 0), fov_y=38.0)
-    return Case(tl.Scene([block, GLASS], camera, [], NIGHT, "priority"), 192, (slice(9, 20), slice(4, 20)))
-
-
-def truth(case: Case, share: float, seed: int) -> Array:
-    """Radiance (h, w) by random paths."""
-    up = texel_directions(MAP_HEIGHT, 2 * MAP_HEIGHT)[..., 1] > np.cos(RADIUS)
-    angles = np.broadcast_to(row_solid_angles(MAP_HEIGHT, 2 * MAP_HEIGHT)[:, None], up.shape)
-    sun = np.where(up, 3.0 / angles[up].sum(), 0.0)[..., None] * np.ones(3, np.float32)
-    scene = replace(case.scene, environment=tl.Environment.image(sun.astype(np.float32)))
-    paths = max(int(share * case.paths), 2)
-    return np.asarray(tl.reference.path_trace(scene, SIZE, paths=paths, seed=seed)[0].radiance[..., 0])
-
-
-def shown(case: Case, renderer: tl.Renderer, caustics: tl.Caustics | None) -> Array:
-    """Radiance (h, w) with lamps, some at a time."""
-    number = np.arange(LAMPS)
-    fall = (number + 0.5) / LAMPS * (1.0 - np.cos(RADIUS))
-    turn, across = np.pi * (1.0 + np.sqrt(5.0)) * number, np.sqrt(fall * (2.0 - fall))
-    ways = -np.stack([across * np.cos(turn), 1.0 - fall, across * np.sin(turn)], axis=1)
-    total = np.zeros(SIZE[::-1])
-    for first in range(0, LAMPS, AT_ONCE):
-        lights = [tl.DirectionalLight(way, 3.0 / LAMPS) for way in ways[first : first + AT_ONCE]]
-        total += renderer.render(replace(case.scene, lights=lights), SIZE, samples=4, caustics=caustics).radiance[
-            ..., 0
-        ]
-    return total
+from translucent.bench.shadows.caustic_media import FULL, GLASS, SCENES, MediumEffort, MediumScene, measure_medium
+from translucent.geometry.solids import Box
 
 
 def picture(path: Path) -> None:
@@ -107,35 +49,32 @@ def picture(path: Path) -> None:
 
 
 def main() -> None:
-    """Compare both scenes, with photons and without."""
+    """Compare the scenes, with photons and without."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--share", type=float, default=1.0, help="of the paths, which take some minutes")
-    parser.add_argument("--picture", type=Path, help="of both, and nothing else")
+    parser.add_argument("--only", choices=[told.name for told in SCENES], help="one of the scenes")
+    parser.add_argument("--picture", type=Path, help="of fog and wax, and nothing else")
     asked = parser.parse_args()
     if asked.picture is not None:
         return picture(asked.picture)
-    compare(asked.share)
+    with tl.Renderer() as renderer:
+        for told in SCENES:
+            if asked.only in (None, told.name):
+                compare(renderer, told, asked.share)
     return None
 
 
-def compare(share: float) -> None:
-    """Print how far both scenes are from their truths."""
-    with tl.Renderer() as renderer:
-        for name, case in (("fog", fog()), ("wax", wax())):
-            began = time.perf_counter()
-            one, other = (truth(case, share, seed)[case.counted] for seed in (1, 2))
-            mean = 0.5 * float((one + other).mean())
-            noise = float((one - other).std()) / 2.0 / np.sqrt(one.size) / mean
-            print(f"{name}: the mean of the truth is uncertain by {noise:.1%}, {time.perf_counter() - began:.0f} s")
-            for told, caustics in (("with photons", tl.Caustics(400_000)), ("without", None)):
-                began = time.perf_counter()
-                found = shown(case, renderer, caustics)[case.counted]
-                squares = (found - one) * (found - other)
-                spread = 2.0 * float(squares.std()) / np.sqrt(squares.size)
-                error, most = (np.sqrt(max(float(squares.mean()) + more, 0.0)) / mean for more in (0.0, spread))
-                off = float(found.mean()) / mean - 1.0
-                seconds = time.perf_counter() - began
-                print(f"  {told}: nRMSE {error:.3f}, at most {most:.3f}, mean {off:+.1%}, {seconds:.0f} s")
+def compare(renderer: tl.Renderer, told: MediumScene, share: float) -> None:
+    """Print how far a scene is from its truth."""
+    case = measure_medium(renderer, told, MediumEffort(share, FULL.photons))
+    if case.failure:
+        print(f"{told.name}: {case.failure}")
+        return
+    print(f"{told.name}: the mean of the truth is uncertain by {case.noise:.1%}, {case.reference_seconds:.0f} s")
+    for row in case.rows:
+        name = f"{row.photons:,} photons" if row.photons else "without photons"
+        error = f"nRMSE {row.nrmse:.3f}, at most {row.most:.3f}, mean {row.power:+.1%}"
+        print(f"  {name}: {error}, {row.seconds:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

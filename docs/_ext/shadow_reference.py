@@ -75,6 +75,17 @@ def caustics(cases: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def media(cases: list[dict[str, Any]]) -> list[str]:
+    """Errors in media with photons and without, a row for each scene."""
+    lines = ["| | mean, of a truth uncertain by | nRMSE (at most) | without photons |", "|---|---|---|---|"]
+    for case in cases:
+        rows = {bool(row["photons"]): row for row in case["rows"]}
+        of = {there: f"{row['nrmse']:.2f} ({row['most']:.2f})" for there, row in rows.items()}
+        mean = f"{rows[True]['power']:+.1%}, {case['noise']:.1%}"
+        lines.append(f"| {case['title']} | {mean} | {of[True]} | {rows[False]['power']:+.1%}, {of[False]} |")
+    return lines
+
+
 def write_tables(app: Sphinx) -> None:
     """Write the files that ``methods.md`` includes."""
     source = Path(app.srcdir)
@@ -86,6 +97,7 @@ def write_tables(app: Sphinx) -> None:
         "shadows": [*errors(cases), "", *shortcuts(cases)],
         "shadow_directions": directions(found["sky"]),
         "caustics": caustics([case for case in found["caustics"] if case["rows"]]),
+        "caustics_in_media": media([case for case in found.get("media", ()) if case["rows"]]),
     }.items():
         (folder / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -7,7 +7,7 @@
 #include <Shadows>
 #include <SkyShadows>
 
-uniform sampler2D shadow_sums;  // path, with exits less entries before the end; or of several media optical depths; for each metre ahead
+uniform sampler2D shadow_sums;  // path, with exits less entries before the end; paths in two media; or of more optical depths; for each metre ahead
 uniform sampler2D shadow_ends;  // metres ahead of the center where an opaque surface ends the ray
 
 // A map, and how a point projects into it: from -1 to 1, and metres ahead of the light.
@@ -47,8 +47,10 @@ vec3 texel_transmittance(ivec2 at, float end, float advance) {
 #if SHADOW_SPECTRAL
     vec3 optical_depth = texelFetch(shadow_sums, at, 0).rgb;
 #else
-    vec2 path_and_count = texelFetch(shadow_sums, at, 0).rg;
-    vec3 optical_depth = (path_and_count.r - path_and_count.g * end) * shadow_extinction.rgb;
+    vec2 found = texelFetch(shadow_sums, at, 0).rg;
+    vec3 optical_depth = shadow_second.w > 0.0
+        ? found.r * shadow_extinction.rgb + found.g * shadow_second.rgb
+        : (found.r - found.g * end) * shadow_extinction.rgb;
 #endif
     return exp(-clamp(optical_depth * advance, 0.0, MAX_OPTICAL_DEPTH));
 }

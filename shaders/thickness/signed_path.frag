@@ -1,4 +1,5 @@
-// Signed depth of bodies without holes that share one medium, for maps of shadows. See signed_depth.frag.
+// Signed depth of bodies without holes that share one medium, or with TWO_MEDIA one of two, for maps of shadows. See
+// signed_depth.frag.
 // PROJECTED_DEPTH: what is behind an opaque surface fails the depth test. What was counted then does not balance, and the
 // lookup ends it at the surface: the sum of min(reached, end) is the sum of reached where that is less, less the end for
 // each entry that is counted and no exit. So counted lengths are from the center, and not from each body's anchor.
@@ -10,7 +11,7 @@
 
 in float axial;
 
-layout(location = 0) out vec2 path_and_count;
+layout(location = 0) out vec2 path_and_count;  // or the paths in two media: of other slots it has none
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
@@ -21,6 +22,10 @@ void main() {
 #if OPAQUE
     reached = min(reached, last_axial());
 #endif
+#if TWO_MEDIA
+    path_and_count = side * reached * vec2(equal(ivec2(slot), ivec2(0, 1)));
+#else
     path_and_count = vec2(side * reached, 0.0);
+#endif
 #endif
 }

@@ -67,5 +67,3 @@ def test_what_makes_no_caustics_is_told(run: Run, tmp_path: Path, options: tuple
 def test_another_renderer_shows_none(run: Run, model: Path, tmp_path: Path) -> None:
     found = run("render", model, "-o", tmp_path / "out.png", "--caustics", 10, "--opaque-with", "pyrender")
     assert found.err.startswith("error: --caustics; --opaque-with, which draws what light lands on; leave out one")
-    found = run("render", model, "-o", tmp_path / "out.png", "--caustics", 10, "--backend", "cpu")
-    assert found.err.startswith("error: caustics; photons are followed by OpenGL, and this renderer works on the CPU")

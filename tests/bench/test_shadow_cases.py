@@ -15,7 +15,7 @@ from translucent.bench.drawing import Studio
 from translucent.bench.page.build import build_page
 from translucent.bench.record import Report
 from translucent.bench.row import Errors, Ratio, Timing
-from translucent.bench.shadows import caustics, sky
+from translucent.bench.shadows import caustic_media, caustics, sky
 from translucent.bench.shadows import measure as measuring
 from translucent.bench.shadows.claims import shadow_claims
 from translucent.bench.shadows.maps import map_camera
@@ -26,6 +26,7 @@ from translucent.bench.shadows.record import (
     HALF,
     OPAQUE,
     CausticCase,
+    CausticMediumCase,
     CausticRow,
     ShadowCase,
     ShadowRow,
@@ -143,7 +144,7 @@ def test_a_caustic_has_the_power_of_the_truth(renderer: tl.Renderer) -> None:
 def test_steps_of_a_quick_run_are_few(studio: Studio) -> None:
     quick, full = (list(ShadowsRun(studio, quick).steps()) for quick in (True, False))
     assert quick == ["shadow, bear, sun", "shadow, two media", "shadows of environments", "caustic, glass ball"]
-    assert len(full) == len(SCENES) + 1 + len(caustics.SCENES)
+    assert len(full) == len(SCENES) + 1 + len(caustics.SCENES) + len(caustic_media.SCENES)
     assert set(quick) < set(full)
 
 
@@ -166,6 +167,12 @@ GOOD = Shadows(
     (SkyRow("sky", 8, 0.1, 0.1), SkyRow("sky", 32, 0.04, 0.2)),
     None,
     (CausticCase("ball", "Ball", "", 1000, 1.0, 1e-3, (CausticRow(250_000, 0.002, 0.1, 0.12, 1.0),)),),
+    (
+        CausticMediumCase(
+            *("wax", "Wax", "", 192, 1.0, 0.02),
+            (CausticRow(0, 0.08, 0.22, 0.29, 1.0), CausticRow(400_000, -0.015, 0.08, 0.19, 1.0)),
+        ),
+    ),
 )
 
 
@@ -174,7 +181,7 @@ def held(**changes: Any) -> list[bool | None]:
 
 
 def test_claims_fall_where_a_number_does() -> None:
-    assert held() == [True, True, True, None, True, True, True, True, True]
+    assert held() == [True, True, True, None, True, True, True, True, True, True]
     assert held(cases=(case(texels=2e-5),))[0] is False
     assert held(cases=(case(order=0.8),))[1] is False
     assert held(cases=(case(), case(cost=1.5)))[2] is False
@@ -191,7 +198,10 @@ def test_claims_fall_where_a_number_does() -> None:
         (CausticRow(62_500, 0.5, 0.3, 0.4, 1.0), [None, None]),
     ):
         caustic = dataclasses.replace(GOOD.caustics[0], rows=(row,))
-        assert held(caustics=(caustic,))[7:] == expected
+        assert held(caustics=(caustic,))[7:9] == expected
+    for error, most, found in ((0.25, 0.3, False), (0.1, 0.3, None)):
+        row = CausticRow(400_000, 0.0, error, most, 1.0)
+        assert held(media=(dataclasses.replace(GOOD.media[0], rows=(row,)),))[-1] is found
     assert {claim.held for claim in shadow_claims(Shadows())} == {None}
 
 
@@ -200,12 +210,13 @@ def test_the_page_the_table_and_the_record_have_them() -> None:
     assert Report.from_json(made.to_json()) == made
     page = build_page(made)
     assert page.count("<svg") >= 4
-    for text in ("Shadows and caustics", "in rays of texels, p99.9", "1.20", "4.00 %", "+0.20 %", OPAQUE):
+    for text in ("Shadows and caustics", "in rays of texels, p99.9", "1.20", "4.00 %", "+0.20 %", "-1.5 %", OPAQUE):
         assert text in page, text
     assert "Shadows and caustics" not in build_page(Report(PROVENANCE, complete=True))
     text = table(made)
     assert "sky, 32 directions: error 4.0% of the mean" in text
     assert "250,000 photons: power +0.20%, nRMSE 0.100, at most 0.120" in text
+    assert "caustic in wax, 0 photons: mean +8.0%, nRMSE 0.220, at most 0.290" in text
 
 
 def test_reports_are_compared_by_shadows_too() -> None:

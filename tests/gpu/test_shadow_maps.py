@@ -286,6 +286,24 @@ def test_maps_are_rendered_when_something_changes(renderer: tl.Renderer, monkeyp
         assert len(rendered) == count
 
 
+def test_maps_of_two_media_are_paths_and_stay_when_these_change(renderer: tl.Renderer) -> None:
+    """Of a third one they are optical depths; clear bodies are none."""
+    clear = moved(CUBE, (-1.5, 0.0, 0.0), tl.Medium())
+    objects = [tl.Object(BALL, LEAF), clear, moved(CUBE, (0, 0.9, 0), WINE), ground()]
+    shown, atlas = replace(scene("ball", "sun"), objects=objects), renderer.gpu._resources.shadows
+    renderer.render(shown, SIZE)
+    held = atlas.held
+    assert (atlas.two_media, atlas.spectral) == (True, False)
+    jade = tl.Medium(absorption=(3, 0.1, 2))
+    changed = replace(shown, objects=[replace(objects[0], medium=jade), *objects[1:]])
+    error = relative(renderer.render(changed, SIZE), tl.reference.render(changed, SIZE))
+    assert atlas.held is held
+    assert np.median(error) < 2e-6
+    assert np.quantile(error, 0.95) < 1e-4
+    renderer.render(replace(changed, objects=[changed.objects[0], replace(clear, medium=LEAF), *objects[2:]]), (8, 8))
+    assert (atlas.two_media, atlas.spectral) == (False, True)
+
+
 def test_a_layer_that_becomes_a_sheet_throws_its_shadow(renderer: tl.Renderer) -> None:
     """Nothing but the surface tells one from the other."""
     _, floor = SCENES["ball"]["objects"]

@@ -71,6 +71,13 @@ def test_photons_light_bodies_that_scatter_behind_interfaces() -> None:
     assert "caustics in media that scatter: 'box'" in str(alone)
 
 
+def test_without_opengl_photons_land_where_opaque_objects_are_shaded() -> None:
+    found = plan(scene(), capabilities=Capabilities(shader_storage=False, opengl=False), caustics=FEW)
+    assert "photons from 1 light" in found.passes[-1].reason
+    assert "followed on the processor" in found.passes[-1].reason
+    assert not [note for note in found.unmodelled if "receivers that interfaces alone show" in note]
+
+
 def test_fog_that_photons_do_not_light_is_told() -> None:
     fog, ground = body(tl.Medium(scattering=2.0), 1.0), body(None, 3.0)
     once = plan(scene(body(), fog, ground), scattering=tl.SingleScattering(), caustics=FEW)
@@ -108,7 +115,6 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
         (scene(body()), {}, "caustics; no opaque object that light could land on, and no other body in which"),
         (scene(), {"method": tl.PathTraced()}, "leave out one of the two"),
         (scene(), {"method": tl.ThinLayer()}, "it takes every face for a sheet, which bends nothing"),
-        (scene(), {"capabilities": Capabilities(opengl=False)}, "this renderer works on the CPU; use tl.reference"),
         (
             scene(body(density=tl.LinearDensity(1, 0.0, 1.0)), body(None, 3.0)),
             {},

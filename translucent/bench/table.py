@@ -66,6 +66,10 @@ def _shadows(shadows: Shadows) -> Iterator[str]:
         for row in caustic.rows:
             found = f"power {row.power:+.2%}, nRMSE {row.nrmse:.3f}, at most {row.most:.3f}, {row.seconds:.1f} s"
             yield f"caustic, {caustic.title}, {row.photons:,} photons: {found}"
+    for medium in shadows.media:
+        for row in medium.rows:
+            found = f"mean {row.power:+.1%}, nRMSE {row.nrmse:.3f}, at most {row.most:.3f}, {row.seconds:.1f} s"
+            yield f"caustic in {medium.title.lower()}, {row.photons:,} photons: {found}"
 
 
 def _shadow_row(row: ShadowRow) -> str:

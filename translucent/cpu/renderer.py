@@ -152,7 +152,7 @@ class CpuRenderer:
         shapes = tuple((body.mesh, body.matrix.tobytes()) for body in scene.objects)
         if self._caster is None or self._caster[0] != shapes:
             self._caster = shapes, Caster(scene.objects, scene.bounds)
-        diffused = DiffusedLight(self._fields.of(scene, plan.given_back.diffusion).surfaces)
+        diffused = DiffusedLight(self._fields.of(scene, plan.given_back.diffusion, plan.caustics).surfaces)
         return BentLight.of(shader, self._caster[1], picture.size, plan.interfaces.tree, diffused)
 
     def _draw(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Integers
+from translucent.cpu.caustics import CausticLight
 from translucent.cpu.light_paths import EmbreeLightPaths
 from translucent.cpu.projection import slices
 from translucent.geometry.embree import EmbreeMesh
@@ -61,7 +62,11 @@ class Shader:
             FALLBACK_SHEET * diagonals[i] if i in drawn and metres is None else metres
             for i, metres in enumerate(sheets)
         )
-        return cls(scene, sheets, fallback if drawn else None, SurfaceLight(EmbreeLightPaths(scene, sheets, meshes)))
+        if plan.caustics is None:
+            light = SurfaceLight(EmbreeLightPaths(scene, sheets, meshes))
+        else:
+            light = CausticLight(scene, sheets, meshes, plan.caustics, plan.opaque_to_shadows)
+        return cls(scene, sheets, fallback if drawn else None, light)
 
     def shade(self, rays: Rays, hits: Sequence[Hits]) -> Arrays:
         """Shade some rays into the arrays of a frame, (n,) or (n, 3), float64 and bool.

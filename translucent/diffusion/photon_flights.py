@@ -54,6 +54,8 @@ class Flights:
         Object that decides the index of refraction here and not before, -1 for none.
     bent_before : (n,) bool
         An interface has bent or mirrored them before they have come in.
+    lands : (n,) bool
+        Something opaque is where they end.
     """
 
     origins: Array
@@ -67,6 +69,7 @@ class Flights:
     bent: Mask
     entered: Integers
     bent_before: Mask
+    lands: Mask
 
     def where(self, chosen: Mask | Integers) -> Flights:
         """Selection of flights."""
@@ -181,6 +184,7 @@ def _step(surfaces: PhotonSurfaces, going: _Photons, rng: np.random.Generator) -
         going.bent,
         going.entered,
         going.bent_before,
+        beyond.lands,
     )
     # On from a surface that bends or mirrors, the other side is none that light comes straight from.
     after = surfaces.filling(beyond.photons.windings, beyond.photons.since)
@@ -190,11 +194,12 @@ def _step(surfaces: PhotonSurfaces, going: _Photons, rng: np.random.Generator) -
 
 @dataclass(eq=False)
 class _Beyond:
-    """Photons beyond a surface, whether they go straight on or end there, and what fills the other side."""
+    """Photons beyond a surface, whether they go straight on, end or land there, and what fills the other side."""
 
     photons: _Photons
     straight: Mask
     ended: Mask
+    lands: Mask
     filling: Array
 
 
@@ -220,7 +225,7 @@ def _beyond(
         going.channel,
     )
     ended = np.asarray(turn.ended | ~turn.power.any(axis=1))
-    return _Beyond(photons, turn.straight, ended, surfaces.filling(windings, since))
+    return _Beyond(photons, turn.straight, ended, turn.ended, surfaces.filling(windings, since))
 
 
 def _surviving(photons: _Photons, rng: np.random.Generator) -> _Photons:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.gpu.backdrop import TextureBackdrop
-from translucent.gpu.balance import Balance, face_counts
+from translucent.gpu.balance import Balance, FaceCounts, face_counts
 from translucent.gpu.body_uniforms import BodyRoles
 from translucent.gpu.coverage import extents, part_of
 from translucent.gpu.densities import density_uniforms, scene_grids
@@ -75,6 +75,8 @@ class FrameJob(SceneView):
         The frame is a map of shadows.
     path_only : bool
         The accumulator has paths of one medium alone, and counts of those that an opaque surface ends at most.
+    two_media : bool
+        It has the paths in two media instead, which are the slots 0 and 1 of bodies.
     bent_apart : bool
         Rays are traced from interfaces apart from what else a sample shows.
     bending : bool
@@ -87,7 +89,7 @@ class FrameJob(SceneView):
     """
 
     corner: tuple[int, int] = (0, 0)
-    for_map = path_only = projected_depth = bent_apart = bending = False
+    for_map = path_only = two_media = projected_depth = bent_apart = bending = False
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(
@@ -117,7 +119,7 @@ class FrameJob(SceneView):
         if self.features.varies:
             light = resources.diffusion.of(scene, plan.given_back.diffusion, plan.caustics)
             contents[DENSITY] = density_uniforms(scene, self.features.slots, media_sphere(scene)[0], light)
-        super().__init__(gl, placed, BodyRoles.of(self.features, counts), contents, targets, resources)
+        super().__init__(gl, placed, self.roles_of(counts), contents, targets, resources)
         self._cleared: set[str] = set()
         self._lit = False
         self._extents = extents(scene.boxes, scene.camera, targets.size)
@@ -125,6 +127,10 @@ class FrameJob(SceneView):
         if self.features.marches and not self.features.scatters:
             self.light(LightLookup(media_sphere(scene)[0], (), np.zeros((0, 4)), np.zeros((0, 4))))
         self.place((0.0, 0.0), with_depth=with_depth)
+
+    def roles_of(self, counts: FaceCounts) -> BodyRoles:
+        """Roles of the objects."""
+        return BodyRoles.of(self.features, counts)
 
     @cached_property
     def diffused_light(self) -> DiffusedLight | None:

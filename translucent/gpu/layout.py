@@ -148,6 +148,7 @@ SHADOWS = UniformBlock(
         ("shadow_lights", "f4", (MAX_LIGHTS, 4)),  # of each light: number of its first view, and how many it has
         ("shadow_views", "f4", (4 * MAX_SHADOW_VIEWS, 4)),  # rows of right, up and ahead; corner, size, perspective
         ("shadow_extinction", "f4", (4,)),  # of the one medium, where maps hold paths
+        ("shadow_second", "f4", (4,)),  # of another, with w 1, where they hold those in both
         ("sky_count", "i4", ()),  # directions of the environment,
         ("sky_first", "i4", ()),  # and those of them that this sample looks at: the first,
         ("sky_step", "i4", ()),  # and every so-many-th after it; negative: these stand for all

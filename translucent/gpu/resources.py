@@ -29,6 +29,8 @@ class Resources:
         self._shadows = ShadowAtlas(gl), ShadowAtlas(gl)
         #: Photons carry the light that interfaces turn, so that bodies are opaque to lights: their maps are others.
         self.photons_carry = False
+        #: Media change after passes have been recorded, so that maps must not know which of them are alike.
+        self.media_change = False
         #: Views from lights, which are the same for frames of all sizes.
         self.light_lists = Storage(gl, "light that media scatter")
 

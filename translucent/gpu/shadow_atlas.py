@@ -132,13 +132,14 @@ class ShadowViews:
         yield from (view for views in self.lights for view in views)
         yield from self.sky
 
-    def light_uniforms(self, center: Array, first_and_step: tuple[int, int], extinction: Array) -> bytes:
+    def light_uniforms(self, center: Array, first_and_step: tuple[int, int], extinctions: Array) -> bytes:
         """Contents of the Shadows block, for positions that count from `center`.
 
         Of the directions of the environment, the first and every so-many-th after it are looked at, and count for all.
-        `extinction` (3,) is that of the one medium, where the maps are paths.
+        `extinctions` (1 or 2, 3) are those of the media, where the maps are paths.
         """
-        first, spans = 0, np.zeros((MAX_LIGHTS, 4))
+        first, spans, media = 0, np.zeros((MAX_LIGHTS, 4)), np.zeros((2, 4))
+        media[: len(extinctions), :3], media[1, 3] = extinctions, len(extinctions) > 1
         rows = np.zeros((MAX_SHADOW_VIEWS, 4, 4))
         for i, views in enumerate(self.lights):
             spans[i, :2] = first, len(views)
@@ -148,7 +149,8 @@ class ShadowViews:
         return SHADOWS.pack(
             shadow_lights=spans,
             shadow_views=rows.reshape(-1, 4),
-            shadow_extinction=[*extinction, 0.0],
+            shadow_extinction=media[0],
+            shadow_second=media[1],
             sky_count=len(self.sky),
             sky_size=self.sky[0].size if self.sky else 0,
             sky_columns=self._columns,
@@ -170,12 +172,6 @@ class ShadowViews:
     def _columns(self) -> int:
         """Maps of directions of the environment that fit into a row of the atlas."""
         return self.extent[0] // self.sky[0].size if self.sky else 0
-
-
-def _is_one_medium(media: tuple[bytes | None, ...]) -> bool:
-    """Whether objects have one extinction, which is not 0."""
-    found = {medium for medium in media if medium is not None}
-    return len(found) == 1 and bool(np.frombuffer(found.pop()).any())
 
 
 def _placed(
@@ -209,19 +205,20 @@ class Seen:
         What decides where light goes.
     media : tuple of bytes or None
         Extinction in each object.
+    slots : tuple of int
+        Number of the extinction of each object that throws a shadow among those that differ, -1 of others and of 0.
     step : int
         There are maps of every so-many-th direction of the environment.
     """
 
     places: tuple[object, ...]
     media: tuple[bytes | None, ...]
+    slots: tuple[int, ...]
     step: int = 1
 
     def fits(self, other: Seen, *, path_only: bool) -> bool:
-        """Whether maps of this are those of another; of one medium they are paths, whatever it absorbs."""
-        if self.places != other.places or self.media == other.media:
-            return self.places == other.places
-        return path_only and all(_is_one_medium(seen.media) for seen in (self, other))
+        """Whether maps of this are those of another; of one medium or two they are paths, whatever these absorb."""
+        return self.places == other.places and (self.media == other.media or (path_only and self.slots == other.slots))
 
 
 class ShadowAtlas:
@@ -238,6 +235,8 @@ class ShadowAtlas:
     spectral : bool
         The maps are optical depths (RGBA32F), since media differ, and not paths: R32F, or with counts RG32F where
         opaque objects end some.
+    two_media : bool
+        The maps are paths in two media (RG32F).
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
@@ -247,9 +246,9 @@ class ShadowAtlas:
         self.held: Seen | None = None
         self.drawn: set[ShadowView] = set()
         self.views: ShadowViews | None = None
-        self.spectral = False
+        self.spectral = self.two_media = False
 
-    def make(self, views: ShadowViews, *, spectral: bool) -> None:
+    def make(self, views: ShadowViews, *, spectral: bool, two_media: bool = False) -> None:
         """Make room for maps; what the textures held is lost.
 
         Raises
@@ -259,12 +258,12 @@ class ShadowAtlas:
         """
         self.held = None
         self.drawn.clear()
-        components = 4 if spectral else 2 if any(view.ends for view in views) else 1
+        components = 4 if spectral else 2 if two_media or any(view.ends for view in views) else 1
         if self._made_of != (views.extent, components):
             self.release()
             self._framebuffers = self._made(views.extent, components)
             self._made_of = views.extent, components
-        self.views, self.spectral = views, spectral
+        self.views, self.spectral, self.two_media = views, spectral, two_media
         for framebuffer in (self.sums, self.ends):
             framebuffer.viewport = (0, 0, *views.extent)
         self.sums.clear()

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from translucent.errors import InputError
+from translucent.media.medium import Medium
 from translucent.planning.bodies import count_of, indices
 from translucent.planning.caustics import Caustics
 from translucent.planning.methods import Method
@@ -18,6 +21,9 @@ from translucent.scene.scene import Object, Scene, object_names
 #: processor core: through a ball of glass into fog, measured on two busy cores.
 SECONDS_OF_A_PHOTON = 2.5e-5
 
+#: Optical depth across a body whose light photons carry.
+DENSE = 1e4
+
 #: Passes that show light of media, of which the first that a plan has tells of photons in them.
 _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
 
@@ -25,6 +31,19 @@ _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
     """Numbers of the objects that stop the straight light of lamps where photons carry it: solids that bend it."""
     return frozenset(i for i, body in enumerate(scene.objects) if _turns_light(body) and body.sheet_thickness is None)
+
+
+def darkened(scene: Scene, bodies: frozenset[int]) -> Scene:
+    """The scene with these of its bodies so dense that no light passes; the scene itself if there are none."""
+    if not bodies:
+        return scene
+
+    def dense(body: Object) -> Object:
+        return replace(
+            body, medium=Medium(DENSE / float(np.linalg.norm(body.bounds[1] - body.bounds[0]))), surface=None
+        )
+
+    return replace(scene, objects=[dense(body) if i in bodies else body for i, body in enumerate(scene.objects)])
 
 
 def lit_by_photons(scene: Scene, solved: Iterable[int]) -> tuple[int, ...]:
@@ -43,7 +62,7 @@ def with_caustics(
     InputError
         If no photon could land, or this machine or what else is asked for follows none.
     """
-    _check(scene, method, capabilities)
+    _check(method)
     back = found.given_back
     lit = lit_by_photons(scene, sorted((*back.volumes, *back.diffused)))
     _check_ways(scene, lit)
@@ -53,10 +72,12 @@ def with_caustics(
         steps.append(_into_media(one, scene, lit, caustics) if lit and one.name is carries else one)
         if one.name is PassName.OPAQUE:
             steps.append(_onto_opaque(scene, caustics))
+        elif one.name is PassName.SHADE and scene.opaque:
+            steps[-1] = _shaded_with(steps[-1], scene, caustics)
     return replace(
         found,
         passes=tuple(steps),
-        unmodelled=(*found.unmodelled, *_left_out(scene, lit, back.volumes)),
+        unmodelled=(*found.unmodelled, *_left_out(scene, lit, back.volumes, capabilities.opengl)),
         caustics=caustics,
         opaque_to_shadows=opaque_to_shadows(scene),
     )
@@ -64,12 +85,22 @@ def with_caustics(
 
 def _onto_opaque(scene: Scene, caustics: Caustics) -> PassSpec:
     """Pass of the photons that land on opaque objects."""
-    reason = (
+    opaque, cost = indices(scene, lambda item: item.medium is None), caustics.cost_of_a_million * caustics.photons / 1e6
+    return PassSpec(PassName.CAUSTICS, _landing(scene, caustics), opaque, 1, cost=cost)
+
+
+def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics) -> PassSpec:
+    """Pass that shades opaque objects without OpenGL, with the photons that land on them."""
+    seconds = caustics.photons * SECONDS_OF_A_PHOTON * len(scene.objects)
+    told = f"{_landing(scene, caustics)}, followed on the processor, about {seconds:.2g} s"
+    return replace(step, reason=f"{step.reason}; {told}")
+
+
+def _landing(scene: Scene, caustics: Caustics) -> str:
+    return (
         f"asked for: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
         f"through {_bending(scene)}, added to what opaque objects reflect diffusely"
     )
-    opaque = indices(scene, lambda item: item.medium is None)
-    return PassSpec(PassName.CAUSTICS, reason, opaque, 1, cost=caustics.cost_of_a_million * caustics.photons / 1e6)
 
 
 def _into_media(step: PassSpec, scene: Scene, lit: tuple[int, ...], caustics: Caustics) -> PassSpec:
@@ -96,10 +127,7 @@ def _turns_light(body: Object) -> bool:
     return body.medium is not None and body.has_interface and body.medium.ior != 1.0
 
 
-def _check(scene: Scene, method: Method | None, capabilities: Capabilities) -> None:
-    if not capabilities.opengl:
-        found = "photons are followed by OpenGL, and this renderer works on the CPU"
-        raise InputError("caustics", found, "use tl.reference.trace_photons, or an OpenGL backend")
+def _check(method: Method | None) -> None:
     if method is not None and method.follows_paths:
         found = "its paths meet opaque objects behind interfaces without the caustics on them"
         raise InputError(f"caustics with {method}", found, "leave out one of the two")
@@ -131,12 +159,12 @@ def _check_ways(scene: Scene, lit: tuple[int, ...]) -> None:
         raise InputError("caustics", found, "give it an inside, or no roughness")
 
 
-def _left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...]) -> tuple[Note, ...]:
+def _left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...], opengl: bool) -> tuple[Note, ...]:
     """Notes on light that photons do not carry."""
-    texts = [
-        "caustics of light of the environment",
-        "caustics on receivers that interfaces alone show, which are out of the picture or hidden by what is opaque",
-    ]
+    texts = ["caustics of light of the environment"]
+    if opengl:
+        hidden = "which are out of the picture or hidden by what is opaque"
+        texts.append(f"caustics on receivers that interfaces alone show, {hidden}")
     dark = indices(scene, lambda body: body.medium is not None and body.medium.scatters)
     uneven = indices(scene, lambda body: body.medium is not None and body.medium.anisotropy != 0.0)
     if others := tuple(i for i in dark if i not in lit):

@@ -47,9 +47,13 @@ class SurfaceLight:
             arriving = np.array(light.irradiance_on(points, normals))
             lit = np.flatnonzero(arriving.any(axis=1))
             with np.errstate(under="ignore"):
-                arriving[lit] *= self.passed(points[lit], *way_of(light, points[lit]), before)
+                arriving[lit] *= self.straight(light, points[lit], before)
                 irradiance = irradiance + arriving
         return np.asarray(irradiance)
+
+    def straight(self, light: Light, points: Array, before: float) -> Array:
+        """(k, 3): transmittance of straight ways from one of `LightPaths.lights` that end `before` points (k, 3)."""
+        return self.passed(points, *way_of(light, points), before)
 
     def _share_of_sky(self, points: Array, normals: Array, before: float) -> Array:
         """(k, 3): share of the environment's irradiance that is left, by its `shadow_directions`."""

@@ -29,7 +29,7 @@ class PositionalLight(Frozen):
     intensity: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        position = _vector("light position", self.position)
+        position = _vector("light position", self.position, "give (x, y, z); at infinity, use a tl.DirectionalLight")
         if (farthest := float(np.abs(position).max())) > MAX_COORDINATE:
             raise InputError("light position", f"{farthest:.3g} m away", f"stay within {MAX_COORDINATE:g} m")
         object.__setattr__(self, "position", position)
@@ -188,13 +188,13 @@ def _angle(name: str, value: object) -> float:
     return float(value)
 
 
-def _vector(what: str, value: npt.ArrayLike) -> Array:
+def _vector(what: str, value: npt.ArrayLike, do: str = "give (x, y, z)") -> Array:
     try:
         vector = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         vector = np.zeros(0)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{what} {value!r}", "not three finite numbers", "give (x, y, z)")
+        raise InputError(f"{what} {value!r}", "not three finite numbers", do)
     vector.setflags(write=False)
     return vector
 
@@ -208,6 +208,6 @@ def positive_triple(what: str, value: npt.ArrayLike) -> Array:
     triple = _vector(what, triple)
     if (triple < 0).any() or (triple > MAX_RADIANCE).any():
         raise InputError(
-            f"{what} {tuple(triple.tolist())}", f"not in 0 to {MAX_RADIANCE:g}", "give values of 0 and above"
+            f"{what} {tuple(triple.tolist())}", f"not in 0 to {MAX_RADIANCE:g}", "give values in this range"
         )
     return triple

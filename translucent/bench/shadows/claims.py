@@ -13,6 +13,7 @@ from translucent.bench.shadows.record import (
     HALF,
     OPAQUE,
     CausticCase,
+    CausticMediumCase,
     CausticRow,
     ShadowCase,
     Shadows,
@@ -108,6 +109,10 @@ def shadow_claims(shadows: Shadows) -> tuple[Claim, ...]:
             f"Caustics are within {CAUSTIC_ERROR:g} of the mean, blurred by a pixel, from {least}",
             map(_sharp, caustics),
         ),
+        _over(
+            f"In fog, wax and milk, light behind glass is within {CAUSTIC_ERROR:g} of the mean, with photons",
+            (_near_in_medium(case) for case in shadows.media if not case.failure),
+        ),
     )
 
 
@@ -193,3 +198,12 @@ def _sharp(case: CausticCase) -> _Check | None:
     worst = max(rows, key=lambda row: row.nrmse)
     held = None if worst.nrmse <= CAUSTIC_ERROR < worst.most else worst.nrmse <= CAUSTIC_ERROR
     return _Check(case.name, worst.nrmse, held, f"{worst.nrmse:.3f}, at most {worst.most:.3f}")
+
+
+def _near_in_medium(case: CausticMediumCase) -> _Check | None:
+    if not (rows := [row for row in case.rows if row.photons]):
+        return None
+    row = rows[-1]
+    held = None if row.nrmse <= CAUSTIC_ERROR < row.most else row.nrmse <= CAUSTIC_ERROR
+    without = "".join(f"; without {one.nrmse:.3f}" for one in case.rows if not one.photons)
+    return _Check(case.name, row.nrmse, held, f"{row.nrmse:.3f}, at most {row.most:.3f}{without}")

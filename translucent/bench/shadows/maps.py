@@ -44,7 +44,7 @@ def texel_errors(renderer: Renderer, scene: Scene, size: int) -> Array:
     camera, ground = map_camera(scene), scene.objects[-1]
     origins, ways = (np.broadcast_to(rays, (size, size, 3)) for rays in camera.rays((size, size)))
     advance = 1.0 / (ways @ camera.forward)
-    depth = sums[..., :3] if sums.shape[-1] > 1 else sums * _extinction(scene)
+    depth = sums[..., :3] if sums.shape[-1] > 2 else sums @ _extinctions(scene)[: sums.shape[-1]]
     found = np.exp(-depth * advance[..., None])
     seen = replace(scene, objects=list(scene.bodies), camera=camera)
     counts = reference.hit_counts(seen, (size, size))
@@ -54,14 +54,14 @@ def texel_errors(renderer: Renderer, scene: Scene, size: int) -> Array:
     return np.asarray(found[inside] - reference.light_transmittance(scene, 0, points))
 
 
-def _extinction(scene: Scene) -> Array:
-    medium = scene.bodies[0].medium
-    assert medium is not None, "a body"
-    return np.asarray(medium.extinction)
+def _extinctions(scene: Scene) -> Array:
+    """(k, 3): those of the bodies that differ, in order."""
+    found = {item.medium.extinction.tobytes(): item.medium.extinction for item in scene.bodies if item.medium}
+    return np.array(list(found.values()))
 
 
 def _sums(renderer: Renderer, size: int) -> Array:
-    """(size, size, 1 or 4): the one map that the renderer holds, the bottom row first."""
+    """(size, size, 1, 2 or 4): the one map that the renderer holds, the bottom row first."""
     with renderer.gpu.context.current():
         texture = renderer.gpu.shadows.sums.color_attachments[0]
         return np.frombuffer(texture.read(), np.float32).reshape(size, size, -1).astype(np.float64)
@@ -87,7 +87,11 @@ def halve(studio: Studio, scene: Scene, size: int) -> None:
     forward = np.broadcast_to(ways @ camera.forward, (size, size))[..., None]
     values = np.array(_sums(renderer, size))
     if values.shape[-1] > 1:
-        values[..., :3] = np.flipud(np.asarray(frame.optical_depth, np.float64) * forward)
+        depth = np.flipud(np.asarray(frame.optical_depth, np.float64) * forward)
+        if values.shape[-1] == 2:  # the paths in two media that have these optical depths
+            values = depth @ np.linalg.pinv(_extinctions(scene))
+        else:
+            values[..., :3] = depth
     else:
         values[..., :1] = np.flipud(np.asarray(frame.thickness, np.float64)[..., None] * forward)
     texture.write(np.ascontiguousarray(values, dtype=np.float32).tobytes())

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from translucent.bench.drawing import Studio
 from translucent.bench.measure import one_line
-from translucent.bench.shadows import caustics, measure, scenes, sky
+from translucent.bench.shadows import caustic_media, caustics, measure, scenes, sky
 from translucent.bench.shadows.record import Shadows
 from translucent.errors import TranslucentWarning
 
@@ -39,7 +39,9 @@ class ShadowsRun:
             f"shadow, {one.name}": partial(self._case, one) for one in self._chosen(scenes.SCENES)
         }
         found["shadows of environments"] = self._sky
-        return found | {f"caustic, {one.name}": partial(self._caustic, one) for one in self._chosen(caustics.SCENES)}
+        found |= {f"caustic, {one.name}": partial(self._caustic, one) for one in self._chosen(caustics.SCENES)}
+        media = () if self._quick else caustic_media.SCENES  # their truths take minutes
+        return found | {f"caustic in a medium, {one.name}": partial(self._medium, one) for one in media}
 
     def _chosen(self, every: Iterable[Scene]) -> list[Scene]:
         return [one for one in every if one.quick or not self._quick]
@@ -61,3 +63,7 @@ class ShadowsRun:
             warnings.simplefilter("ignore", TranslucentWarning)
             found = caustics.measure_caustic(self._studio.renderer, one, effort)
         return dataclasses.replace(made, caustics=(*made.caustics, found))
+
+    def _medium(self, one: caustic_media.MediumScene, made: Shadows) -> Shadows:
+        found = caustic_media.measure_medium(self._studio.renderer, one, caustic_media.FULL)
+        return dataclasses.replace(made, media=(*made.media, found))

@@ -169,6 +169,37 @@ class CausticCase:
 
 
 @dataclass(frozen=True)
+class CausticMediumCase:
+    """Record of the light of photons in a medium that scatters.
+
+    Attributes
+    ----------
+    name, title, why : str
+    truth_paths : int
+        Random paths of each pixel, in each of two halves.
+    reference_seconds : float
+        That both took.
+    noise : float
+        Standard error of the mean of the truth, as a share of it.
+    rows : tuple of CausticRow
+        Of radiance in place of power and irradiance; that without photons has 0 of them.
+    pictures : tuple of Picture
+        The reference, then the rows.
+    failure : str, optional
+    """
+
+    name: str
+    title: str
+    why: str
+    truth_paths: int = 0
+    reference_seconds: float = 0.0
+    noise: float = 0.0
+    rows: tuple[CausticRow, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
 class Shadows:
     """Record of the part.
 
@@ -179,17 +210,19 @@ class Shadows:
     sky_failure : str, optional
         Why there are none of these.
     caustics : tuple of CausticCase
+    media : tuple of CausticMediumCase
     """
 
     cases: tuple[ShadowCase, ...] = ()
     sky: tuple[SkyRow, ...] = ()
     sky_failure: str | None = None
     caustics: tuple[CausticCase, ...] = ()
+    media: tuple[CausticMediumCase, ...] = ()
 
     @property
     def measured(self) -> bool:
         """Whether anything is there."""
-        return bool(self.cases or self.sky or self.caustics or self.sky_failure)
+        return bool(self.cases or self.sky or self.caustics or self.media or self.sky_failure)
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -202,4 +235,5 @@ class Shadows:
             if row.failure
         ]
         sky = [f"shadows of the environment: {self.sky_failure}"] if self.sky_failure else []
-        return (*whole, *rows, *sky, *(f"caustics, {one.name}: {one.failure}" for one in self.caustics if one.failure))
+        light = [(one.name, one.failure) for one in self.caustics] + [(one.name, one.failure) for one in self.media]
+        return (*whole, *rows, *sky, *(f"caustics, {name}: {failure}" for name, failure in light if failure))

@@ -12,7 +12,8 @@ import moderngl
 import numpy as np
 
 from translucent.arrays import Array
-from translucent.gpu.body_uniforms import bounded_extinction
+from translucent.gpu.balance import FaceCounts
+from translucent.gpu.body_uniforms import BodyRoles, bounded_extinction
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
@@ -32,6 +33,7 @@ from translucent.gpu.storage import SHADER_STORAGE
 from translucent.gpu.targets import Targets
 from translucent.gpu.uniforms import media_center
 from translucent.media.medium import Medium
+from translucent.planning.caustic_plan import darkened
 from translucent.planning.methods import Method
 from translucent.planning.passes import PassName, PassSpec
 from translucent.planning.paths import straight_scene
@@ -44,9 +46,6 @@ from translucent.scene.shadow_directions import shadow_directions
 
 #: Most shares of the directions of the environment where one sample of a pixel may have to do.
 _FEW_SHARES = 16
-
-#: Optical depth across a body whose light photons carry.
-_DENSE = 1e4
 
 #: Largest ratio of distances from a lamp that a projected depth buffer resolves: its step at the far end is
 #: 2^-24 far^2 / near, so at most 1e-6 of the distance.
@@ -80,11 +79,16 @@ class MapJob(FrameJob):
     ) -> None:
         self._view = view
         self.corner = view.corner
-        self.path_only = not resources.shadows.spectral
-        self.projected_depth = self.path_only and view.ends and _resolves(scene)
+        self.path_only, self.two_media = not resources.shadows.spectral, resources.shadows.two_media
+        self.projected_depth = self.path_only and not self.two_media and view.ends and _resolves(scene)
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
         super().__init__(gl, scene, plan, targets, resources, placed=placed, with_depth=self.projected_depth)
+
+    def roles_of(self, counts: FaceCounts) -> BodyRoles:
+        """Roles of the objects, with the slots of two media."""
+        roles = super().roles_of(counts)
+        return replace(roles, slots=np.array(_slots(self.features.scene)[0])) if self.two_media else roles
 
     def at_place(self, framebuffer: moderngl.Framebuffer) -> moderngl.Framebuffer:
         """The framebuffer, with its viewport where the map is."""
@@ -145,11 +149,12 @@ class ShadowMapsPass:
             self._render(job, seen, first, step)
         assert atlas.views is not None
         center = media_center(scene)
-        extinction = bounded_extinction(_throwing(scene)[0].medium, scene.diagonal)
+        media = _slots(scene)[1] if atlas.two_media else [_throwing(scene)[0].medium]
+        extinctions = np.array([bounded_extinction(medium, scene.diagonal) for medium in media])
         turns = first, -step if few or job.bending else step
         if job.averaged:
             turns = 0, max(len(atlas.views.sky), 1)  # no picture is read of what is drawn now
-        job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinction))
+        job.uniforms.add(SHADOWS, atlas.views.light_uniforms(center, turns, extinctions))
         assert atlas.held is not None
         irradiance = shadow_directions(scene.environment, count)[1][:: atlas.held.step] if count else np.zeros((0, 3))
         job.uniforms.add(SKY_SHADOWS, atlas.views.sky_uniforms(center, irradiance))
@@ -160,14 +165,16 @@ class ShadowMapsPass:
         scene, atlas = job.scene, job.resources.shadows
         # Where all bodies are drawn as sheets, these throw the shadows, too.
         method = job.plan.method if job.plan.method.makes_sheets else None
-        dark = _darkened(scene, job.plan.opaque_to_shadows)
+        dark = darkened(scene, job.plan.opaque_to_shadows)
         opaque = tuple(i for i, item in enumerate(scene.objects) if item.medium is None)
         everything = self._planned(dark, method, opaque)
         # Sums can be added up in place; others, and what depends on whether they balance, are copied.
         in_place = all(one.name in _IN_PLACE for one in everything[2].passes)
         if atlas.held is None:
             views = self._views(job, seen, opaque, in_place=in_place)
-            atlas.make(views, spectral=everything[2].spectral or not in_place or dark is not scene)
+            spectral = everything[2].spectral or not in_place or dark is not scene
+            two = spectral and dark is scene and not job.resources.media_change and _has_two_media(*everything[1:])
+            atlas.make(views, spectral=spectral and not two, two_media=two)
             atlas.held = seen
         assert atlas.views is not None
         center = media_center(scene)
@@ -279,6 +286,9 @@ def _resolves(scene: Scene) -> bool:
 #: Passes whose sums are read where they were added up.
 _IN_PLACE = (PassName.OPAQUE, PassName.SIGNED_DEPTH, PassName.THIN_LAYER, PassName.TRANSMITTANCE)
 
+#: Those of bodies without holes.
+_SUMS = (PassName.OPAQUE, PassName.SIGNED_DEPTH, PassName.TRANSMITTANCE)
+
 #: Passes that plans for scenes without interfaces and light have.
 _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass | DepthPeelingPass]] = {
     PassName.SIGNED_DEPTH: SignedDepthPass,
@@ -290,22 +300,31 @@ _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass 
 }
 
 
-def _darkened(scene: Scene, opaque: frozenset[int]) -> Scene:
-    """The scene with these of its bodies so dense that no light passes; the scene itself if there are none."""
-    if not opaque:
-        return scene
-
-    def dense(body: Object) -> Object:
-        return replace(
-            body, medium=Medium(_DENSE / float(np.linalg.norm(body.bounds[1] - body.bounds[0]))), surface=None
-        )
-
-    return replace(scene, objects=[dense(body) if i in opaque else body for i, body in enumerate(scene.objects)])
-
-
 def _throwing(scene: Scene) -> Sequence[Object]:
     """Bodies that throw shadows. Layers throw none; but a plan needs bodies, and alone they are clear sheets."""
     return [item for item in scene.bodies if not item.covers] or scene.bodies
+
+
+def _slots(scene: Scene) -> tuple[tuple[int, ...], list[Medium | None]]:
+    """Slots of all objects by the extinction of those that throw shadows, -1 of others and of clear ones; and the
+    medium of each slot, two at least.
+    """
+    throwing, found = set(map(id, _throwing(scene))), dict[bytes, Medium | None]()
+    slots = []
+    for item in scene.objects:
+        extinction = None if item.medium is None or id(item) not in throwing else np.asarray(item.medium.extinction)
+        if extinction is None or not extinction.any():
+            slots.append(-1)
+        else:
+            found.setdefault(extinction.tobytes(), item.medium)
+            slots.append(list(found).index(extinction.tobytes()))
+    return tuple(slots), [*found.values(), None, None][: max(len(found), 2)]
+
+
+def _has_two_media(scene: Scene, chosen: RenderPlan) -> bool:
+    """Tell whether paths in two media are all that light goes through."""
+    names = {step.name for step in chosen.passes}
+    return PassName.SIGNED_DEPTH in names and names.issubset(_SUMS) and len(_slots(scene)[1]) == 2
 
 
 def _sky_lights(scene: Scene) -> list[Light]:
@@ -327,4 +346,4 @@ def _seen(job: FrameJob) -> Seen:
     sky = scene.environment_shadows and shadow_directions(scene.environment, scene.environment_shadows)[0].tobytes()
     sheets = job.plan.method if job.plan.method.makes_sheets else None
     places = objects_key(scene), inside, lights, sky, sheets, job.plan.shadows.size, job.plan.opaque_to_shadows
-    return Seen(places, media)
+    return Seen(places, media, _slots(scene)[0])

@@ -23,7 +23,10 @@ class SignedDepthPass:
         opaque, plain = job.features.has_opaque, {"WITH_NORMAL": False, "WITH_POSITION": False}
         if job.path_only:
             variants = self._paths
-            kinds = [{"OPAQUE": kind == 1, "PROJECTED_DEPTH": kind == 2} for kind in range(3)]
+            two = {"TWO_MEDIA": job.two_media}
+            kinds = [
+                two | {"OPAQUE": kind == 1, "PROJECTED_DEPTH": kind == 2} for kind in range(2 if job.two_media else 3)
+            ]
             chosen = kinds[(2 if job.projected_depth else 1) if opaque else 0]
         else:
             variants = self._variants

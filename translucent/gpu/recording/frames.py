@@ -87,6 +87,7 @@ class FrameRecorder:
         self._samples = samples
         self._targets = Targets(self._context, SIZE)
         self._resources = Resources(self._context)
+        self._resources.media_change = True
         self._resources.meshes = RecordedMeshes(self.gl)  # type: ignore[assignment]
         self._passes: dict[type[Pass], Pass] = {}
 
