@@ -28,7 +28,7 @@ def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def rows(text: str) -> dict[str, str]:
-    """What ``show`` prints, by label."""
+    """Lines of ``show``, by label."""
     return dict(re.split(r" +", line, maxsplit=1) for line in text.splitlines())
 
 

@@ -214,7 +214,7 @@ def test_a_file_where_a_folder_has_to_be_is_found_before_any_work(
 
 @pytest.mark.usefixtures("renderer")
 class TestRendering:
-    """What needs OpenGL."""
+    """Tests that need OpenGL."""
 
     # Straight on, from 10 m: the middle ray of a frame of odd size crosses the unit cube along its axis.
     VIEW = ("--eye", "0,0,10", "--target", "0,0,0", "--fov", "20", "--size", "9x5", "--samples", "1")

@@ -71,7 +71,7 @@ Render = Callable[[str, float, int], np.ndarray]
 
 @pytest.fixture(scope="session")
 def blender() -> list[str]:
-    """How a script is started in Blender: by a Python that has its module, or by the program."""
+    """Command that starts a script in Blender: by a Python that has its module, or by the program."""
     for python, found in (
         (os.environ.get("BLENDER_PYTHON", ""), bool(os.environ.get("BLENDER_PYTHON"))),
         (sys.executable, importlib.util.find_spec("bpy") is not None),

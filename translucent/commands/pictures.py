@@ -45,7 +45,7 @@ class Pictures(NamedTuple):
     aov: Path | None
 
     def tiled(self, size: tuple[int, int]) -> bool:
-        """Whether a picture of this size is so large that it is rendered and written in tiles."""
+        """True if a picture of this size is so large that it is rendered and written in tiles."""
         large = size[0] * size[1] > LARGE or max(size) > MOST_SIDE
         return large and self.turntable is None and self.output.suffix.lower() != ".npz"
 

@@ -152,7 +152,7 @@ def _coefficients(per_metre: Iterable[float]) -> str:
 
 
 def _colorful() -> bool:
-    """Whether colors can be shown: on a terminal, unless it is a dumb one or NO_COLOR asks for none."""
+    """True if colors can be shown: on a terminal, unless it is a dumb one or NO_COLOR asks for none."""
     return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 

@@ -51,7 +51,7 @@ class ShadowView:
 
     @property
     def ends(self) -> bool:
-        """Whether opaque objects are in the way of some rays."""
+        """True if opaque objects are in the way of some rays."""
         return bool(self.opaque)
 
     def rows(self, center: Array) -> npt.NDArray[np.float64]:
@@ -173,7 +173,7 @@ class ShadowViews:
 
 
 def _is_one_medium(media: tuple[bytes | None, ...]) -> bool:
-    """Whether objects have one extinction, which is not 0."""
+    """True if objects have one extinction, which is not 0."""
     found = {medium for medium in media if medium is not None}
     return len(found) == 1 and bool(np.frombuffer(found.pop()).any())
 
@@ -218,7 +218,7 @@ class Seen:
     step: int = 1
 
     def fits(self, other: Seen, *, path_only: bool) -> bool:
-        """Whether maps of this are those of another; of one medium they are paths, whatever it absorbs."""
+        """True if maps of this are those of another; of one medium they are paths, whatever it absorbs."""
         if self.places != other.places or self.media == other.media:
             return self.places == other.places
         return path_only and all(_is_one_medium(seen.media) for seen in (self, other))

@@ -86,5 +86,5 @@ def _is_about(error: InputError, key: str) -> bool:
 
 
 def _speaks_of(one: Preset, word: str) -> bool:
-    """Whether the note contains the word, as that of merlot contains wine."""
+    """True if the note contains the word, as that of merlot contains wine."""
     return len(word) >= LEAST_PART and word in re.findall(r"[a-z]+", one.note.lower())
