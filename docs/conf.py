@@ -1,4 +1,4 @@
-"""How the site is built: ``make docs`` writes it to ``out/docs``, without a network."""
+"""Settings of the site, which ``make docs`` writes to ``out/docs``, without a network."""
 
 from __future__ import annotations
 

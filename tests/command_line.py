@@ -1,4 +1,4 @@
-"""What a command line printed and returned, and what both are held against; the fixture `run` makes it."""
+"""Output and exit code of a command line, and what both are held against; the fixture `run` makes it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every test runs under: floating-point errors raise, seeds are fixed, and no OpenGL is a failure, not a skip."""
+"""Conditions of every test: floating-point errors raise, seeds are fixed, and no OpenGL is a failure, not a skip."""
 
 from __future__ import annotations
 

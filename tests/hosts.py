@@ -1,4 +1,4 @@
-"""What an engine gives the lifted passes of one body: vertices, uniform blocks, and the truth to hold them against."""
+"""Inputs of one body's lifted passes from an engine: vertices, uniform blocks, and the truth to hold them against."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much work something is, counted and not timed."""
+"""Amounts of work, counted and not timed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def calls(action: Callable[[], object]) -> int:
-    """How many functions of Python and C are called meanwhile in this thread."""
+    """Number of functions of Python and C that are called meanwhile in this thread."""
     count = 0
 
     def note(frame: FrameType, event: str, argument: Any) -> None:

@@ -1,4 +1,4 @@
-"""How many rays a second a bake traces, beside Embree alone on the same rays.
+"""Measure the rays a second that a bake traces, beside Embree alone on the same rays.
 
 Run it with ``python tools/bake_throughput.py [MESH] [--size 1024] [--rays 64] [--threads N] [--rounds 3]``.
 

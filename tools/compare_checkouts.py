@@ -1,4 +1,4 @@
-"""Whether frames got slower: two checkouts of the project draw the same frames in turns.
+"""Compare the speed of two checkouts of the project, which draw the same frames in turns.
 
 ``python tools/compare_checkouts.py OLDER [NEWER] [--scene SCENE] [--rounds N]``; NEWER is this checkout unless given,
 and ``git worktree add`` makes others. Each draws in a process of its own; the times are processor time, which other

@@ -1,4 +1,4 @@
-"""How many rays a second the CPU backend traces, beside Embree alone on the same rays.
+"""Measure the rays a second that the CPU backend traces, beside Embree alone on the same rays.
 
 ``python tools/cpu_throughput.py [MESH]`` prints millions of rays a second; default: the bear of the toolkit.
 """

@@ -47,7 +47,7 @@ def device(environment: dict[str, str]) -> tuple[str, str]:
 
 
 def run(path: Path, environment: dict[str, str]) -> tuple[str, dict[str, int]]:
-    """What a file of tests came to, in words where it did not pass, and how many tests did what."""
+    """Result of a file of tests, in words where it did not pass, and how many tests did what."""
     command = [sys.executable, "-m", "pytest", str(path), "-q", "-p", "no:cacheprovider"]
     try:
         done = subprocess.run(

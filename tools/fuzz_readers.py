@@ -178,7 +178,7 @@ def limits() -> Iterator[None]:
 
 @dataclass
 class Tally:
-    """What the runs were."""
+    """Counts of what the runs were."""
 
     runs: int = 0
     read: int = 0

@@ -72,7 +72,7 @@ scattering = [1.0, 1, 1]
 
 
 class Reader(NamedTuple):
-    """What reads a file, and good files for it: name and content of each."""
+    """A reader of files, and good files for it: name and content of each."""
 
     read: Callable[[Path], object]
     seeds: list[tuple[str, bytes]]

@@ -1,4 +1,4 @@
-"""What a bake costs: time for a point beside trimesh, and memory.
+"""Measure the cost of a bake: time for a point beside trimesh, and memory.
 
 ``python tools/measure_baking.py [MODEL...]`` measures points a second of the modes ``normal`` and ``inscribed``, beside
 ``trimesh.proximity.thickness`` with ``ray`` and ``max_sphere`` for the same points and normals; default: the bear and
@@ -49,7 +49,7 @@ def sampled(surface: Surface, count: int) -> tuple[npt.NDArray[np.int64], Array]
 
 
 def seconds(call: Callable[[], object]) -> float:
-    """That a call takes."""
+    """Seconds that a call takes."""
     begin = time.perf_counter()
     call()
     return time.perf_counter() - begin

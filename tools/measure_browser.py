@@ -243,7 +243,7 @@ def drawing_time() -> float:
 
 
 def is_ours(pid: int) -> bool:
-    """Whether a process descends from this one."""
+    """True if a process descends from this one."""
     while pid > 1 and pid != os.getpid():
         pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
     return pid == os.getpid()

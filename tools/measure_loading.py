@@ -100,7 +100,7 @@ def _measured(path: Path, small: Path, rounds: int) -> dict[str, Any]:
 
 
 def _checked(mesh: Any) -> tuple[object, ...]:
-    """What `load_mesh` and a diagnosis make sure of, asked of trimesh."""
+    """Checks that `load_mesh` and a diagnosis make, asked of trimesh."""
     mesh.merge_vertices()
     return mesh.is_watertight, mesh.is_winding_consistent, mesh.body_count, mesh.volume
 

@@ -86,7 +86,7 @@ def measure(
 
 
 def numbers_of(preset: Preset) -> list[Any]:
-    """What the measurement of a preset depends on."""
+    """Numbers that the measurement of a preset depends on."""
     medium = preset.medium
     values = [medium.absorption, medium.scattering, medium.anisotropy, medium.ior, preset.roughness]
     return [np.asarray(value).tolist() for value in values]

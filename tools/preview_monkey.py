@@ -206,7 +206,7 @@ def memory() -> float:
 
 
 def objects() -> int:
-    """How many objects with much in them are alive."""
+    """Number of objects with much in them that are alive."""
     gc.collect()
     return sum(type(one).__name__ in COUNTED for one in gc.get_objects())
 

@@ -36,7 +36,7 @@ def trace(one: ScatteringScene) -> StoredTruth:
 
 
 def is_current(one: ScatteringScene) -> bool:
-    """Whether the stored truth is that of the scene as it is."""
+    """True if the stored truth is that of the scene as it is."""
     try:
         stored_truth(one.name, one.make())
     except InputError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 import threading
@@ -42,7 +43,8 @@ def main(arguments: list[str] | None = None) -> int:
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "translucent"
-        return _failed(f"{error.format_message().rstrip('.')}{_quoting(error)}; see '{command} --help'", 2)
+        message = _below_zero(error, given) or error.format_message().rstrip(".")
+        return _failed(f"{message}{_quoting(error)}; see '{command} --help'", 2)
     except TranslucentError as error:
         if "--debug" in given:
             raise
@@ -54,6 +56,14 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows where", 1)
     return 0
+
+
+def _below_zero(error: click.ClickException, given: list[str]) -> str | None:
+    """The message for a number below 0 that was read as an option, where a value may be left out or an argument is."""
+    if not (isinstance(error, click.NoSuchOption) and re.match(r"-[\d.]", error.option_name)):
+        return None
+    word = next((word for word in given if error.option_name in word), error.option_name)
+    return f"{word!r}; a number below 0, where none is taken; give one above 0"
 
 
 def _quoting(error: click.ClickException) -> str:

@@ -156,7 +156,7 @@ def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
 
 
 def _is_plain(content: dict[str, Any]) -> bool:
-    """Whether a part is a mesh of triangles as they are stored."""
+    """True if a part is a mesh of triangles as they are stored."""
     vertices, faces = content.get("vertices"), content.get("faces")
     return (
         isinstance(vertices, np.ndarray)

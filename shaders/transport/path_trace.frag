@@ -97,21 +97,7 @@ vec3 reaching_irradiance(vec3 point, vec3 normal) {
     return sum;
 }
 
-// An opaque object, lit as where it is seen directly, but without its textures.
-vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
-    vec3 color = paint_color(body, point);
-    if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
-    OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
-        body.emissive, normal, 0.0, 1.0, 1.0, false
-#if THIN_FILM
-        , body.film
-#endif
-#if CLEAR_COAT
-        , vec2(body.clearcoat, body.clearcoat_roughness)
-#endif
-    );
-    return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
-}
+#include "transport/opaque_objects.glsl"
 
 // Share of the light of each channel that the media of a place turn by an angle, in 1/sr.
 vec3 phase_of(uvec4 record, int dominant, vec3 scattering, float cosine) {
@@ -166,11 +152,6 @@ void leave(inout Path path, vec3 point, vec3 face_normal) {
     float across = dot(face_normal, path.direction);
     path.origin = point + (across < 0.0 ? -offset : offset) * face_normal;
     path.skipped = offset / max(abs(across), 1e-2);
-}
-
-// Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
-vec3 kept_on_side(vec3 direction, vec3 side) {
-    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
 void begin_path(inout Path path, vec2 pixel, ivec2 texel) {

@@ -86,11 +86,6 @@ void leave(inout Photon photon, vec3 point, vec3 face_normal) {
     photon.skipped = offset / max(abs(across), 1e-2);
 }
 
-// Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
-vec3 kept_on_side(vec3 direction, vec3 side) {
-    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
-}
-
 // A photon at an interface: one branch, chosen by its share.
 void meet(inout Photon photon, Place place, TracedBody body, int before, int after, int channel, inout Draws draws) {
     bool is_sheet = int(body.kind) == KIND_SHEET;

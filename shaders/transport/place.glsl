@@ -164,3 +164,8 @@ uvec4 record_at_eye(vec3 eye, vec3 direction, float ahead) {
     return sound ? record : start_record;
 }
 #endif
+
+// Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
+vec3 kept_on_side(vec3 direction, vec3 side) {
+    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}

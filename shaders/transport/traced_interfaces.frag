@@ -25,6 +25,9 @@
 #include "transport/record.glsl"
 #include "transport/place.glsl"
 #include "transport/light_passed.glsl"
+#include "transport/opaque_objects.glsl"
+#include "transport/branch_ends.glsl"
+#include "transport/sampled_facets.glsl"
 
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
@@ -34,11 +37,6 @@ uniform sampler2D surface_color;
 uniform int most_interfaces;
 uniform int all_closed;              // 1: no solid has holes: what seems to leave through one passes an edge by rounding
 uniform float faintest_share;        // of the light, its three channels together: fainter rays are not followed
-#if MICROFACETS
-uniform int sample_number;           // of a pixel
-uniform float blurred_share;         // of the variance of microfacets, that blurs what is seen in them; the rest is sampled
-#endif
-
 layout(location = 0) out vec4 out_radiance;
 layout(location = 1) out vec4 out_transmittance;
 
@@ -61,17 +59,6 @@ struct Ray {
     vec3 outwards;    // normal of the body where it starts inside one
 };
 
-vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
-#if MICROFACETS
-    float roughness = sqrt(sqrt(min(blur, 1.0)));
-    return reflected ? environment_light(direction, roughness) : environment_beyond(point, direction, roughness);
-#elif SEEN_LIGHTS
-    return mirrored_environment(direction);
-#else
-    return reflected ? mirrored_environment(direction) : environment_beyond(point, direction, 0.0);
-#endif
-}
-
 float strength(vec3 share) {
     return dot(share, vec3(1.0));
 }
@@ -85,121 +72,16 @@ void leave(inout Ray ray, vec3 point, vec3 face_normal) {
     ray.skipped = offset / max(abs(across), 1e-2);
 }
 
-// Directions that smooth normals turn to the wrong side of a face, mirrored to the right one.
-vec3 kept_on_side(vec3 direction, vec3 side) {
-    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
-}
-
-#if MICROFACETS
-// Random numbers for the microfacet at an interface of a path: an additive recurrence in four dimensions over the samples of
-// a pixel (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), two for every other interface, from a
-// random start for each pixel and path (Jarzynski & Olano 2020, "Hash functions for GPU rendering").
-vec2 microfacet_shares(int met, int turns) {
-    uvec2 at = uvec2(gl_FragCoord.xy + beyond.xy);
-    uint state = (at.x * 1664525u + at.y * 22695477u + uint(met / 2) * 2654435761u + uint(turns) * 40503u) * 747796405u + 2891336453u;
-    state = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
-    state = (state >> 22u) ^ state;
-    vec2 step = met % 2 == 0 ? vec2(0.8566749, 0.7338919) : vec2(0.6287067, 0.5385973);
-    return fract(vec2(state & 0xffffu, state >> 16) / 65536.0 + float(sample_number) * step);
-}
-
-// A microfacet of a rough interface as the ray sees it.
-vec3 microfacet_normal(vec3 normal, vec3 direction, float alpha, vec2 shares) {
-    vec3 aside = normalize(abs(normal.x) < 0.7 ? cross(normal, vec3(1.0, 0.0, 0.0)) : cross(normal, vec3(0.0, 1.0, 0.0)));
-    vec3 up = cross(normal, aside);
-    vec3 towards = -vec3(dot(direction, aside), dot(direction, up), dot(direction, normal));
-    vec3 local = ggx_visible_normal(towards, alpha, shares);
-    return local.x * aside + local.y * up + local.z * normal;
-}
-
-// Share of the light on a microfacet that leaves the surface: G2 / G1 of Smith's masking, heights correlated (Heitz 2014).
-float masking_ratio(float cos_in, float cos_out, float alpha) {
-    if (cos_out <= 0.0) { return 0.0; }
-    float into = smith_lambda(cos_in, alpha);
-    return (1.0 + into) / (1.0 + into + smith_lambda(cos_out, alpha));
-}
-#endif
-
 struct Sum {
     vec3 light;
     float lost;        // share of the light whose ray went through a hole, or is in more bodies than a record holds
 };
 
-// Radiance of an opaque object along a ray, lit as where it is seen directly, but without its textures.
-vec3 opaque_light(TracedBody body, vec3 normal, vec3 direction, vec3 point) {
-    vec3 color = paint_color(body, point);
-    if (body.plain == 1.0) { return color * reaching_irradiance(point, normal) / PI; }
-    OpaqueFinish finish = OpaqueFinish(color, body.metallic, body.roughness, body.ior, body.passed, body.passed_share,
-        body.emissive, normal, 0.0, 1.0, 1.0, false
-#if THIN_FILM
-        , body.film
-#endif
-#if CLEAR_COAT
-        , vec2(body.clearcoat, body.clearcoat_roughness)
-#endif
-    );
-    return opaque_radiance_of(finish, normal, direction, point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz, point);
-}
-
 #if OPAQUE
 uniform int ground_object;   // number of the object that is the ground, or -1
 uniform vec4 ground_plane;   // unit normal upwards, and metres along it from the center of the media
 
-// How much the axial depth of a surface may differ between the centers of neighboring pixels.
-float depth_within_pixel(vec3 point, vec3 normal) {
-    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
-    float spread = surface_right.w == 1.0 ? dot(from_eye, ray_forward.xyz) : 1.0;
-    vec3 view = surface_right.w == 1.0 ? normalize(from_eye) : ray_forward.xyz;
-    float facing = abs(dot(view, normal));
-    return 2.0 * length(surface_up.xyz) * spread / frame_size.y * sqrt(1.0 - min(facing * facing, 1.0)) / max(facing, 1e-3);
-}
 #endif
-
-// The end of a branch: what is seen there is found for all rays of a group together, apart from following them.
-struct Glimpse {
-    int object;        // that is opaque; AIR for the environment
-    vec3 normal;       // of the object
-    vec3 origin;       // of the ray
-    vec3 point;        // of the object
-    vec3 direction;
-    vec3 share;        // of the light that reaches the eye
-    bool reflected;
-    float blur;
-};
-
-#if OPAQUE
-// Opaque objects as the picture shows them: with their textures, and blurred behind rough interfaces. False where it does not.
-bool opaque_shown(Glimpse end, out vec3 light) {
-    vec3 shown = seen_at(end.point);
-    if (!in_picture(shown.xy)) { return false; }
-    ivec2 texel = stored(texel_of(shown.xy));
-    float there = texelFetch(opaque_axial_depth, texel, 0).r;
-    if (abs(there - shown.z) * surface_ahead.y >= 1e-2 * surface_reach + depth_within_pixel(end.point, end.normal)) { return false; }
-#if MICROFACETS
-    if (end.blur > 0.0) {
-        vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(end.blur), length(end.point - end.origin), end.point));
-        light = blurred.rgb + (1.0 - blurred.a) * environment_seen(end.origin, end.direction, end.reflected, end.blur);
-        return true;
-    }
-#endif
-    vec4 found = texelFetch(opaque_radiance, texel, 0);
-#if ADAPTIVE
-    light = found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
-#else
-    light = found.rgb;
-#endif
-    return true;
-}
-#endif
-
-vec3 light_at(Glimpse end) {
-    if (end.object == AIR) { return environment_seen(end.origin, end.direction, end.reflected, end.blur); }
-#if OPAQUE
-    vec3 light;
-    if (opaque_shown(end, light)) { return light; }
-#endif
-    return opaque_light(traced_body(end.object), end.normal, end.direction, end.point);
-}
 
 // What a ray sees that is not followed on: the environment, or the ground before it.
 Glimpse seen_ahead(Ray ray, vec3 direction, vec3 share, bool reflected) {
@@ -459,42 +341,7 @@ Sum follow(Ray ray, Seen seen, float first_reach, int channel) {
 }
 
 #if MIRROR
-uniform vec4 mirror_plane;   // of the ground: unit normal upwards, and metres along it from the center of the media
-uniform vec2 mirror_finish;  // roughness and ior of its coat
-
-// What bodies change in the mirror image of a ground: along one ray, reflected at a microfacet of its coat, their light takes the place of
-// that of the environment, which the ground is shaded with. Added to the picture.
-void main() {
-    read_bodies();
-    out_radiance = vec4(0.0);
-    out_transmittance = vec4(0.0);
-    vec2 pixel = gl_FragCoord.xy + frame_size.zw;
-    ivec2 texel = ivec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y);
-    float depth = texelFetch(opaque_axial_depth, texel, 0).r;
-    if (depth >= NOTHING || texelFetch(entered, texel, 0).w < NOTHING) { return; }
-    vec3 direction = normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz));
-    vec3 point = point_at(pixel, depth), normal = mirror_plane.xyz;
-    float cosine = -dot(normal, direction);
-    if (cosine <= 0.0 || abs(dot(normal, point) - mirror_plane.w) > MIRROR_TOLERANCE * surface_reach) { return; }
-    point += (dot(normal, point) - mirror_plane.w) / cosine * direction;  // where the rasterizer does not quite see it
-    float alpha = mirror_finish.x * mirror_finish.x;
-    vec3 facet = normal;
-    if (blurred_share < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_share) * alpha, microfacet_shares(0, 1)); }
-    vec3 way = reflected_direction(direction, facet);
-    if (dot(way, normal) <= 0.0) { return; }
-    vec3 origin = point + MIRROR_MARGIN * surface_reach * normal;
-    if (nearest_hit(origin, way, 0.0, NOTHING, uvec4(0u)).object < 0) { return; }
-    float blur = blurred_share * alpha * alpha;
-    Seen nothing;
-    nothing.object = AIR;
-    nothing.point = origin;
-    nothing.normal = normal;
-    Sum sum = follow(Ray(origin, 0.0, way, vec3(1.0), uvec4(0u), 1, 0, true, blur, 1, -normal), nothing, NOTHING, 1);
-    vec2 table = textureLod(reflectance_table, reflectance_coordinate(cosine, mirror_finish.x), 0.0).rg;
-    float step = (mirror_finish.y - 1.0) / (mirror_finish.y + 1.0);
-    vec3 share = layer_of(vec3(step * step), table).mirrored * texelFetch(straight_transmittance, ivec2(gl_FragCoord.xy), 0).rgb;
-    out_radiance = vec4(share * (min(sum.light, vec3(NOTHING)) - environment_seen(origin, way, true, blur)), 0.0);
-}
+#include "transport/mirrored_ground.glsl"
 #else
 void main() {
     read_bodies();

@@ -1,4 +1,4 @@
-"""What browsers run, as the package finds it."""
+"""Scripts for browsers, as the package finds it."""
 
 from __future__ import annotations
 

@@ -54,6 +54,10 @@ def test_photons_are_counted_in_the_plan(run: Run, model: Path, tmp_path: Path) 
         ),
         (("goblet", "--caustics=0"), "error: Caustics photons 0; not a whole number in 1 to"),
         (("goblet", "--caustics=1000000000000"), "error: Caustics photons 1000000000000; not a whole number in 1 to"),
+        (
+            ("goblet", "--caustics=-5"),
+            "error: '--caustics=-5'; a number below 0, where none is taken; give one above 0;",
+        ),
         (("goblet", "--caustics=1e6"), "error: Invalid value for '--caustics': '1e6' is not a valid integer"),
     ],
 )

@@ -109,7 +109,7 @@ def script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="module")
 def data() -> bytes:
-    """What the browser gets of the scene, made once."""
+    """Data of the scene for the browser, made once."""
     from translucent.page.payload import payload
     from translucent.page.plans import plan_page
 

@@ -173,7 +173,7 @@ def test_many_triangles_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("overlap", ["add", "priority"])
 def test_no_shader_reads_more_textures_than_webgl2_promises(overlap: str) -> None:
-    """Of a scene with all that traced interfaces read: shadows, light that diffuses, a picture as environment."""
+    """A scene with all that traced interfaces read: shadows, light that diffuses, a picture as environment."""
     milk = tl.preset("skim_milk").medium
     scene = showcase(ball().mesh, milk, (64, 40))
     bodies = [*scene.objects, ball(transform=np.diag([0.4, 0.4, 0.4, 1.0]), priority=1)]

@@ -28,7 +28,7 @@ def pretend_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def rows(text: str) -> dict[str, str]:
-    """What ``show`` prints, by label."""
+    """Lines of ``show``, by label."""
     return dict(re.split(r" +", line, maxsplit=1) for line in text.splitlines())
 
 
@@ -191,6 +191,7 @@ def test_json_has_no_swatches(run: Run, monkeypatch: pytest.MonkeyPatch) -> None
     ("arguments", "message"),
     [
         (["show", "honney"], "error: preset 'honney'; not a known preset; did you mean honey? 'translucent presets' "),
+        (["--search", "["], "error: --search '['; no letters or digits; give words, such as wine"),
         (["show", "unobtainium"], "error: preset 'unobtainium'; not a known preset; use one of marble"),
         (["show"], "error: Missing argument 'NAME'"),
         (["shw", "merlot"], "error: No such command 'shw'"),

@@ -1,4 +1,4 @@
-"""What the README and the pages of the site say works."""
+"""The README and the pages of the site: what they say works."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def runs_here(command: str) -> bool:
 
 
 def is_built(script: str) -> bool:
-    """Whether a script for browsers is there: it is built with npm."""
+    """True if a script for browsers is there: it is built with npm."""
     try:
         return web_path(script).is_file()
     except tl.InputError:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from tests.apps.models import write_scene
 from tests.boxes import GLASS
@@ -136,6 +137,26 @@ def test_render_refuses_a_bad_option_and_writes_nothing(
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("out.png", ["--size", "200000x200000"], "40000 million pixels, and 1074 million are the most; give a smaller"),
+        (
+            "out.npz",
+            ["--size", "8192x2048"],
+            "17 million pixels at once take about 1.56 GiB of memory, and 954 MiB are f",
+        ),
+        ("out.gif", ["--size", "8192x2048", "--turntable", "4"], "are free; give a smaller size"),
+    ],
+)
+def test_a_size_is_refused_that_nobody_waits_for_or_memory_holds(
+    run: Run, cube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, options: list[str], message: str
+) -> None:
+    monkeypatch.setattr("translucent.files.memory.free_memory", lambda: 10**9)
+    assert message in one_error_line(run("render", cube, "-o", tmp_path / name, *options))
+    assert not (tmp_path / name).exists()
+
+
 @pytest.mark.parametrize("placed", [("--eye", "0,0,9"), ("--target", "0,0,0"), ("--up", "0,1,0"), ("--fov", "30")])
 def test_a_camera_of_the_file_excludes_one_that_options_place(
     run: Run, glass_box: Path, tmp_path: Path, placed: tuple[str, str]
@@ -193,7 +214,7 @@ def test_a_file_where_a_folder_has_to_be_is_found_before_any_work(
 
 @pytest.mark.usefixtures("renderer")
 class TestRendering:
-    """What needs OpenGL."""
+    """Tests that need OpenGL."""
 
     # Straight on, from 10 m: the middle ray of a frame of odd size crosses the unit cube along its axis.
     VIEW = ("--eye", "0,0,10", "--target", "0,0,0", "--fov", "20", "--size", "9x5", "--samples", "1")
@@ -361,9 +382,17 @@ class TestRendering:
         assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.ply", "cube.png"]
 
     def test_a_frame_that_opengl_cannot_hold_fails_at_run_time(self, run: Run, cube: Path, tmp_path: Path) -> None:
-        result = run("render", cube, "-o", tmp_path / "cube.png", "--size", "1000000x1")
+        result = run("render", cube, "-o", tmp_path / "cube.npz", "--size", "1000000x1")
         assert "1000000" in one_error_line(result, code=1)
-        assert not (tmp_path / "cube.png").exists()
+        assert not (tmp_path / "cube.npz").exists()
+
+    def test_a_frame_wider_than_opengl_draws_comes_in_tiles(self, run: Run, cube: Path, tmp_path: Path) -> None:
+        result = run(
+            "render", cube, "-o", tmp_path / "wide.png", "--size", "20000x2", "--samples", 1, "--stage", "none"
+        )
+        assert ": 20000x2, in tiles" in result.out
+        with Image.open(tmp_path / "wide.png") as picture:
+            assert picture.size == (20000, 2)
 
 
 def test_a_backend_that_was_asked_for_is_not_replaced(run: Run, cube: Path, tmp_path: Path, no_opengl: None) -> None:

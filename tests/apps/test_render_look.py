@@ -80,7 +80,7 @@ def test_wrong_options_are_one_line(
 
 @pytest.mark.usefixtures("renderer")
 class TestRendering:
-    """What needs OpenGL."""
+    """Tests that need OpenGL."""
 
     def test_a_background_is_seen_and_through_the_model(self, run: Run, tmp_path: Path, panorama: Path) -> None:
         pictures = []

@@ -1,11 +1,13 @@
-"""What the source promises about itself: rings, docstrings, sizes."""
+"""Promises of the source about itself: rings, docstrings, sizes."""
 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +18,7 @@ import translucent as tl
 
 PACKAGE = Path(tl.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
+CLAUSE = re.compile(r'^ *r?"""((?:What|Where|Which|Whose|Of|Those|That|How|When|If|Whether)\b.*)', re.MULTILINE)
 CONTRACTS = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
 
 
@@ -23,15 +26,21 @@ def name(path: Path) -> str:
     return str(path.relative_to(PACKAGE))
 
 
-def imported(path: Path) -> set[str]:
-    """Dotted names of all modules of the package that a file imports, wherever it does; of names in them, theirs."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+@cache
+def parsed(path: Path) -> tuple[str | None, set[str]]:
+    """Docstring of a file, and dotted names of all that it imports, wherever it does."""
+    tree, found = ast.parse(path.read_text(encoding="utf-8")), set()
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {whole if whole in MODULES else whole.rpartition(".")[0] for whole in found} & set(MODULES)
+    return ast.get_docstring(tree), found
+
+
+def imported(path: Path) -> set[str]:
+    """Dotted names of all modules of the package that a file imports; of names in them, theirs."""
+    return {whole if whole in MODULES else whole.rpartition(".")[0] for whole in parsed(path)[1]} & set(MODULES)
 
 
 MODULES = {".".join(("translucent", *path.relative_to(PACKAGE).with_suffix("").parts)): path for path in FILES}
@@ -52,13 +61,22 @@ def test_no_module_imports_itself_through_others() -> None:
 
 
 def test_a_module_says_what_it_is_for() -> None:
-    silent = [name(path) for path in FILES if not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))]
+    silent = [name(path) for path in FILES if not parsed(path)[0]]
     assert silent == []
 
 
 def test_a_module_is_short() -> None:
     lengths = {name(path): len(path.read_text(encoding="utf-8").splitlines()) for path in FILES}
     assert {path: length for path, length in lengths.items() if length > 400} == {}
+
+
+def test_a_docstring_begins_with_a_noun_or_an_imperative() -> None:
+    """Clauses ("What it does") say less than their nouns; by text, for parsing all files takes long."""
+    root = PACKAGE.parent
+    files = [path for folder in ("translucent", "tests", "tools", "examples") for path in (root / folder).rglob("*.py")]
+    texts = {str(path.relative_to(root)): path.read_text(encoding="utf-8") for path in files}
+    del texts["tools/preview_tasks.py"]
+    assert {path: found for path, text in texts.items() if (found := CLAUSE.findall(text))} == {}
 
 
 def test_a_public_name_exists_and_is_documented() -> None:
@@ -72,7 +90,7 @@ def test_the_public_names_are_sorted_and_unique() -> None:
 
 
 def test_checkers_know_the_public_names() -> None:
-    """What is imported for them alone is what there is, from the same modules."""
+    """Names imported for checkers alone are those there are, from the same modules."""
     tree = ast.parse((PACKAGE / "__init__.py").read_text())
     (known,) = [node.body for node in tree.body if isinstance(node, ast.If)]
     told = {node.names[0].name: node.module for node in known if isinstance(node, ast.ImportFrom)}

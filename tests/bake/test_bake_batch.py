@@ -286,7 +286,7 @@ def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
 
 
 def _runs(process: int) -> bool:
-    """Whether it is there, and not merely waits for somebody to look at how it ended."""
+    """True if it is there, and not merely waits for somebody to look at how it ended."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""What a map loses: right where the answer is known, and the same from every file."""
+"""Losses of a map: right where the answer is known, and the same from every file."""
 
 from __future__ import annotations
 

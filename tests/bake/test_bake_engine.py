@@ -1,4 +1,4 @@
-"""What a bake promises whatever it bakes: the same bits again, honest errors, a way out, and clear refusals."""
+"""Promises of every bake: the same bits again, honest errors, a way out, and clear refusals."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_a_seed_makes_another_map_of_the_same_mesh() -> None:
 @pytest.mark.parametrize("weighting", ["cosine", "uniform"])
 @pytest.mark.parametrize("rays", [8, 16, 64, 100])
 def test_the_standard_error_is_an_upper_estimate(weighting: str, rays: int) -> None:
-    """Of 256 independent estimates of a smooth mean and of a step's, their spread is at most the error they tell."""
+    """The spread of 256 independent estimates of a smooth mean and of a step's is at most the error they tell."""
     settings = BakeSettings(weighting=weighting, rays=rays)  # type: ignore[arg-type]
     cosine = Directions.of(settings).table[2].astype(float)
     edges = block_edges(0, rays, min(8, rays))

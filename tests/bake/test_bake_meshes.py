@@ -93,7 +93,7 @@ CLEAN = ["armadillo.obj", "featuretype.STL", "idler_riser.STL", "mengerSponge3.g
 
 @pytest.mark.parametrize("name", CLEAN)
 def test_no_ray_escapes_from_a_closed_mesh(assets: Path, name: str) -> None:
-    """Of some 100 000 rays at most two a hundred thousand, as Embree promises of watertight meshes."""
+    """At most two rays of a hundred thousand escape, as Embree promises of watertight meshes."""
     _, surface, face, weights, _ = sampled(name, assets, 2000)
     measured = Measure.of(surface, BakeSettings()).at(surface.points(face, weights))
     assert measured.cast == 128_000

@@ -1,4 +1,4 @@
-"""Which texels a mesh covers, what they show, and what is said of texture coordinates."""
+"""Texels that a mesh covers, what they show, and what is said of texture coordinates."""
 
 from __future__ import annotations
 

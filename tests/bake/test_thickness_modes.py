@@ -69,7 +69,7 @@ def test_the_transmittance_of_a_colored_medium() -> None:
 
 
 def test_a_transmittance_that_underflows() -> None:
-    """Of a narrow cone through 0.06 m at 1e6 / m nothing comes out, but the thickness is there all the same."""
+    """Nothing comes out of a narrow cone through 0.06 m at 1e6 / m, but the thickness is there all the same."""
     dense = tl.Medium(absorption=(1e6, 1e6, 2e6))
     values, _ = covered(
         tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 24, mode="transmittance", spread=20.0, medium=dense)

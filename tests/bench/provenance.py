@@ -1,4 +1,4 @@
-"""What a report of the tests says of the machine that it ran on."""
+"""Lines of a report of the tests on the machine that it ran on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is concluded from numbers: the frontier, changes between reports, claims. No clock is read here."""
+"""Conclusions from numbers: the frontier, changes between reports, claims. No clock is read here."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def test_the_cheapest_that_is_good_enough_is_advised() -> None:
 
 
 def test_few_pixels_that_are_plainly_wrong_are_not_good_enough() -> None:
-    """Of thickness: an RMS of 1e-4 of the diagonal, and ten times that in all but one pixel of a thousand."""
+    """Limits of thickness: an RMS of 1e-4 of the diagonal, and ten times that in all but one pixel of a thousand."""
     errors = Errors(2e-5, 1e-8, 1e-7, 2e-3, 0.1, 0.0)
     flawed = dataclasses.replace(row("flawed", 1.0, 0.0), thickness=errors)
     advice = advise(scene(flawed, SIGNED))
@@ -217,7 +217,7 @@ def test_numbers_as_text() -> None:
 
 
 def contrast(one: str, other: str) -> float:
-    """Of two colors, as WCAG 2 defines it: 1 to 21."""
+    """Contrast of two colors, as WCAG 2 defines it: 1 to 21."""
 
     def luminance(color: str) -> float:
         channels = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]

@@ -39,7 +39,7 @@ def test_what_is_left_behind_ink_underflows_to_black() -> None:
 
 
 def test_a_step_of_8_bits_is_not_seen_and_eight_are() -> None:
-    """Of the gray of 18 %, which is about half of the way in lightness."""
+    """Steps of the gray of 18 %, which is about half of the way in lightness."""
     near, far = (parse_color(f"srgb({v},{v},{v})") for v in ((119 + 1) / 255, (119 + 8) / 255))
     assert color_difference(near[None], parse_color("#777777")[None]).max < JUST_NOTICEABLE
     assert color_difference(far[None], parse_color("#777777")[None]).max > JUST_NOTICEABLE

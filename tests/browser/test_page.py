@@ -248,7 +248,7 @@ def test_without_targets_of_floats(web_page: WebPage, web_dist: Path, tmp_path: 
 
 
 def test_half_floats_are_told(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:
-    """Where there is no blending of 32-bit floats, thickness is added up in 16 bits, and the page says so."""
+    """Thickness is added up in 16 bits without blending of 32-bit floats, and the page says so."""
     answer_null(web_page, "WebGL2RenderingContext", "getExtension", "name === 'EXT_float_blend'")
     opened(web_page, scene_of(ball(RED)), tmp_path, tools)
     web_page.page.wait_for_function("async () => (window.viewer = await translucent).still")

@@ -96,7 +96,7 @@ def test_opaque_objects_end_rays(three_page: WebPage) -> None:
 
 
 def test_an_open_mesh_is_marked(three_page: WebPage) -> None:
-    """Where rays meet its hole, and nowhere else."""
+    """Marks are where rays meet its hole, and nowhere else."""
     hole = BALL.vertices[BALL.faces].mean(axis=1)[:, 2] > 0.9
     opened = tl.Mesh(BALL.vertices, BALL.faces[~hole])
     found = measure(three_page, [described(opened)], seen_from(5.0, fov_y=30.0), SIZE)

@@ -62,7 +62,7 @@ class Truth:
 
     @classmethod
     def of(cls, mesh: tl.Mesh, camera: tl.Camera, size: tuple[int, int], matrix: npt.ArrayLike | None = None) -> Truth:
-        """Of one closed mesh that the eye is outside of."""
+        """Thickness of one closed mesh that the eye is outside of."""
         matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64)
         hits = camera_hits(mesh, matrix, camera, size)
         pixels, shape = size[0] * size[1], size[::-1]
@@ -118,7 +118,7 @@ class Errors:
 
     @classmethod
     def of(cls, found: Measured, truth: Truth, diagonal: float) -> Errors:
-        """Of a picture."""
+        """Values of a picture."""
         inside = tl.interior(truth.crossed) & (truth.crossed > 0)
         used = inside & found.valid
         error = np.abs(found.thickness.astype(np.float64) - truth.thickness)[used] / diagonal

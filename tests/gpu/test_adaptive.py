@@ -54,7 +54,7 @@ def test_a_smooth_interior_is_traced_once(renderer: tl.Renderer) -> None:
 
 
 def test_the_edge_of_a_body_takes_all_samples(renderer: tl.Renderer) -> None:
-    """Where some samples meet the body, the mean is that of every one of them, up to the order of the sum."""
+    """The mean is that of every sample where some meet the body, up to the order of the sum."""
     few, every = (renderer.render(ball(), SIZE, samples=8, adaptive=adaptive) for adaptive in (True, False))
     alone = [renderer.render(dataclasses.replace(ball(), camera=moved), SIZE).coverage for moved in around(CAMERA)]
     edge = np.any(alone, axis=0) & ~np.all(alone, axis=0)

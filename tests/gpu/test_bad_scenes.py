@@ -1,4 +1,4 @@
-"""What is no scene is refused in words, wherever one is asked for."""
+"""Refusals, in words, of what is no scene, wherever one is asked for."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def test_on_a_surface_rays_start_on_either_side() -> None:
 
 
 def test_an_open_body_around_the_eye_counts_with_its_weight() -> None:
-    """Of a box without one of 12 triangles the eye is still mostly inside."""
+    """The eye is still mostly inside of a box without one of 12 triangles."""
     assert balance(seen_from(INSIDE, body(), body(mesh=OPEN))).expected_count == (17.0, 17.0)
 
 

@@ -46,7 +46,7 @@ def seen(renderer: tl.Renderer, body: tl.Object, interfaces: Any) -> Array:
 
 
 def truth(surface: tl.Surface, ior: float) -> Array:
-    """What a leaning pane mirrors of the sky, and lets through."""
+    """Light of the sky that a leaning pane mirrors, and lets through."""
     cosine = np.cos(LEAN)
     bare = float(optics.fresnel_dielectric(cosine, ior))
     film = thin_film.thin_film_reflectance(

@@ -1,4 +1,4 @@
-"""What third-party glTF files look like: by what has to hold of the pictures, whatever the light."""
+"""Looks of third-party glTF files: by what has to hold of the pictures, whatever the light."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def check(renderer: tl.Renderer, line: int, expected: np.ndarray) -> bool:
 
 @pytest.fixture
 def old_objects_stay() -> Iterator[None]:
-    """What is there before the test is not looked through at each of its garbage collections."""
+    """Keep what is there before the test from being looked through at each of its garbage collections."""
     gc.collect()
     gc.freeze()
     yield
@@ -144,7 +144,7 @@ def test_what_was_interrupted_says_so() -> None:
 
 
 def in_a_thread(action: Callable[[], object]) -> BaseException | None:
-    """What an action raises in a thread of its own."""
+    """Error of an action in a thread of its own."""
     raised: list[BaseException] = []
 
     def run() -> None:

@@ -123,7 +123,7 @@ def test_emission_in_front_of_an_opaque_object(renderer: tl.Renderer, method: An
 
 
 def test_a_hole_behind_the_wall_does_not_matter_to_lists(renderer: tl.Renderer) -> None:
-    """What lies behind an opaque surface is not looked at: an open body whose hole is there is sound."""
+    """Bodies behind an opaque surface are not looked at: an open body whose hole is there is sound."""
     cup = tl.Mesh(BODY.vertices, BODY.faces[[i for i in range(12) if not _faces_back(i)]], name="cup")
     camera = tl.Camera.look_at((0.1, 0.2, 6), (0, 0, 0))
     for wall, valid in (((0, 0, 0), True), ((0, 0, -4), False)):

@@ -209,7 +209,7 @@ def shells(count: int) -> tl.Scene:
 
 
 def test_a_hundred_nested_shells(renderer: tl.Renderer) -> None:
-    """Which lists and buffers hold at once; peeling holds no more than a batch, whatever their number."""
+    """Lists and buffers hold them at once; peeling holds no more than a batch, whatever their number."""
     scene, size = shells(100), (48, 36)
     for method in (tl.FragmentLists(), tl.KBuffer(k=200)):
         frame = assert_equal_to_reference(renderer, scene, size, method)

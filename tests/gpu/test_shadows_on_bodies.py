@@ -91,7 +91,7 @@ def test_no_light_reaches_a_ball_behind_a_wall(shown: Any, light: str, part: str
 
 
 def test_nor_does_it_reach_paint_on_paths_and_bodies_dim_it(renderer: tl.Renderer) -> None:
-    """Where nothing is left to chance: the paint has no interface over it."""
+    """A scene in which nothing is left to chance: the paint has no interface over it."""
     ball = tl.Object(BALL, tl.Medium(absorption=100), surface=PARTS["paint"])
 
     def shown(stone: Place, wine: Place) -> tl.Scene:

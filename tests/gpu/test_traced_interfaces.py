@@ -100,7 +100,7 @@ def leniently(
 
 
 def differences(renderer: tl.Renderer, scene: tl.Scene, size: tuple[int, int] = SIZE, bounces: int = 20) -> Array:
-    """Of covered pixels, as shares of the mean of the reference."""
+    """Differences of covered pixels, as shares of the mean of the reference."""
     frame = renderer.render(scene, size, samples=1, interfaces=DEEP)
     truth = references.render(scene, size, bounces=bounces)
     assert frame.valid.all()
@@ -157,7 +157,7 @@ def test_one_body_is_that_of_the_reference(thorough: tl.Renderer, name: str) -> 
 
 
 def test_absorption_of_a_thin_slab_misses_nothing_at_its_surfaces(thorough: tl.Renderer) -> None:
-    """What separates a ray from the surface that it left is 1 % of this slab."""
+    """The offset of a ray from the surface that it left is 1 % of this slab."""
     slab = body(Box.slab(thickness=1e-4).tessellate(), tl.Medium(absorption=1e4, ior=1.5))
     assert differences(thorough, seen(slab)).max() < 1e-5
 
@@ -226,7 +226,7 @@ def test_what_lies_before_the_first_interface_is_that_of_the_reference(thorough:
 
 
 def test_an_eye_on_a_surface_is_outside_of_it_or_inside_as_each_ray_goes(thorough: tl.Renderer) -> None:
-    """What lies where the eye is counts as behind it: outwards nothing is met, inwards the far side alone."""
+    """A surface where the eye is counts as behind it: outwards nothing is met, inwards the far side alone."""
     for target, medium, off in (((0.0, 0.0, 0.0), GLASS, 0.04), (3.0 * ON_BALL, tl.Medium(), 1e-5)):
         camera = tl.Camera.look_at(ON_BALL, target, fov_y=60)
         frame = thorough.render(seen(body(BALL), camera=camera), SIZE, samples=1, interfaces=DEEP)
@@ -290,7 +290,7 @@ def test_lights_and_what_is_seen_are_looked_up_apart(thorough: tl.Renderer) -> N
 
 
 def test_light_scattered_once_is_added_as_in_screen_space(thorough: tl.Renderer) -> None:
-    """Where nothing bends both have the same straight rays."""
+    """Both have the same straight rays as nothing bends."""
     fog = tl.Medium(absorption=0.3, scattering=0.5, ior=1.0001)
     scene = seen(body(BALL, fog), lights=[tl.PointLight((3, 5, 2), (20, 20, 20))])
     traced, screen = (
@@ -353,8 +353,8 @@ def test_trees_that_a_driver_cuts_short_are_marked(thorough: tl.Renderer) -> Non
 
 
 def test_rays_that_end_in_an_open_body_are_marked(thorough: tl.Renderer) -> None:
-    """Where more than 0.5 % of the light went through the hole; what is not marked differs little from the closed ball,
-    but for normals at the rim."""
+    """Marks are where more than 0.5 % of the light went through the hole; all else differs little from the closed
+    ball, but for normals at the rim."""
     torn = tl.Mesh(BALL.vertices, np.delete(BALL.faces, slice(300, 320), axis=0), name="torn")
     open_one, closed = (leniently(thorough, seen(body(mesh)), (48, 40)) for mesh in (torn, BALL))
     assert 100 < (~open_one.valid).sum() < 1000
@@ -402,7 +402,7 @@ def test_scenes_without_interfaces_trace_nothing() -> None:
 
 
 def test_a_method_that_makes_sheets_traces_sheets(thorough: tl.Renderer) -> None:
-    """Of the solid nothing is left, its inside neither."""
+    """Nothing is left of the solid, its inside neither."""
     scene = seen(body(BALL), environment=WHITE)
     frame = thorough.render(scene, SIZE, tl.ThinLayer(1e-3), interfaces=DEEP, samples=1)
     assert frame.valid.all()

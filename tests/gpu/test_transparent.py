@@ -25,7 +25,7 @@ def scene() -> tl.Scene:
 
 
 def test_before_any_gray_it_is_the_frame_with_that_background(renderer: tl.Renderer, scene: tl.Scene) -> None:
-    """Where nothing tints, radiance = alone + (1 - alpha) behind."""
+    """Radiance = alone + (1 - alpha) behind, as nothing tints."""
     alone = renderer.render(scene, SIZE, samples=4, transparent=True)
     assert alone.alpha is not None
     behind = scene.environment.with_background(tl.Environment.constant((0.5,) * 3))

@@ -58,7 +58,7 @@ class Studio:
 
     @property
     def pose(self) -> npt.NDArray[np.float64]:
-        """Of the camera."""
+        """Pose of the camera."""
         return tl.Camera.look_at((1.4, 1.2, 3.2), (0.1, 0.3, 0.0)).pose
 
     def scene(self, kind: str = "perspective") -> Any:

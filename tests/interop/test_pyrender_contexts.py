@@ -26,7 +26,7 @@ NAMES = range(1, 600)
 
 
 def _thickness(renderer: tl.Renderer, studio: Any) -> np.ndarray:
-    """Of a frame that has nothing to do with pyrender."""
+    """Thickness of a frame that has nothing to do with pyrender."""
     scene = tl.Scene([tl.Object(studio.ball, medium=GREEN)], tl.Camera(studio.pose))
     return renderer.render(scene, SIZE).thickness
 

@@ -1,4 +1,4 @@
-"""What pyrender draws behind media: in one context and through arrays, against its own pictures, and its depth."""
+"""Drawings of pyrender behind media: in one context and through arrays, against its own pictures, and its depth."""
 
 from __future__ import annotations
 

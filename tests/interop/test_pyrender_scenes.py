@@ -103,7 +103,7 @@ def test_lights_keep_their_units(pyrender: ModuleType, studio: Any) -> None:
 
 
 def _radiance(f0: float, color: float, irradiance: float) -> float:
-    """What pyrender's rough dielectric reflects back the way that light came, at right angles.
+    """Radiance that pyrender's rough dielectric reflects back the way that light came, at right angles.
 
     Its shaders/mesh.frag: diffuse (1 - F) c / pi with c = 0.96 of the base color, and F G D / (4 + 0.001) with
     D = 1 / pi and G = 1 at a roughness of 1.

@@ -54,7 +54,7 @@ def stage(work: Workspace) -> Iterator[Stage]:
 
 @pytest.fixture
 def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
-    """What another process would do, done in this one, once the event is set."""
+    """Work of another process, done in this one, once the event is set."""
     go = threading.Event()
 
     def call(_: Pool, task: Any, work: Callable[..., Any], *arguments: Any, **_urgency: Any) -> Any:

@@ -38,7 +38,7 @@ def lane() -> Iterator[Lane]:
 
 
 def settle(shelf: Shelf, ask: Callable[[], Any]) -> Any:
-    """What a shelf has for a request that is made in every frame."""
+    """Answer of a shelf to a request that is made in every frame."""
     end = time.monotonic() + 10.0
     while (found := ask()) is None and time.monotonic() < end:
         shelf.begin_frame(idle=True)

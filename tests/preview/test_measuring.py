@@ -1,4 +1,4 @@
-"""What is compared with the float64 reference, and how."""
+"""Comparisons with the float64 reference: of what, and how."""
 
 from __future__ import annotations
 

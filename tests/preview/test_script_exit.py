@@ -1,4 +1,4 @@
-"""What ``translucent preview --script`` returns: the window is stood in for, its workspace is the real one."""
+"""Exit codes of ``translucent preview --script``: the window is stood in for, its workspace is the real one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What draws the viewport, without a window: the same pictures and numbers as render, and nothing that ends it."""
+"""Drawing of the viewport, without a window: the same pictures and numbers as render, and nothing that ends it."""
 
 from __future__ import annotations
 

@@ -199,7 +199,7 @@ def told_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def assert_alike(scene: tl.Scene, expected: tl.Scene) -> None:
-    """That scenes show the same, but for the rounding of numbers in texts."""
+    """Assert that scenes show the same, but for the rounding of numbers in texts."""
     np.testing.assert_allclose(scene.camera.pose, expected.camera.pose, rtol=1e-9, atol=1e-9)
     assert (scene.camera.fov_y, scene.camera.height) == pytest.approx((expected.camera.fov_y, expected.camera.height))
     assert len(scene.objects) == len(expected.objects)
@@ -277,7 +277,7 @@ def test_stages_that_are_none_are_refused(
 
 
 def test_quick_shadows_need_no_more_maps_than_they_read(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of all, if these are there; and else of a few, so that an environment can be turned."""
+    """Maps of all directions, if these are there; and else of a few, so that an environment can be turned."""
     scene, quick, made = plain(staged), tl.ShadowMaps(directions=4), []
     add_up = shadow_maps.ShadowMapsPass._add_up
     monkeypatch.setattr(shadow_maps.ShadowMapsPass, "_add_up", lambda *given: made.append(1) or add_up(*given))

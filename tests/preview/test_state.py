@@ -159,7 +159,7 @@ def test_a_preset_is_the_medium_that_it_names() -> None:
 
 
 def test_sessions_with_the_former_switch_of_the_material_are_read(tmp_path: Path) -> None:
-    """What is scattered many times is the planner's choice now, or `display.scattering`."""
+    """Light scattered many times is the planner's choice now, or `display.scattering`."""
     text = "version = 1\n[material]\nroughness = 0.5\nmultiple_scattering = true\n"
     (tmp_path / "a.toml").write_text(text)
     found = load_session(tmp_path / "a.toml")

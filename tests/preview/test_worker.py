@@ -62,13 +62,13 @@ def refuses(report: Report) -> None:
 
 
 def same_mesh(report: Report, mesh: Mesh) -> tuple[bool, int]:
-    """Whether the mesh is the very one of the last call, and how many faces it has."""
+    """True if the mesh is the very one of the last call, and its number of faces."""
     _seen.append(mesh)
     return len(_seen) > 1 and _seen[-2] is mesh, len(mesh.faces)
 
 
 def alive(report: Report) -> int:
-    """How many meshes of other calls there still are."""
+    """Number of meshes of other calls that there still are."""
     del _seen[:]
     kept = __import__("sys")._getframe(2).f_locals["kept"]
     return sum(isinstance(one, Mesh) for one in kept.values())
@@ -230,7 +230,7 @@ def test_a_window_that_is_killed_leaves_no_process_and_no_file(tmp_path: Path) -
 
 
 def runs(process: int) -> bool:
-    """Whether there is such a process, and it has not ended."""
+    """True if there is such a process, and it has not ended."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:

@@ -1,4 +1,4 @@
-"""What refracted rays are in: walls at one place, priorities, bubbles, an eye in glass, and index one."""
+"""Bodies around refracted rays: walls at one place, priorities, bubbles, an eye in glass, and index one."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def hits(*rows: tuple[int, float, int]) -> Hits:
 
 
 def intervals(scene: Scene) -> tuple[Intervals, bool]:
-    """Of all objects on the one ray of the scene, and whether it is defective."""
+    """Intervals of all objects on the one ray of the scene, and True if it is defective."""
     hits = [line_hits(body.mesh, body.matrix, scene.camera, (1, 1)) for body in scene.objects]
     found, defective = scene_intervals(scene, hits, range(len(hits)), np.array([np.inf]))
     return found, bool(defective[0])

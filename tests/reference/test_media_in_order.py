@@ -80,7 +80,7 @@ def coefficients(bodies: list[Object]) -> tuple[Array, Array]:
 
 
 def box_span(box: Box, origin: Array, direction: Array) -> tuple[float, float]:
-    """Where a ray, not parallel to an axis, is in a box; empty if from >= to."""
+    """Span of a ray, not parallel to an axis, in a box; empty if from >= to."""
     ends = np.sort((np.array([box.low, box.high]) - origin) / direction, axis=0)
     return max(float(ends[0].max()), 0.0), float(ends[1].min())
 

@@ -77,7 +77,7 @@ LOSSLESS = {
 
 @pytest.mark.parametrize("name", LOSSLESS)
 def test_white_furnace(name: str) -> None:
-    """What loses nothing is invisible in uniform light: every path brings the same home."""
+    """A body that loses nothing is invisible in uniform light: every path brings the same home."""
     overlap = "priority" if name == "nested" else "add"
     scene = Scene(LOSSLESS[name], CAMERA, environment=Environment.constant(WARM), overlap=overlap)
     frame, error = path_trace(scene, (8, 6), paths=16)

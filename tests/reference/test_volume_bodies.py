@@ -137,7 +137,7 @@ def test_the_shadow_of_a_pole(width: float) -> None:
 
 
 def test_an_opaque_object_stops_the_ray() -> None:
-    """What is behind it is not seen, and it does not shade itself from above."""
+    """Bodies behind it are not seen, and it does not shade itself from above."""
     floor = Object(Box((-60, -60, -0.6), (60, 60, -0.4)).tessellate(), color=(0, 0, 0))
     found = middle(scene(Object(SLAB.tessellate(), MEDIUM), floor, lights=[SUN]))
     np.testing.assert_allclose(found, layers(SUN, (-0.4, 0.0, [MEDIUM])), rtol=1e-9)

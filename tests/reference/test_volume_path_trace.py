@@ -49,7 +49,7 @@ def assert_normal(z: Array, independent: int) -> None:
 @pytest.mark.parametrize("density", [None, LinearDensity(0, 0.0, 2.0), GRID], ids=["plain", "linear", "grid"])
 @pytest.mark.parametrize("g", [0.0, 0.8, -0.5])
 def test_white_furnace(density: Density | None, g: float) -> None:
-    """What only scatters is invisible in uniform light: every path brings the same home."""
+    """A body that only scatters is invisible in uniform light: every path brings the same home."""
     white = Medium(scattering=(4.0, 4.0, 8.0), anisotropy=g)
     scene = Scene([Object(RING, white, density=density)], CAMERA, environment=Environment.constant((1, 0.5, 0.2)))
     frame, error = path_trace(scene, (8, 6), paths=16)
@@ -103,7 +103,7 @@ def test_one_event_is_single_scattering(light: Light, density: Density | None) -
 
 
 def test_more_events_bring_more_light() -> None:
-    """What single scattering leaves out can be told: here more than half."""
+    """The light that single scattering leaves out can be told: here more than half."""
     scene = Scene([Object(BOX, Medium(scattering=5.0))], CAMERA, [SUN], DARK)
     found = [path_trace(scene, (4, 3), paths=200, max_events=most)[0].radiance.mean() for most in (0, 1, 2, None)]
     assert found[0] == 0

@@ -103,7 +103,7 @@ def test_tolerances_that_cannot_be(tolerance: float) -> None:
 
 @pytest.mark.parametrize("depth", [1e-9, 1e-3, 40.0, 1e4, 1e8])
 def test_any_depth(depth: float) -> None:
-    """Of a deep slab only the skin is seen, of a thin one all of it; both to all digits."""
+    """Only the skin is seen of a deep slab, all of a thin one; both to all digits."""
     medium = Medium(absorption=0.25 * depth, scattering=0.75 * depth)
     _, ray = middle_ray()
     light = DirectionalLight((0, 0, -1), 1.0)
@@ -191,7 +191,7 @@ def test_round_solids_converge(name: str, light: Light) -> None:
 
 
 def ends(box: Box, origin: Array, direction: Array) -> tuple[float, float]:
-    """Where a ray enters a box and leaves it."""
+    """Distances at which a ray enters a box and leaves it."""
     at = np.sort((np.array([box.low, box.high]) - origin) / direction, axis=0)
     return float(at[0].max()), float(at[1].min())
 

@@ -81,7 +81,7 @@ def test_the_mean_on_a_line_is_its_integral(name: str, rng: np.random.Generator)
 
 
 def _cuts(a: float, b: float, voxels: int) -> list[float]:
-    """Where on a line the coordinate from a to b passes the centers of voxels."""
+    """Places on a line at which the coordinate from a to b passes the centers of voxels."""
     return [t for i in range(voxels) if a != b and 0 < (t := ((i + 0.5) / voxels - a) / (b - a)) < 1]
 
 

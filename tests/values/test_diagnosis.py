@@ -1,4 +1,4 @@
-"""What is wrong with hand-made meshes, and which are convex."""
+"""Diagnoses of hand-made meshes, and which are convex."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def broken(seed: int) -> Mesh:
 
 
 def counted(mesh: Mesh) -> dict[str, object]:
-    """What is wrong with a mesh, face by face and edge by edge."""
+    """Defects of a mesh, counted face by face and edge by edge."""
     first: dict[bytes, int] = {}
     ids = [first.setdefault((position + 0.0).tobytes(), i) for i, position in enumerate(mesh.vertices)]
     uses: defaultdict[tuple[int, int], list[int]] = defaultdict(list)

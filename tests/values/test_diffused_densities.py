@@ -68,7 +68,7 @@ def of_slab(density: Density, ior: float, side: float) -> tuple[BodyGrid, Array]
     ids=["linear", "linear, from the thin side", "hollow"],
 )
 def test_slabs_are_as_deep_as_their_optical_depth(density: Density, side: float) -> None:
-    """Where the density varies across alone, the optical depth tells all. Measured: .012 and less; even slabs: .007."""
+    """The optical depth tells all if the density varies across alone. Measured: .012 and less; even slabs: .007."""
     grid, leaving = of_slab(density, 1.5, side)
     middle = np.abs(grid.points[:, [0, 2]]).max(axis=1) < 1
     normal = side * grid.face_normals[:, 1]

@@ -316,7 +316,7 @@ def test_the_system_is_symmetric_and_positive() -> None:
 
 
 def test_fluence_is_positive() -> None:
-    """Of light on one side alone, whatever is absorbed."""
+    """Fluence of light on one side alone, whatever is absorbed."""
     grid = ball_grid(20)
     entering = np.where(grid.points[:, :1] > 0.9, 1.0, 0.0)
     found = lit(grid, tl.Medium(absorption=(0.01, 3.0, 300.0), scattering=(30.0, 30.0, 3.0), ior=1.5), entering).fluence
@@ -338,7 +338,7 @@ def test_channels_without_scattering_stay_dark() -> None:
 
 @pytest.mark.parametrize("anisotropy", [-0.5, 0.8])
 def test_anisotropy_counts_by_similarity(anisotropy: float) -> None:
-    """Where nothing is absorbed; else less light is turned back the more it is scattered ahead."""
+    """Similarity holds where nothing is absorbed; else less light is turned back the more it is scattered ahead."""
     grid = ball_grid(10)
     absorption = np.array([0.0, 0.1, 5.0])
     plain = lit(grid, tl.Medium(absorption, 5.0, ior=1.4)).fluence.mean(axis=0)

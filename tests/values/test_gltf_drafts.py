@@ -66,7 +66,7 @@ def printed(color: Any, g: float) -> np.ndarray:
     ],
 )
 def test_a_draft_is_read_by_its_own_formula(tmp_path: Path, extension: str, stated: Json, color: Any, g: float) -> None:
-    """That of volume_scatter leaves the anisotropy out of the color."""
+    """The formula of volume_scatter leaves the anisotropy out of the color."""
     medium = medium_of(box(tmp_path / "box.glb", **{extension: stated}))
     np.testing.assert_allclose(medium.extinction, EXTINCTION, rtol=1e-14)  # its meaning, not its value, changes
     np.testing.assert_allclose(albedo_of(medium), printed(color, g), atol=2e-5)  # six digits are printed
@@ -111,7 +111,7 @@ def test_how_well_the_color_is_that_of_a_thick_body(g: float, most: float) -> No
 
 
 def test_an_interface_makes_the_color_darker() -> None:
-    """Which both drafts leave out: 0.58 is seen as 0.33 behind the interface of glass."""
+    """Both drafts leave this out: 0.58 is seen as 0.33 behind the interface of glass."""
     (albedo,) = hulst_albedo([0.58])
     assert whole_shares(float(albedo), 1e5, 1.5)[0] == pytest.approx(0.58 - 0.2515, abs=1e-3)
 

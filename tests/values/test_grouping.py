@@ -1,4 +1,4 @@
-"""What is the same in a mesh, held against sorting whole rows."""
+"""Equal rows of a mesh, held against sorting whole rows."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def bare(albedo: float, anisotropy: float, ior: float = 1.0) -> tuple[Array, Arr
 
 @pytest.mark.parametrize(("albedo", "anisotropy"), [(0.5, 0.9), (0.9, 0.5), (0.99, 0.75), (0.9, -0.5)])
 def test_half_spaces_are_deep_slabs(albedo: float, anisotropy: float) -> None:
-    """Which are doubled layers, and have the values of van de Hulst's tables."""
+    """Deep slabs are doubled layers, and have the values of van de Hulst's tables."""
     for ior in (1.0, 1.33):
         deep = slabs.shares(albedo, 400.0, ior, anisotropy)[0]
         assert half_space_reflectance(albedo, ior, anisotropy) == pytest.approx(deep, abs=MODES)
@@ -79,7 +79,7 @@ def test_light_straight_on_comes_back_as_giovanelli_found() -> None:
 
 @pytest.mark.parametrize("anisotropy", [0.3, 0.8, -0.6])
 def test_rare_events_are_single(anisotropy: float) -> None:
-    """Of light that is scattered once: w p / (4 (mu + mu')) times 2 mu' (Chandrasekhar 1960, section 20)."""
+    """Light that is scattered once: w p / (4 (mu + mu')) times 2 mu' (Chandrasekhar 1960, section 20)."""
     albedo, around = 1e-7, math.pi * (np.arange(512) + 0.5) / 512
     cosine, weight, found = bare(albedo, anisotropy)
     level = np.sqrt(1 - cosine**2)
@@ -108,7 +108,7 @@ def test_modes_go_over_into_h(ior: float) -> None:
 
 
 def test_what_scatters_ahead_turns_back_less() -> None:
-    """Of media with the same reduced albedo, behind interfaces; and all is alike where nothing absorbs."""
+    """Media with the same reduced albedo, behind interfaces; and all is alike where nothing absorbs."""
     for ior in (1.33, 1.5):
         for reduced in (0.05, 0.5, 0.95):
             found = [

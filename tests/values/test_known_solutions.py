@@ -35,7 +35,7 @@ def test_mixed_lights_take_no_steps() -> None:
 
 
 def test_many_lights_are_no_worse_than_none_before() -> None:
-    """Those of long ago are dropped, one by one; what is dropped is found again."""
+    """Solutions of long ago are dropped, one by one; what is dropped is found again."""
     rng = np.random.default_rng(3)
     n = 40
     matrix = sparse.csr_array(np.diag(np.linspace(1.0, 50.0, n)) + 0.1)

@@ -110,7 +110,7 @@ def test_colors_of_vertices_are_linear(tmp_path: Path, values: Any, fields: Json
 
 
 def test_colors_stay_with_their_vertices(tmp_path: Path) -> None:
-    """Where a vertex has two colors, it stays two, and the mesh closed."""
+    """A vertex of two colors stays two, and the mesh closed."""
     colors = np.column_stack([(BOX.vertices + (1, 2, 3)) / (2, 4, 6), np.ones(8)])
     (item,) = colored(tmp_path, colors, {}).objects
     np.testing.assert_allclose(item.mesh.colors[:, :3], (item.mesh.vertices + (1, 2, 3)) / (2, 4, 6), atol=1e-7)

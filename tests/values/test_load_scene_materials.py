@@ -1,4 +1,4 @@
-"""What bodies, thin walls and opaque objects become of glTF materials, and what they lose."""
+"""Bodies, thin walls and opaque objects of glTF materials, and what they lose."""
 
 from __future__ import annotations
 

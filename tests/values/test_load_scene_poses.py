@@ -71,7 +71,7 @@ def test_arcs_are_those_of_another_library() -> None:
 
 
 def test_cubic_splines_follow_their_tangents() -> None:
-    """Of a cubic, the derivative as tangents gives the cubic itself."""
+    """The derivative of a cubic as tangents gives the cubic itself."""
     times = np.array([0.0, 0.5, 2.0])
     keys = np.stack([3 * times**2 - 1, times**3 - times, 3 * times**2 - 1], axis=1)[..., None]
     for t in (0.1, 0.5, 1.7):

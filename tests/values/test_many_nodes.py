@@ -35,7 +35,7 @@ def by_force(boxes: Any, matters: Any = None) -> tuple[int, int] | None:
 
 
 def some_boxes(random: np.random.Generator, count: int) -> Any:
-    """Of whole coordinates, so that many touch, some are flat, and some are equal."""
+    """Boxes of whole coordinates, so that many touch, some are flat, and some are equal."""
     low = random.integers(0, 6, (count, 3))
     return np.stack([low, low + random.integers(0, 3, (count, 3))], axis=1).astype(np.float64)
 

@@ -71,7 +71,7 @@ TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "measure_blender
 
 @pytest.fixture(scope="session")
 def blender() -> list[str]:
-    """How a script is started in Blender: by a Python that has its module, or by the program."""
+    """Command that starts a script in Blender: by a Python that has its module, or by the program."""
     if (command := TOOL["blender_command"]()) is None:
         pytest.skip(TOOL["ABSENT"])
     return list(command)

@@ -52,7 +52,7 @@ media = st.builds(
 
 
 def carried(medium: tl.Medium, target: str) -> tl.Medium:
-    """What a target holds of a medium."""
+    """Values that a target holds of a medium."""
     if FILES[target][2]:
         return medium
     return tl.Medium(absorption=medium.extinction, ior=medium.ior)

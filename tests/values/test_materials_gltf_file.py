@@ -174,7 +174,7 @@ def test_pieces_that_are_broken_are_refused(tmp_path: Path, change: Json, messag
 
 
 def test_a_glb_holds_its_images_wherever_they_were(two_boxes: Path, tmp_path: Path) -> None:
-    """Of a .glb with links, too, whose other chunks stay behind; the same bytes without their folder."""
+    """Images of a .glb with links, too, whose other chunks stay behind; the same bytes without their folder."""
     for folder in ("deep/model", "textures"):
         (tmp_path / folder).mkdir(parents=True)
     Image.new("RGB", (2, 1), (9, 8, 7)).save(tmp_path / "textures" / "a b.jpg")

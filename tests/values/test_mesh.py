@@ -1,4 +1,4 @@
-"""What a mesh says of itself: volume, bounds, normals, winding number; and what is none."""
+"""Properties of a mesh: volume, bounds, normals, winding number; and what is none."""
 
 from __future__ import annotations
 

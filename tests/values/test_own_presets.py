@@ -68,6 +68,11 @@ def test_own_presets_are_found_by_name_and_listed(folder: Path, run: Run) -> Non
     result = run("presets", "--group", "own")
     assert [line.split()[0] for line in result.out.splitlines()] == ["name", "green_mint"]
     assert "bad.toml" in result.err
+    (folder / "bad.toml").write_text("[tea]\nior = 1\n")
+    for name, words in (("bad", "yours cannot be read"), ("tea", "yours cannot be read"), ("cup", "are not all read")):
+        told = run("presets", "show", name).err
+        assert words in told
+        assert "bad.toml', line 1, [tea]; " in told
     assert run("presets", "--search", "red wine").out.splitlines()[1].startswith("merlot ")
     assert run("presets", "--group", "paper").code == run("presets", "--search", "paper bag").code == 2
 

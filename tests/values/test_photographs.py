@@ -133,6 +133,15 @@ def test_what_is_no_line_and_photographs_that_differ_are_told() -> None:
         assert words in few.warnings[0]
 
 
+@pytest.mark.parametrize("ior", [None, IOR])
+def test_steps_that_are_named_in_reverse_are_told(ior: float | None) -> None:
+    reverse = [(where, float(d)) for (where, _), d in zip(PATCHES, STEPS[::-1], strict=True)]
+    with pytest.raises(
+        tl.InputError, match=r"every channel is brighter where it is thicker.*in their order from the left"
+    ):
+        fit_photographs([Photograph(photograph(np.random.default_rng(3)), WHITE, reverse)], ior)
+
+
 def test_patches_are_steps_or_a_wedge() -> None:
     assert parse_patches("1,2,30,4=2mm") == [((1, 2, 30, 4), 0.002)]
     assert parse_patches("0,5,300,20=1mm,2,4mm", "cm") == [

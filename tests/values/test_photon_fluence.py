@@ -64,7 +64,7 @@ def test_haze_below_a_ball_has_the_light_of_its_rays(light: Any, lamp: float | N
 
 
 def test_a_body_has_what_its_interface_lets_in() -> None:
-    """Of a ball's light, by Fresnel, as flux at its samples: around the focus, and in all."""
+    """Light in a ball, by Fresnel, as flux at its samples: around the focus, and in all."""
     milk = tl.Object(Box((-2, -3, -2), (2, -1.5, 2)).tessellate(), tl.Medium(scattering=9.0, ior=1.33))
     photons = bent_light(scene(GLASS, milk), tl.Caustics(1), {}, (1,)).entering[1]
     flux, distance, cosine = ball_parts(1.5, 1.5, rays=20_000)
@@ -105,7 +105,7 @@ def test_no_light_is_lost() -> None:
 
 
 def test_media_that_overlap_take_their_shares() -> None:
-    """Where two fogs add up, each sees the light that both have left; where one displaces the other, it alone does."""
+    """Two fogs that add up each see the light that both have left; one that displaces the other sees it alone."""
     first = tl.Object(Box((-1, -3, -1), (1, -1, 1)).tessellate(), tl.Medium(scattering=0.5))
     other = tl.Object(Box((-1, -2, -1), (1, -1, 1)).tessellate(), tl.Medium(absorption=0.25), priority=1)
     prism = tl.Object(Box((-1, 0, -1), (1, 1, 1)).tessellate(), tl.Medium(ior=1.5), priority=2)

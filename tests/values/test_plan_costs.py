@@ -1,4 +1,4 @@
-"""What plans cost, and that the planner picks the cheapest of the exact ones."""
+"""Costs of plans: the planner picks the cheapest of the exact ones."""
 
 from __future__ import annotations
 

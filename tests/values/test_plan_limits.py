@@ -1,4 +1,4 @@
-"""Where a plan is not exact, and says so: bodies that are not closed, and effects that are left out."""
+"""Limits of plans that are not exact, and say so: bodies that are not closed, and effects that are left out."""
 
 from __future__ import annotations
 

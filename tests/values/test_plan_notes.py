@@ -1,4 +1,4 @@
-"""What plans say has types: names of passes, and kinds of notes, that no program has to read sentences for."""
+"""Types of what plans say: names of passes, and kinds of notes, so that no program has to read sentences for."""
 
 from __future__ import annotations
 

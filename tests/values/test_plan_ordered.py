@@ -1,4 +1,4 @@
-"""What each method makes of every kind of scene and machine, and how far it reaches."""
+"""Passes of each method for every kind of scene and machine, and how far it reaches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the planner refuses."""
+"""Refusals of the planner."""
 
 from __future__ import annotations
 

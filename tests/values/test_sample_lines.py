@@ -1,4 +1,4 @@
-"""Whether a surface is inside out somewhere, by winding numbers along sample lines."""
+"""Surfaces that are inside out somewhere, found by winding numbers along sample lines."""
 
 from __future__ import annotations
 

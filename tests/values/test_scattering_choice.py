@@ -1,4 +1,4 @@
-"""How the planner shows light that is scattered many times: in which bodies it diffuses, which are layers, and why."""
+"""Ways to show light that is scattered many times: in which bodies it diffuses, which are layers, and why."""
 
 from __future__ import annotations
 

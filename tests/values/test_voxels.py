@@ -106,7 +106,7 @@ def test_mirrored_bodies_have_the_same_cells() -> None:
 
 
 def test_centroids() -> None:
-    """Of the whole, by those of the cells; of each cell, within it; of whole cells, their middle."""
+    """The centroid of the whole, by those of the cells; of each cell, within it; of whole cells, their middle."""
     found = cut(BALL)
     center = (found.inside[..., None] * found.center).sum(axis=(0, 1, 2)) / found.inside.sum()
     moment = 4 * ball_off(1.0) / BALL.volume  # first moments are over distances up to the radius, with both signs
@@ -162,7 +162,7 @@ def test_open_faces_and_the_boundary_close_each_cell(mesh: tl.Mesh) -> None:
 
 
 def test_open_faces_are_plane_sections() -> None:
-    """Of a ball: pi (R^2 - z^2)."""
+    """Sections of a ball: pi (R^2 - z^2)."""
     found = cut(BALL)
     for axis in range(3):
         sections = found.open_area[axis].sum(axis=tuple({0, 1, 2} - {axis})) * STEP**2

@@ -118,12 +118,12 @@ def _share(key: str, text: str) -> float:
 
 
 def has_parts(job: Job) -> bool:
-    """Whether the objects of the model are baked one by one, and not as one mesh."""
+    """True if the objects of the model are baked one by one, and not as one mesh."""
     return Path(job["model"]).suffix.lower() in SUFFIXES and (stays_gltf(job) or not job.get("vertices"))
 
 
 def stays_gltf(job: Job) -> bool:
-    """Whether the output is a copy of the model's glTF file."""
+    """True if the output is a copy of the model's glTF file."""
     return Path(job["output"]).suffix.lower() == ".glb" and Path(job["model"]).suffix.lower() in SUFFIXES
 
 
@@ -156,7 +156,7 @@ def _parts(path: Path, allow_outside: bool) -> list[bytes]:
 
 
 def is_done(job: Job, content: str) -> bool:
-    """Whether the job's files exist, complete and with this content."""
+    """True if the job's files exist, complete and with this content."""
     output = Path(job["output"])
     record = read_record(output)
     return (

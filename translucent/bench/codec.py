@@ -207,7 +207,7 @@ class _Strict(Converter):
 
 
 def _is_of(origin: Any, kind: Any) -> bool:
-    """Whether a type is a generic one with arguments, such as ``tuple[int, ...]`` of ``tuple``."""
+    """True if a type is a generic one with arguments, such as ``tuple[int, ...]`` of ``tuple``."""
     return get_origin(kind) is origin
 
 

@@ -41,7 +41,7 @@ class Change:
 
     @property
     def worse(self) -> bool:
-        """Whether the change is for the worse."""
+        """True if the change is for the worse."""
         return self.kind not in ("faster", "more accurate")
 
     def __str__(self) -> str:

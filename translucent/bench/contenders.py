@@ -96,7 +96,7 @@ class Contender:
 
     @property
     def fitted(self) -> bool:
-        """Whether its thickness, in solids, is chosen to fit the truth best."""
+        """True if its thickness, in solids, is chosen to fit the truth best."""
         return self.technique in ("constant", "ball") or self.method.makes_sheets
 
     def refusal(self, scene: Scene) -> str | None:

@@ -290,7 +290,7 @@ class OfEngine:
 
 
 def is_software(renderer: Renderer) -> bool:
-    """Whether OpenGL runs on a software rasterizer."""
+    """True if OpenGL runs on a software rasterizer."""
     return "software" in renderer.provenance["renderer"]
 
 

@@ -43,7 +43,7 @@ def mark_frontier(rows: Sequence[Row], quantity: Quantity) -> tuple[Row, ...]:
 
 
 def beats(one: Row, other: Row, quantity: Quantity) -> bool:
-    """Whether one row is clearly better in time or error, and not clearly worse in the other.
+    """True if one row is clearly better in time or error, and not clearly worse in the other.
 
     A row that marks pixels as not to be trusted leaves a part of the picture out: it beats none that marks fewer.
     """

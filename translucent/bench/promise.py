@@ -61,6 +61,6 @@ def promise_of(contender: Contender, plan: RenderPlan, scene: Scene, quantity: Q
 
 
 def _shines(body: Object) -> bool:
-    """Whether steps through the body add up any light."""
+    """True if steps through the body add up any light."""
     medium = body.medium
     return medium is not None and (medium.emits or medium.scatters or body.density is not None)

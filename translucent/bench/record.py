@@ -251,7 +251,7 @@ class Claim:
 
     @property
     def undecided(self) -> bool:
-        """Whether there are numbers whose noise leaves the claim open."""
+        """True if there are numbers whose noise leaves the claim open."""
         return self.held is None and self.measured.startswith("undecided")
 
 

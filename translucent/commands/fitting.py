@@ -56,7 +56,7 @@ def fit_options(command: Any) -> Any:
 
 
 def is_table(fits: tuple[Path, ...]) -> bool:
-    """Whether --fit names a table, as against photographs."""
+    """True if --fit names a table, as against photographs."""
     return any(one.suffix.lower() in TABLES for one in fits)
 
 

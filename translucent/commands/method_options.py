@@ -50,7 +50,7 @@ def caustics_option(command: F) -> F:
     """Option for photons from lights through interfaces onto opaque objects."""
     told = (
         "Let N photons carry the light of lamps through interfaces onto opaque objects, into fog, wax and milk. "
-        "Default: none; without N: a million. Four times as many halve the noise."
+        "Default: none; without N: a million; at most 2^30. Four times as many halve the noise."
     )
     return click.option("--caustics", type=int, is_flag=False, flag_value=1_000_000, metavar="[N]", help=told)(command)
 

@@ -72,7 +72,7 @@ class FileLook(NamedTuple):
 
 
 def is_scene_file(model: str) -> bool:
-    """Whether MODEL is a glTF file, which holds a scene; all others hold one mesh."""
+    """True if MODEL is a glTF file, which holds a scene; all others hold one mesh."""
     from translucent.gltf.load import SUFFIXES
 
     return Path(model).suffix.lower() in SUFFIXES
@@ -210,7 +210,7 @@ def require_translucent(model: str, scene: Scene) -> None:
 
 
 def is_own(model: str) -> bool:
-    """Whether MODEL is a mesh that comes with the toolkit, and no file of the same name."""
+    """True if MODEL is a mesh that comes with the toolkit, and no file of the same name."""
     from translucent.assets import mesh_names
 
     return not os.path.lexists(model) and model in mesh_names()

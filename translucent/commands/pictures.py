@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 #: Pixels from which on a picture is rendered in tiles.
 LARGE = 1 << 23
 
+#: Width and height up to which OpenGL draws a picture at once, and pixels of the largest picture.
+MOST_SIDE, MOST_PIXELS = 1 << 14, 1 << 30
+
+#: Bytes of memory that each pixel of a picture takes that is not rendered in tiles, at least: its arrays, read back.
+_PIXEL_BYTES = 100
+
 #: Width and height within which a large picture is looked at as a whole.
 SMALL = 512
 
@@ -39,8 +45,9 @@ class Pictures(NamedTuple):
     aov: Path | None
 
     def tiled(self, size: tuple[int, int]) -> bool:
-        """Whether a picture of this size is so large that it is rendered and written in tiles."""
-        return size[0] * size[1] > LARGE and self.turntable is None and self.output.suffix.lower() != ".npz"
+        """True if a picture of this size is so large that it is rendered and written in tiles."""
+        large = size[0] * size[1] > LARGE or max(size) > MOST_SIDE
+        return large and self.turntable is None and self.output.suffix.lower() != ".npz"
 
     def check(self, size: tuple[int, int]) -> None:
         """Raise before any work is done if pictures of this size could not be written."""
@@ -50,6 +57,7 @@ class Pictures(NamedTuple):
         from translucent.frames.writing import check_output
 
         check_exposure(self.exposure)
+        self._check_size(size)
         if self.aov is not None and self.tiled(size):
             found = f"{size[0]}x{size[1]} pixels, which are written in tiles"
             raise InputError(f"--aov {str(self.aov)!r}", found, "write an .exr, which holds these quantities")
@@ -61,6 +69,19 @@ class Pictures(NamedTuple):
         check_animation(self.output, self.fps)
         if self.aov is not None:
             raise InputError(f"--turntable {self.turntable}", "--aov is given, too", "render one picture for it")
+
+    def _check_size(self, size: tuple[int, int]) -> None:
+        """Raise if nobody could wait for pictures of this size, or memory could not hold them."""
+        from translucent.files.memory import require_memory
+
+        asked, pixels = f"--size {size[0]}x{size[1]}", size[0] * size[1]
+        if pixels > MOST_PIXELS:
+            found = f"{pixels / 1e6:.0f} million pixels, and {MOST_PIXELS / 1e6:.0f} million are the most"
+            raise InputError(asked, found, "give a smaller size, at most about 32768x32768")
+        if not self.tiled(size):
+            do = "give a smaller size" if self.turntable else "give a smaller size, or write an .exr or .png, in tiles"
+            found = f"{pixels / 1e6:.0f} million pixels at once"
+            require_memory(asked, found, _PIXEL_BYTES * pixels, do)
 
     def write(self, scene: Scene, draw: Callable[[Scene], Frame]) -> Frame:
         """Draw and write all of them; returns the first frame."""

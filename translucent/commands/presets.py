@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -59,6 +60,8 @@ def _listed(group: str | None, search: str | None) -> list[Preset]:
         if not chosen:
             raise InputError(f"--group {group!r}", "no group is called so", f"use one of {', '.join(groups)}")
         found = {one.name: one for one in chosen}
+    if search is not None and not re.search(r"[^\W_]", search):
+        raise InputError(f"--search {search!r}", "no letters or digits", "give words, such as wine")
     if search is not None and not (found := matching(found, search)):
         which = "no preset" if group is None else f"no preset of --group {group!r}"
         raise InputError(f"--search {search!r}", f"{which} has these words", "use fewer, or see 'translucent presets'")
@@ -149,7 +152,7 @@ def _coefficients(per_metre: Iterable[float]) -> str:
 
 
 def _colorful() -> bool:
-    """Whether colors can be shown: on a terminal, unless it is a dumb one or NO_COLOR asks for none."""
+    """True if colors can be shown: on a terminal, unless it is a dumb one or NO_COLOR asks for none."""
     return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 

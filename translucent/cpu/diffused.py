@@ -24,7 +24,7 @@ class DiffusedLight:
         self._fields = dict(fields)
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
+        """True if there is any."""
         return bool(self._fields)
 
     def leaves(self, before: Integers, after: Integers) -> Mask:

@@ -66,7 +66,7 @@ class Picture:
 
     @property
     def perspective(self) -> bool:
-        """Whether the rays meet in the eye."""
+        """True if the rays meet in the eye."""
         return self.camera.fov_y is not None
 
     def bands(self) -> Iterator[Band]:

@@ -59,7 +59,7 @@ class ProjectedObject:
 
     @cached_property
     def any_passing(self) -> bool:
-        """Whether any faces are `passing`."""
+        """True if any faces are `passing`."""
         return bool(self.passing.any())
 
     @cached_property

@@ -43,7 +43,7 @@ class Fields:
     volumes: dict[int, VolumeField]
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
+        """True if there is any."""
         return bool(self.surfaces or self.volumes)
 
 
@@ -91,7 +91,7 @@ class FieldCache:
             return _kept(self._scenes, key, make, KEPT_SCENES)
 
     def has(self, key: Hashable) -> bool:
-        """Whether the light of this `diffusion_key` is known."""
+        """True if the light of this `diffusion_key` is known."""
         return key in self._scenes
 
     def clear(self) -> None:

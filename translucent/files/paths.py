@@ -85,7 +85,7 @@ def require_folder(path: Path, asked: str) -> None:
 
 
 def same_file(one: Path, other: Path) -> bool:
-    """Whether both paths name one existing file: directly, or through links of either kind."""
+    """True if both paths name one existing file: directly, or through links of either kind."""
     try:
         return os.path.samefile(one, other)
     except (OSError, ValueError):

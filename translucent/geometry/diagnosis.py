@@ -98,12 +98,12 @@ class Diagnosis:
 
     @property
     def inside_out(self) -> bool:
-        """Whether a part, or a lobe of one, is inside out."""
+        """True if a part, or a lobe of one, is inside out."""
         return self.inside_out_parts > 0 or self.negative_winding
 
     @property
     def sound(self) -> bool:
-        """Whether the mesh is solid and nowhere inside out: exits minus entries is the thickness along every ray."""
+        """True if the mesh is solid and nowhere inside out: exits minus entries is the thickness along every ray."""
         return self.solid and not self.inside_out
 
     @property
@@ -212,7 +212,7 @@ class _Edges:
 
 
 def _is_convex(vertices: Array, faces: npt.NDArray[np.integer], edges: _Edges | None, orientation: float) -> bool:
-    """Whether all edges of one closed component are convex; with genus 0 that means a convex body."""
+    """True if all edges of one closed component are convex; with genus 0 that means a convex body."""
     if orientation == 0:
         return False
     faces = faces if edges is None else edges.faces
@@ -227,7 +227,7 @@ def _is_convex(vertices: Array, faces: npt.NDArray[np.integer], edges: _Edges | 
 
 
 def _all_convex(vertices: Array, faces: npt.NDArray[np.integer], sides: SortedSides, orientation: float) -> bool:
-    """Whether the edges that have two of these sides are convex."""
+    """True if the edges that have two of these sides are convex."""
     low, high = extent(vertices[use_mask(faces, len(vertices))])
     # Files keep float32, so flat patches and fine tessellations scatter by some 1e-7 of the size.
     dent = CONVEX_TOLERANCE * float((high - low).max())

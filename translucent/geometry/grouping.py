@@ -98,7 +98,7 @@ class SortedSides:
 
     @property
     def paired(self) -> bool:
-        """Whether every edge has two sides, which run along it in opposite directions."""
+        """True if every edge has two sides, which run along it in opposite directions."""
         if len(self.edge) % 2:
             return False
         one, other = self.edge[::2], self.edge[1::2]
@@ -306,7 +306,7 @@ def extent(points: Array) -> Array:
 
 
 def _begins(changes: Mask) -> Integers:
-    """Where groups of sorted elements begin, from where the next element differs."""
+    """Beginnings of groups of sorted elements, from where the next element differs."""
     return np.concatenate([[0], np.flatnonzero(changes) + 1])
 
 

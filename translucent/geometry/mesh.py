@@ -172,7 +172,7 @@ class Mesh(Frozen):
         return winding_number(self.vertices[self.faces], point)
 
     def is_near(self, point: npt.ArrayLike, distance: float) -> bool:
-        """Whether the surface comes within `distance` metres of `point`."""
+        """True if the surface comes within `distance` metres of `point`."""
         from trimesh.triangles import closest_point
 
         corners, target = self.vertices[self.faces], np.asarray(point, dtype=np.float64)

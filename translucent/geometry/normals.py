@@ -98,7 +98,7 @@ def keep_drawn_normals(mesh: Mesh, normals: npt.NDArray[np.floating]) -> None:
 
 
 def has_drawn_normals(mesh: Mesh) -> bool:
-    """Whether `drawn_normals` have been made."""
+    """True if `drawn_normals` have been made."""
     return mesh in _drawn
 
 

@@ -31,7 +31,7 @@ _SAMPLE = 3000
 
 
 def all_apart(vertices: Vertices, distance: float) -> bool:
-    """Whether no two vertices are within a distance of each other; all have to be finite."""
+    """True if no two vertices are within a distance of each other; all have to be finite."""
     sample = vertices[:_SAMPLE]
     return len(equal_rows(sample).first) == len(sample) and len(near_points(vertices, distance)) == 0
 

@@ -26,7 +26,7 @@ _TURNS = np.stack([_AXES, _AXES[:, [1, 2, 0]], _AXES[:, [2, 0, 1]]])
 
 
 def winds_negatively(vertices: Array, faces: npt.NDArray[np.integer]) -> bool:
-    """Whether a sample line crosses a place around which the surface winds a negative number of times.
+    """True if a sample line crosses a place around which the surface winds a negative number of times.
 
     A closed surface that does not cross itself never does, unless a part of it is inside out; nor does one that only
     overlaps itself. Lines that enter and leave unequally often tell nothing, and are left out.
@@ -74,7 +74,7 @@ def _near_lines(scaled: Array, faces: npt.NDArray[np.integer], lines: int) -> In
 
 
 def _winds_below_zero(line: Integers, height: Array, sign: Integers) -> bool:
-    """Whether a balanced line winds negatively for longer than rounding explains."""
+    """True if a balanced line winds negatively for longer than rounding explains."""
     if len(line) == 0:
         return False
     order = np.lexsort((height, line))

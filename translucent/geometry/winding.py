@@ -112,7 +112,7 @@ def _is_cavity(corners: Array, part: npt.NDArray[np.signedinteger[Any]], low: Ar
 def _balanced_parts(
     faces: npt.NDArray[np.integer], part: npt.NDArray[np.signedinteger[Any]], count: int
 ) -> npt.NDArray[np.bool_]:
-    """Whether every directed edge of a part has its opposite."""
+    """True if every directed edge of a part has its opposite."""
     sides = sorted_sides(faces)
     unbalanced = np.zeros(count, dtype=bool)
     if not sides.paired:

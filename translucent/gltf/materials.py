@@ -122,7 +122,7 @@ class GltfMaterial:
 
     @property
     def has_thickness_texture(self) -> bool:
-        """Whether a texture scales the thickness."""
+        """True if a texture scales the thickness."""
         return self.thickness_texture is not None
 
     @property
@@ -257,7 +257,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
 
 
 def _lets_light_in(extensions: Json) -> bool:
-    """Whether light may enter by another way than transmission: diffusely, or by an extension that is not known."""
+    """True if light may enter by another way than transmission: diffusely, or by an extension that is not known."""
     return any(
         key == DIFFUSE_TRANSMISSION or (not key.startswith("KHR_") and key not in EXCLUDED) for key in extensions
     )

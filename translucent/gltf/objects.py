@@ -155,7 +155,7 @@ def _fitting(surface: Surface | None, mesh: Mesh, left_out: LeftOut) -> Surface 
 
 
 def _has_metal(surface: Surface, mesh: Mesh) -> bool:
-    """Whether a vertex is on metal; a metallicFactor alone does not tell, since its default is 1 for glass, too."""
+    """True if a vertex is on metal; a metallicFactor alone does not tell, since its default is 1 for glass, too."""
     if surface.metallic == 0 or surface.roughness_texture is None or mesh.uv is None:
         return False
     return bool((surface.roughness_texture.sample(mesh.uv)[:, 2] > _METAL).any())

@@ -95,7 +95,7 @@ def _embedded_images(file: GltfFile, binary: bytearray) -> dict[int, tuple[int, 
 
 
 def is_link(holder: Json) -> bool:
-    """Whether a buffer or an image is a file beside the glTF file."""
+    """True if a buffer or an image is a file beside the glTF file."""
     uri = holder.get("uri")
     return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
 

@@ -110,7 +110,7 @@ class Finish:
 
     @property
     def translucent(self) -> bool:
-        """Whether light passes the object."""
+        """True if light passes the object."""
         return self.medium is not None or self.wall_ior is not None
 
     def wall_medium(self, thickness: float) -> Medium:
@@ -280,7 +280,7 @@ class _Reader:
         return cutoff
 
     def _hidden(self) -> bool:
-        """Whether alpha is below the cutoff everywhere."""
+        """True if alpha is below the cutoff everywhere."""
         return self.entry.get("alphaMode") == "MASK" and bool(self.base_color[3] < self._alpha_cutoff())
 
     def _extension(self, name: str) -> Json:

@@ -116,7 +116,7 @@ class AdaptiveSampling:
 
 
 def is_adaptive(job: FrameJob, samples: int) -> bool:
-    """Whether rays need not be traced for every sample of a job: from smooth interfaces alone, and not from the eye."""
+    """True if rays need not be traced for every sample of a job: from smooth interfaces alone, and not from the eye."""
     surfaces = [body.surface for body in job.scene.bodies if body.surface is not None]
     return (
         samples >= FEW_SAMPLES

@@ -89,7 +89,7 @@ class GpuContext:
 
     @property
     def owned(self) -> bool:
-        """Whether the context was made here, and is released here."""
+        """True if the context was made here, and is released here."""
         return self.backend != "adopted"
 
     @property

@@ -61,7 +61,7 @@ class Convergence:
 
     @property
     def done(self) -> bool:
-        """Whether more paths would change nothing to be seen."""
+        """True if more paths would change nothing to be seen."""
         return self.paths >= MOST_PATHS or self.error < QUIET
 
     def step(self, seconds: float) -> bool:

@@ -26,7 +26,7 @@ class Part:
     top: int
 
     def __bool__(self) -> bool:
-        """Whether it has any pixels."""
+        """True if it has any pixels."""
         return self.right > self.left and self.top > self.bottom
 
     @property
@@ -39,7 +39,7 @@ class Part:
         return Part(self.left, height - self.top, self.right, height - self.bottom)
 
     def rows(self, first: int, last: int) -> Part:
-        """Those of its rows from `first` on that are before `last`."""
+        """The part of its rows from `first` on that are before `last`."""
         return Part(self.left, max(self.bottom, first), self.right, min(self.top, last))
 
     def rest(self, size: tuple[int, int]) -> tuple[Part, ...]:

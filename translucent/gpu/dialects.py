@@ -1,4 +1,4 @@
-"""What a lifted shader begins with: its version of GLSL, and what that version has to be told."""
+"""The head of a lifted shader: its version of GLSL, and what that version has to be told."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ class DiffusionCache:
         return self._last
 
     def has(self, key: Hashable) -> bool:
-        """Whether the light of this `diffusion_key` is known."""
+        """True if the light of this `diffusion_key` is known."""
         return self._fields.has(key)
 
     def solve(self, scene: Scene, diffusion: Diffusion, caustics: Caustics | None = None) -> None:

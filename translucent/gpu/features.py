@@ -32,57 +32,57 @@ class FrameFeatures:
 
     @property
     def has_opaque(self) -> bool:
-        """Whether rays may end on an opaque surface."""
+        """True if rays may end on an opaque surface."""
         return self.plan.has(PassName.OPAQUE, PassName.BACKDROP)
 
     @property
     def has_shadow_maps(self) -> bool:
-        """Whether opaque objects look up what reaches them of lights."""
+        """True if opaque objects look up what reaches them of lights."""
         return self.plan.has(PassName.SHADOW_MAPS)
 
     @property
     def shadows_backdrop(self) -> bool:
-        """Whether bodies throw shadows onto a picture that is drawn elsewhere."""
+        """True if bodies throw shadows onto a picture that is drawn elsewhere."""
         return self.has_shadow_maps and self.plan.has(PassName.BACKDROP)
 
     @property
     def has_surfaces(self) -> bool:
-        """Whether any body has an interface that changes light."""
+        """True if any body has an interface that changes light."""
         return self.plan.has(PassName.SURFACES, PassName.TRACED)
 
     @property
     def has_layers(self) -> bool:
-        """Whether layers are drawn over the picture, or interfaces emit light."""
+        """True if layers are drawn over the picture, or interfaces emit light."""
         return self.plan.has(PassName.LAYERS)
 
     @property
     def accumulates(self) -> bool:
-        """Whether path lengths are accumulated without order, by the method or through sheets."""
+        """True if path lengths are accumulated without order, by the method or through sheets."""
         return not self.plan.ordered or self.plan.has(PassName.THIN_LAYER)
 
     @property
     def has_fallback(self) -> bool:
-        """Whether pixels with unbalanced counts take their path length from another target."""
+        """True if pixels with unbalanced counts take their path length from another target."""
         return self._fills("fallback")
 
     @property
     def has_unlit(self) -> bool:
-        """Whether pixels are marked invalid where bodies scatter light that is not followed."""
+        """True if pixels are marked invalid where bodies scatter light that is not followed."""
         return self._fills("unlit")
 
     @property
     def scatters(self) -> bool:
-        """Whether light from the lights is scattered into the rays."""
+        """True if light from the lights is scattered into the rays."""
         return self.plan.has(PassName.LIGHT_VIEWS)
 
     @property
     def varies(self) -> bool:
-        """Whether media, or the light in them, vary from place to place."""
+        """True if media, or the light in them, vary from place to place."""
         return self.scene.varies or self.scatters_again
 
     @property
     def scatters_again(self) -> bool:
-        """Whether light that was scattered before is scattered into the rays."""
+        """True if light that was scattered before is scattered into the rays."""
         return bool(self.plan.given_back.volumes)
 
     @property
@@ -98,42 +98,42 @@ class FrameFeatures:
 
     @property
     def one_interface(self) -> bool:
-        """Whether only the first interface on each ray is drawn, and not the one where the ray leaves."""
+        """True if only the first interface on each ray is drawn, and not the one where the ray leaves."""
         return self.plan.interfaces is not None and not self.plan.interfaces.finds_exits
 
     @property
     def traced(self) -> bool:
-        """Whether rays are traced from the first interface on."""
+        """True if rays are traced from the first interface on."""
         return self.plan.has(PassName.TRACED)
 
     @property
     def dims_interfaces(self) -> bool:
-        """Whether rays find what bodies keep of the lights on interfaces, their highlights and paint."""
+        """True if rays find what bodies keep of the lights on interfaces, their highlights and paint."""
         return (self.traced or self.path_traced) and dims_interfaces(self.scene)
 
     @property
     def path_traced(self) -> bool:
-        """Whether radiance is that of random paths."""
+        """True if radiance is that of random paths."""
         return self.plan.has(PassName.PATH_TRACE)
 
     @property
     def has_caustics(self) -> bool:
-        """Whether photons light opaque objects."""
+        """True if photons light opaque objects."""
         return self.plan.has(PassName.CAUSTICS)
 
     @property
     def finds_exits(self) -> bool:
-        """Whether the intervals give each ray's first exit from all bodies: touching interfaces need it."""
+        """True if the intervals give each ray's first exit from all bodies: touching interfaces need it."""
         return self.has_surfaces and self.plan.method.finds_exits
 
     @property
     def marches(self) -> bool:
-        """Whether the method steps through the intervals."""
+        """True if the method steps through the intervals."""
         return self.plan.method.marches
 
     @cached_property
     def emits(self) -> bool:
-        """Whether any medium emits light."""
+        """True if any medium emits light."""
         return any(body.medium is not None and body.medium.emits for body in self.scene.bodies)
 
     @cached_property

@@ -236,7 +236,7 @@ def _fading(body: Object, scale: float) -> tuple[float, float, float]:
 
 
 def _decides(scene: Scene, body: Object) -> bool:
-    """Whether a body determines the index of refraction of the rays in it."""
+    """True if a body determines the index of refraction of the rays in it."""
     return body.medium is not None and (body.has_interface or scene.overlap == "priority")
 
 

@@ -179,7 +179,7 @@ class FrameJob(SceneView):
         return self.targets.surfaced() if apart else self.targets.result()
 
     def sums_after(self, name: str) -> bool:
-        """Whether the pass of this name adds a sample to the averages, in place of showing it."""
+        """True if the pass of this name adds a sample to the averages, in place of showing it."""
         return self.averaging and name == self.features.last_pass
 
     def accumulator(self, name: str = "accumulated") -> moderngl.Framebuffer:

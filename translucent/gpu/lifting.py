@@ -271,7 +271,7 @@ def _reached(parts: list[_Part]) -> list[_Part]:
 
 
 def _faces(part: _Part) -> bool:
-    """Whether a part is an input or output of a stage, which has to match the neighboring stage."""
+    """True if a part is an input or output of a stage, which has to match the neighboring stage."""
     return re.match(r"\s*(layout\s*\([^)]*\)\s*)?(flat\s+)?(in|out|invariant)\b", part.code) is not None
 
 

@@ -69,7 +69,7 @@ def keep_packed(mesh: Mesh, packed: PackedMesh) -> None:
 
 
 def has_packed(mesh: Mesh) -> bool:
-    """Whether `packed_mesh` has been made."""
+    """True if `packed_mesh` has been made."""
     return mesh in _packed
 
 

@@ -93,7 +93,7 @@ class PlacedScene:
 
     @property
     def starts_inside(self) -> bool:
-        """Whether rays may start inside a body."""
+        """True if rays may start inside a body."""
         return bool((self.expected_counts[:, 1] > 0).any())
 
     def camera_from_offset(self, camera: Camera) -> Array:

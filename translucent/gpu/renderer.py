@@ -282,7 +282,7 @@ class GpuRenderer:
 
     @property
     def interrupted(self) -> bool:
-        """Whether a frame was interrupted at an unknown point, as by Ctrl-C."""
+        """True if a frame was interrupted at an unknown point, as by Ctrl-C."""
         return self._interrupted
 
     def interrupt(self) -> None:

@@ -51,7 +51,7 @@ class ShadowView:
 
     @property
     def ends(self) -> bool:
-        """Whether opaque objects are in the way of some rays."""
+        """True if opaque objects are in the way of some rays."""
         return bool(self.opaque)
 
     def rows(self, center: Array) -> npt.NDArray[np.float64]:
@@ -217,7 +217,7 @@ class Seen:
     step: int = 1
 
     def fits(self, other: Seen, *, path_only: bool) -> bool:
-        """Whether maps of this are those of another; of one medium or two they are paths, whatever these absorb."""
+        """True if maps of this are those of another; of one medium or two they are paths, whatever these absorb."""
         return self.places == other.places and (self.media == other.media or (path_only and self.slots == other.slots))
 
 

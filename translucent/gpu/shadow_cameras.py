@@ -21,7 +21,7 @@ _BEHIND = 1e-6
 
 
 def holds_eye(item: Object, scene: Scene) -> bool:
-    """Whether the eye is in the bounds of an object, so that its inner side may be seen."""
+    """True if the eye is in the bounds of an object, so that its inner side may be seen."""
     low, high = item.bounds
     return bool((low <= scene.camera.eye).all() and (scene.camera.eye <= high).all())
 
@@ -154,7 +154,7 @@ class ShadowThrowers:
         return tuple(grounds)
 
     def _lights(self, ground: int, points: _Stack, others: Sequence[int]) -> bool:
-        """Whether an object shadows none of the others, whose corners are stacked; see `_lights_one`."""
+        """True if an object shadows none of the others, whose corners are stacked; see `_lights_one`."""
         item = self._scene.objects[ground]
         if len(item.mesh.faces) * len(points) > _MOST_PAIRS:
             return False
@@ -168,7 +168,7 @@ class ShadowThrowers:
         return all(others[k] == ground for k in np.flatnonzero(~lit).tolist())
 
     def _lights_one(self, ground: int, other: int) -> bool:
-        """Whether an object does not shadow another: that is before the lit sides of all its faces, or, of a convex
+        """True if an object does not shadow another: that is before the lit sides of all its faces, or, of a convex
         one that the eye is not in, of some face.
         """
         item = self._scene.objects[ground]
@@ -181,7 +181,7 @@ class ShadowThrowers:
         return other == ground or bool(self._ahead(points, sides.lit).all(axis=0).any())
 
     def _turns_once(self, item: Object) -> bool:
-        """Whether an object is convex, and seen from outside alone."""
+        """True if an object is convex, and seen from outside alone."""
         return item.mesh.diagnosis.convex and not holds_eye(item, self._scene)
 
     def _ahead(self, points: Array, planes: Array) -> Mask:

@@ -8,7 +8,10 @@ import moderngl
 
 
 class PassTimer:
-    """OpenGL timer queries by name; read after the frame, or a sample later, so that drawing does not wait for them."""
+    """OpenGL timer queries by name; read after the frame, or a sample later, so that drawing does not wait for them.
+
+    moderngl reads 32 bits of nanoseconds: a single draw that takes more than 4.295 s counts as that.
+    """
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl

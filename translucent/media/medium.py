@@ -189,12 +189,12 @@ class Medium(Frozen):
 
     @cached_property
     def emits(self) -> bool:
-        """Whether any channel emits."""
+        """True if any channel emits."""
         return bool(np.any(np.asarray(self.emission) > 0))
 
     @cached_property
     def scatters(self) -> bool:
-        """Whether any channel scatters."""
+        """True if any channel scatters."""
         return bool(np.any(np.asarray(self.scattering) > 0))
 
     def _key(self) -> tuple[object, ...]:

@@ -97,7 +97,7 @@ def _read(what: str, path: str | Path, do: str, per_pixel: int = 16) -> tuple[Im
 
 
 def _is_deep(image: ImageFile, data: bytes) -> bool:
-    """Whether an image has colors of 16 bits per channel, of which Pillow keeps 8."""
+    """True if an image has colors of 16 bits per channel, of which Pillow keeps 8."""
     from PIL import TiffImagePlugin
 
     if image.mode not in ("RGB", "RGBA"):

@@ -48,9 +48,11 @@ def preset(name: str) -> Preset:
     key = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     if key in known:
         return known[key]
-    own, _ = read_own_presets()
+    own, wrong = read_own_presets()
     if key in own:
         return own[key]
+    if broken := [error for error in wrong if _is_about(error, key)]:
+        raise InputError(f"preset {name!r}", "yours cannot be read", str(broken[0]))
     speaking = [one.name for one in _all().values() if _speaks_of(one, key)]
     close = close_names(key, [*_all(), *own]) or close_names(key, known) or speaking
     number = len(_all())
@@ -59,7 +61,8 @@ def preset(name: str) -> Preset:
         if close
         else f"use one of {', '.join(_WELL_KNOWN)} and {number - len(_WELL_KNOWN)} more, see 'translucent presets'"
     )
-    raise InputError(f"preset {name!r}", "not a known preset", do)
+    unread = f"; your own are not all read: {wrong[0]}" if wrong else ""
+    raise InputError(f"preset {name!r}", "not a known preset", f"{do}{unread}")
 
 
 @cache
@@ -77,6 +80,11 @@ def _words(one: Preset) -> list[str]:
     return re.findall(r"\w+", " ".join(parts).lower().replace("_", " "))
 
 
+def _is_about(error: InputError, key: str) -> bool:
+    """True where an own preset of this name is wrong: an entry, or the file called so."""
+    return re.search(rf"\[{key}\]|[/\\]{key}\.toml'", str(error)) is not None
+
+
 def _speaks_of(one: Preset, word: str) -> bool:
-    """Whether the note contains the word, as that of merlot contains wine."""
+    """True if the note contains the word, as that of merlot contains wine."""
     return len(word) >= LEAST_PART and word in re.findall(r"[a-z]+", one.note.lower())

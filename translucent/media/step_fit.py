@@ -26,6 +26,9 @@ SCATTER_LEVEL, DOUBT_LEVEL = 0.05, 0.01
 #: Share by which the slope has to change from thin to thick, or from photograph to photograph, to be spoken of.
 BEND, DISAGREEMENT = 0.1, 0.03
 
+#: Standard errors, and -log(T) from the thinnest step to the thickest, by which a channel clearly brightens.
+_CLEAR, _BRIGHTER = 3.0, 0.1
+
 #: Smallest relative error of a transmittance: that of numbers in float32.
 _FLOOR = 1e-6
 
@@ -159,10 +162,14 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
     Raises
     ------
     InputError
-        If no sample of a channel is left, or the index is none.
+        If no sample of a channel is left, or the index is none, or all channels brighten with thickness.
     """
     index = Medium(ior=1.0 if ior is None else ior).ior  # one that is none is refused before it is calculated with
-    found = [_fit_channel(photographs, channel, ior) for channel in range(3)]
+    channels = [_channel(photographs, channel, ior) for channel in range(3)]
+    if all(map(_brightens, channels)):
+        do = "give thicknesses in their order from the left of a patch, or from its top where that is the longer side"
+        raise InputError("fit to photographs", "every channel is brighter where it is thicker, as no plate is", do)
+    found = [_fit_channel(photographs, samples, number, ior) for number, samples in enumerate(channels)]
     sigma, error, interval, loss, chi2, samples = (np.array(row) for row in list(zip(*found, strict=True))[:6])
     warnings = [line for one in found for line in one[6]]
     warnings += [
@@ -175,12 +182,20 @@ def fit_steps(photographs: Sequence[Steps], ior: float | None = None) -> StepFit
     return StepFit(medium, error, interval, loss, chi2, samples, distance, tuple(dict.fromkeys(warnings)))
 
 
+def _brightens(samples: _Channel) -> bool:
+    """True where light clearly grows with thickness, whatever the faces keep back."""
+    if len(np.unique(samples.thickness)) < 2:
+        return False
+    line = samples.line(1, fixed=False)
+    gain = -line.best[0]
+    return bool(gain > _CLEAR * line.errors[0] and gain * np.ptp(samples.thickness) > _BRIGHTER)
+
+
 def _fit_channel(
-    photographs: Sequence[Steps], channel: int, ior: float | None
+    photographs: Sequence[Steps], samples: _Channel, channel: int, ior: float | None
 ) -> tuple[float, float, float, float, float, int, list[str]]:
     from scipy.special import chdtrc, stdtrit
 
-    samples = _channel(photographs, channel, ior)
     steps = len(np.unique(samples.thickness))
     fixed = ior is not None or steps == 1
     line = samples.line(1, fixed)

@@ -245,7 +245,7 @@ def _changed(body: Object, told: Json) -> Object:
 
 
 def _same(body: Object, told: Json) -> bool:
-    """Whether a body has what is shown, so that it need not be made anew."""
+    """True if a body has what is shown, so that it need not be made anew."""
     assert body.medium is not None
     roughness = 0.0 if body.surface is None else body.surface.roughness
     alike = np.allclose(body.medium.extinction, told["extinction"], rtol=1e-12, atol=0)
@@ -253,7 +253,7 @@ def _same(body: Object, told: Json) -> bool:
 
 
 def _is_preset(told: Json, name: str) -> bool:
-    """Whether a medium is that of a preset."""
+    """True if a medium is that of a preset."""
     found = named_preset(name)
     alike = np.allclose(told["extinction"], found.medium.extinction, rtol=1e-9, atol=0)
     return bool(alike) and (told["ior"], told["roughness"]) == (found.medium.ior, found.roughness)

@@ -29,12 +29,12 @@ def open_bodies(scene: Scene) -> tuple[int, ...]:
 
 
 def media_differ(scene: Scene) -> bool:
-    """Whether any two bodies have different media."""
+    """True if any two bodies have different media."""
     return any(not same_medium(scene.bodies[0], body) for body in scene.bodies[1:])
 
 
 def scatters(scene: Scene) -> bool:
-    """Whether any solid scatters, and the scene has lights."""
+    """True if any solid scatters, and the scene has lights."""
     media = (scene.objects[i].medium for i in solids_of(scene))
     return bool(scene.lights) and any(medium is not None and medium.scatters for medium in media)
 

@@ -47,7 +47,7 @@ def darkened(scene: Scene, bodies: frozenset[int]) -> Scene:
 
 
 def lit_by_photons(scene: Scene, solved: Iterable[int]) -> tuple[int, ...]:
-    """Those of bodies in which light diffuses, by their numbers, into which others bend some."""
+    """Bodies in which light diffuses, by their numbers, into which others bend some."""
     bending = opaque_to_shadows(scene)
     return tuple(i for i in solved if bending - {i})
 
@@ -123,7 +123,7 @@ def _names(scene: Scene, numbers: tuple[int, ...]) -> str:
 
 
 def _turns_light(body: Object) -> bool:
-    """Whether interfaces of an object bend or mirror light."""
+    """True if interfaces of an object bend or mirror light."""
     return body.medium is not None and body.has_interface and body.medium.ior != 1.0
 
 

@@ -73,7 +73,7 @@ def photon_aims(scene: Scene, center: Array, photons: int) -> list[PhotonAim]:
 
 
 def _displaces(scene: Scene, body: Object) -> bool:
-    """Whether a body without an interface of its own may have one where it displaces another."""
+    """True if a body without an interface of its own may have one where it displaces another."""
     if scene.overlap != "priority" or body.medium is None or body.sheet_thickness is not None:
         return False
     return any(other.has_interface and other.priority <= body.priority for other in scene.bodies if other is not body)

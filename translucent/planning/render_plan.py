@@ -96,12 +96,12 @@ class RenderPlan:
 
     @property
     def exact(self) -> bool:
-        """Whether all but what is `unmodelled` is exact for the meshes as given, up to float32."""
+        """True if all but what is `unmodelled` is exact for the meshes as given, up to float32."""
         return not self.limits
 
     @property
     def ordered(self) -> bool:
-        """Whether the method finds the intervals of each ray in their order."""
+        """True if the method finds the intervals of each ray in their order."""
         return self.method.ordered
 
     @property
@@ -115,11 +115,11 @@ class RenderPlan:
         return sum(step.cost for step in self.passes)
 
     def has(self, *names: PassName) -> bool:
-        """Whether the plan has a pass with one of these names."""
+        """True if the plan has a pass with one of these names."""
         return any(step.name in names for step in self.passes)
 
     def says(self, kind: NoteKind) -> bool:
-        """Whether the plan has a note of this kind among its limits or the effects that it does not model."""
+        """True if the plan has a note of this kind among its limits or the effects that it does not model."""
         return any(note.kind is kind for note in (*self.limits, *self.unmodelled))
 
     def summary(self) -> dict[str, object]:

@@ -82,7 +82,7 @@ def require_clear_priorities(scene: Scene) -> None:
 
 
 def same_medium(a: Object, b: Object) -> bool:
-    """Whether two bodies have the same medium, as far as thickness, absorption and emission go."""
+    """True if two bodies have the same medium, as far as thickness, absorption and emission go."""
     if a.medium is None or b.medium is None or a.medium is b.medium:
         return a.medium is b.medium
     return np.array_equal(a.medium.extinction, b.medium.extinction) and np.array_equal(

@@ -139,7 +139,7 @@ class _Window:
 
     @property
     def remembers(self) -> bool:
-        """Whether files opened lately, folders and the places of panels are read, and kept for the next window."""
+        """True if files opened lately, folders and the places of panels are read, and kept for the next window."""
         return self.script is None or self.script.remembers
 
     def params(self, size: tuple[int, int], scale: float) -> Any:

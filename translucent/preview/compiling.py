@@ -110,7 +110,7 @@ class Compiler:
         self.lane.start("", _guarded(work), then)
 
     def lacks_normals(self, scene: Scene, plans: Sequence[RenderPlan]) -> bool:
-        """Whether the context should wait for normals."""
+        """True if the context should wait for normals."""
         return self.ledger.postpones and bool(unsmoothed(scene, plans))
 
     def ask(

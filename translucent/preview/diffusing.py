@@ -25,7 +25,7 @@ class _Solving:
 
     @property
     def failed(self) -> bool:
-        """Whether it ended without any, or nobody wants to wait for it."""
+        """True if it ended without any, or nobody wants to wait for it."""
         return self.task.cancelled or self.task.error is not None
 
 

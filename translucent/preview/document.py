@@ -176,17 +176,17 @@ class Display:
 
     @property
     def converges(self) -> bool:
-        """Whether a still picture is path traced: there is one, and nothing beside it."""
+        """True if a still picture is path traced: there is one, and nothing beside it."""
         return self.converge and self.mode == "picture" and self.compare == "off"
 
     @property
     def follows_photons(self) -> bool:
-        """Whether photons light a still picture: one alone that is not path traced."""
+        """True if photons light a still picture: one alone that is not path traced."""
         return self.caustics and self.mode == "picture" and self.compare == "off" and not self.converge
 
     @property
     def pictured(self) -> bool:
-        """Whether pictures are on show, and neither quantities nor the reference, which are of the model alone."""
+        """True if pictures are on show, and neither quantities nor the reference, which are of the model alone."""
         return self.mode == "picture" and self.compare in ("off", "method")
 
 

@@ -18,7 +18,7 @@ class Loaded:
 
     @property
     def bare(self) -> bool:
-        """Whether the model is a mesh, and no scene of a file."""
+        """True if the model is a mesh, and no scene of a file."""
         return not hasattr(self.scene, "has_camera")
 
     @property

@@ -110,7 +110,7 @@ class Photons:
         return True
 
     def _media_known(self, scene: Scene, renderer: Renderer, lane: Lane) -> bool:
-        """Whether the light of photons in media is known, if there is any; else it is searched for."""
+        """True if the light of photons in media is known, if there is any; else it is searched for."""
         assert self.plan is not None
         back, caustics, cache = self.plan.given_back, self.plan.caustics, renderer.gpu.diffusion
         if not lit_by_photons(scene, (*back.volumes, *back.diffused)):
@@ -140,7 +140,7 @@ class Photons:
 
     @property
     def done(self) -> bool:
-        """Whether more photons would change nothing to be seen."""
+        """True if more photons would change nothing to be seen."""
         return not self.drawing and (self._in_picture >= MOST_PHOTONS or self._noise < QUIET)
 
     def take_over(self, viewport: Viewport, stride: int, samples: int) -> bool:

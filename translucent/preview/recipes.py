@@ -54,7 +54,7 @@ class Shot:
 
     @property
     def kept(self) -> bool:
-        """Whether the material is the one that ``translucent render`` gives the model by itself."""
+        """True if the material is the one that ``translucent render`` gives the model by itself."""
         return self.document.material == own_material(self.document.look, self.loaded)
 
     def object_name(self, number: int) -> str | None:
@@ -69,7 +69,7 @@ class Shot:
 
     @property
     def is_own(self) -> bool:
-        """Whether the model is one of the toolkit's own."""
+        """True if the model is one of the toolkit's own."""
         path = self.loaded.model.path
         return path in mesh_names() and not Path(path).exists()
 

@@ -105,7 +105,7 @@ class _Pickler(pickle.Pickler):
 
 
 def _stays(arrays: list[memoryview], array: pickle.PickleBuffer) -> bool:
-    """Whether an array stays in the text; if it is large, it is added to `arrays` instead."""
+    """True if an array stays in the text; if it is large, it is added to `arrays` instead."""
     raw = array.raw()
     if raw.nbytes >= LARGE:
         arrays.append(raw)

@@ -69,7 +69,7 @@ class Shelf:
 
     @property
     def busy(self) -> bool:
-        """Whether pictures are still to be made."""
+        """True if pictures are still to be made."""
         return bool(self._wanted) or self.lane.task is not None
 
     def begin_frame(self, idle: bool) -> None:

@@ -228,7 +228,7 @@ class Stage:
         return True
 
     def _traces_slowly(self, plan: RenderPlan | None) -> bool:
-        """Whether tracing interfaces is known to take too long for a picture that moves."""
+        """True if tracing interfaces is known to take too long for a picture that moves."""
         if plan is None or not plan.has(PassName.TRACED):
             return False
         return self._pace.known(plan) / COARSEST_TRACED**2 > BUDGET
@@ -277,7 +277,7 @@ class Stage:
         self.timings[side] = Timing(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def has_truth(self) -> bool:
-        """Whether the split shows the reference."""
+        """True if the split shows the reference."""
         return self._presenting.truth is not None
 
     def probe(self, x: int, y: int, side: int = 0) -> Probe | None:

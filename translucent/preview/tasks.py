@@ -50,12 +50,12 @@ class Task:
 
     @property
     def cancelled(self) -> bool:
-        """Whether the task is canceled."""
+        """True if the task is canceled."""
         return self._cancelled.is_set()
 
     @property
     def finished(self) -> bool:
-        """Whether the task has ended, in whichever way."""
+        """True if the task has ended, in whichever way."""
         return self._finished.is_set()
 
     @property
@@ -137,7 +137,7 @@ class Lane:
 
     @property
     def ended(self) -> bool:
-        """Whether the thread has ended."""
+        """True if the thread has ended."""
         return not self._thread.is_alive()
 
     def _run(self) -> None:

@@ -36,7 +36,7 @@ class Tracing:
         self._asked: tuple[Mesh, Task] | None = None
 
     def ready(self, scene: Scene, pool: Pool, lane: Lane) -> bool:
-        """Whether rays can be traced through all meshes at once; else what is missing is requested."""
+        """True if rays can be traced through all meshes at once; else what is missing is requested."""
         self.told = ""
         missing = [mesh for mesh in dict.fromkeys(item.mesh for item in scene.objects) if not _is_ready(mesh)]
         if not missing:

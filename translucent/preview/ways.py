@@ -63,7 +63,7 @@ class Ways:
         self.interfaces = None if not traced or self.traceable(workspace, scene) else SCREEN
 
     def traceable(self, workspace: Workspace, scene: Scene) -> bool:
-        """Whether rays can be traced through the meshes of the scene without making the window wait."""
+        """True if rays can be traced through the meshes of the scene without making the window wait."""
         return self._at_once or self._tracing.ready(scene, workspace.pool, workspace.lanes["trace"])
 
     def quick_shadows(self, scene: Scene) -> ShadowMaps | None:

@@ -292,7 +292,7 @@ class _Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether the worker process is there."""
+        """True if the worker process is there."""
         return self._process.is_alive()
 
     def status(self) -> int | None:

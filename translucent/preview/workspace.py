@@ -334,7 +334,7 @@ class Workspace:
 
     @property
     def ended(self) -> bool:
-        """Whether all work has ended."""
+        """True if all work has ended."""
         return all(lane.ended for lane in self.lanes.values())
 
     def _set(self, history: History) -> None:
@@ -395,6 +395,6 @@ class Workspace:
 
 
 def _lit_alike(first: Document, second: Document) -> bool:
-    """Whether two looks differ only in exposure and tone curve, before the same kind of backdrop."""
+    """True if two looks differ only in exposure and tone curve, before the same kind of backdrop."""
     developed = dataclasses.replace(first.look, exposure=second.look.exposure, tone=second.look.tone)
     return developed == second.look and first.display.pictured == second.display.pictured

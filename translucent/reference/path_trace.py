@@ -159,7 +159,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
 
 
 def _straight(scene: Scene) -> bool:
-    """Whether paths turn at nothing but events in media."""
+    """True if paths turn at nothing but events in media."""
     return not bends(scene) and all(body.sheet_thickness is None for body in scene.bodies)
 
 

@@ -25,7 +25,7 @@ BATCH = 1 << 16
 
 
 def bends(scene: Scene) -> bool:
-    """Whether any interface of the scene changes light, so that not all rays are straight."""
+    """True if any interface of the scene changes light, so that not all rays are straight."""
     return any(body.has_interface for body in scene.bodies)
 
 

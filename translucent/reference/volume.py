@@ -52,7 +52,7 @@ class Volume:
 
     @property
     def scatters(self) -> bool:
-        """Whether any medium scatters."""
+        """True if any medium scatters."""
         return bool((self.scattering > 0).any())
 
     def at(self, filling: Array, points: Array) -> Array:

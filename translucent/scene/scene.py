@@ -134,7 +134,7 @@ class Object(Frozen):
 
     @cached_property
     def has_interface(self) -> bool:
-        """Whether its interface changes light: refracts, reflects, tints or scatters it."""
+        """True if its interface changes light: refracts, reflects, tints or scatters it."""
         if self.medium is None or self.covers:
             return False
         return self.medium.ior != 1.0 or self.medium.gives_back or not self.plain
@@ -166,7 +166,7 @@ class Object(Frozen):
 
     @property
     def has_holes(self) -> bool:
-        """Whether the object is a thin sheet in which alpha may make holes."""
+        """True if the object is a thin sheet in which alpha may make holes."""
         return (
             self.sheet_thickness is not None
             and self.surface is not None
@@ -176,12 +176,12 @@ class Object(Frozen):
 
     @property
     def covers(self) -> bool:
-        """Whether the object is a partly transparent layer; see `Surface.opacity`."""
+        """True if the object is a partly transparent layer; see `Surface.opacity`."""
         return self.surface is not None and self.surface.opacity is not None
 
     @property
     def plain(self) -> bool:
-        """Whether neither its surface nor its vertex colors change light that passes."""
+        """True if neither its surface nor its vertex colors change light that passes."""
         return self.surface is None or (self.surface.plain and self.mesh.colors is None)
 
     @property
@@ -191,12 +191,12 @@ class Object(Frozen):
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether the transform reverses the winding."""
+        """True if the transform reverses the winding."""
         return bool(np.linalg.det(self.matrix[:3, :3]) < 0)
 
     @cached_property
     def faces_inwards(self) -> bool:
-        """Whether the faces, as drawn, face into the body: mirrored, or inverted, but not both."""
+        """True if the faces, as drawn, face into the body: mirrored, or inverted, but not both."""
         return self.mirrored != self.mesh.diagnosis.inverted
 
     @cached_property
@@ -335,12 +335,12 @@ class Scene(Frozen):
 
     @cached_property
     def varies(self) -> bool:
-        """Whether the density of any body varies in space."""
+        """True if the density of any body varies in space."""
         return any(body.density is not None for body in self.bodies)
 
     @cached_property
     def scatters_ambient(self) -> bool:
-        """Whether any medium scatters ambient radiance."""
+        """True if any medium scatters ambient radiance."""
         media = [body.medium for body in self.bodies if body.medium is not None]
         return any(bool((np.asarray(medium.scattering) * np.asarray(self.ambient) > 0).any()) for medium in media)
 

@@ -199,7 +199,7 @@ def moved(light: Light, matrix: Array) -> Light:
 
 
 def has_ground(scene: Scene) -> bool:
-    """Whether an opaque object is a ground, or a room, for all that light enters: below it, and as wide and deep."""
+    """True if an opaque object is a ground, or a room, for all that light enters: below it, and as wide and deep."""
     if not scene.bodies or not scene.opaque:
         return False
     boxes = np.stack([body.bounds for body in scene.bodies])

@@ -159,7 +159,7 @@ class Surface(Frozen):
 
     @property
     def plain(self) -> bool:
-        """Whether light passes the surface unchanged where the indices of refraction on both sides are equal."""
+        """True if light passes the surface unchanged where the indices of refraction on both sides are equal."""
         return (
             self.transmission == 1.0
             and self.transmission_texture is None
@@ -172,7 +172,7 @@ class Surface(Frozen):
 
     @property
     def glows(self) -> bool:
-        """Whether the surface emits light."""
+        """True if the surface emits light."""
         return bool((np.asarray(self.emissive) > 0).any())
 
     @property

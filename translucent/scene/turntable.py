@@ -93,7 +93,7 @@ def _about(center: Array, angle: float) -> Array:
 
 
 def on_stage(scene: Scene) -> bool:
-    """Whether a scene has a shadow catcher."""
+    """True if a scene has a shadow catcher."""
     return any(item.shadow_catcher for item in scene.objects)
 
 

@@ -76,7 +76,7 @@ class Bodies:
         self._joined: dict[int, tuple[Mesh, dict[PrimitiveKey, int]] | None] = {}
 
     def is_closed(self, key: PrimitiveKey) -> bool:
-        """Whether a primitive is closed, together with those adjacent to it."""
+        """True if a primitive is closed, together with those adjacent to it."""
         whole = self.around(key) or self._outline(key)
         return whole.diagnosis.closed
 

@@ -152,7 +152,7 @@ def _names(file: GltfFile, keys: list[PrimitiveKey]) -> list[str]:
 
 
 def _is_sheet(material: GltfMaterial | None, key: PrimitiveKey, bodies: Bodies) -> bool:
-    """Whether a primitive is an open mesh that its material makes a thin wall."""
+    """True if a primitive is an open mesh that its material makes a thin wall."""
     return material is not None and material.kind == "thin wall" and not bodies.is_closed(key)
 
 

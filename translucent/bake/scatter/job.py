@@ -64,7 +64,7 @@ class ScatterJob:
 
     @property
     def makes_map(self) -> bool:
-        """Whether the output is an image."""
+        """True if the output is an image."""
         return self.output.suffix.lower() == MAP_SUFFIX
 
     def bake(self, mesh: Mesh, body: Mesh | None = None) -> ScatterMap | VertexScatter:

@@ -99,7 +99,7 @@ def _opaque(checks: Checks) -> None:
 
 
 def _sizes(checks: Checks) -> None:
-    """Of a body that fills them: one of a few pixels suffers from the grid of 1/256 pixel that rasterizers draw on."""
+    """Sizes of pictures that a body fills: few pixels suffer from the grid of 1/256 pixel that rasterizers draw on."""
     wedge = Box((-6000, -1, -1), (6000, 1, 1)).tessellate()
     camera = Camera.orthographic((0, 1, 5), (0, 0.05, 0), height=1.0)
     scene = Scene([Object(wedge, GLASS)], camera)

@@ -41,7 +41,7 @@ def overview_svg(report: Report) -> str:
 
 
 def has_overview(report: Report) -> bool:
-    """Whether there is anything to draw."""
+    """True if there is anything to draw."""
     return bool(_shown(report))
 
 

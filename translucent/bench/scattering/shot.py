@@ -1,4 +1,4 @@
-"""What a picture shows of the surface of a body, as shaders of engines get it: points, normals, falling light."""
+"""Properties of the surface of a body in a picture, as shaders of engines get it: points, normals, falling light."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class Casting:
 
 
 def shot_of(renderer: Renderer, scene: Scene, size: tuple[int, int]) -> Shot:
-    """What a picture of a scene of one body shows of it.
+    """Surface properties in a picture of a scene of one body.
 
     Raises
     ------

@@ -103,7 +103,7 @@ def _diffused(medium: Medium) -> Array:
 
 
 def _hazy_shares(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[float, float]:
-    """What pictures with `Diffusion` show beside unscattered light: what is scattered ahead on each way across.
+    """Light in pictures with `Diffusion` beside the unscattered: what is scattered ahead on each way across.
 
     The same as in ``shaders/transport/traced_interfaces.frag``: it leaves where the way ends, or is mirrored there.
     """

@@ -145,7 +145,7 @@ def errors_of(differences: Array) -> Errors:
 
 
 def _crossings(scene: Scene, points: Array) -> list[npt.NDArray[np.int64]]:
-    """Of each object but the ground: how often the ways from points (h, w, 3) to the light cross it."""
+    """Number of crossings with each object but the ground of the ways from points (h, w, 3) to the light."""
     paths = LightPaths(scene, sheet_thicknesses(scene))
     places = points.reshape(-1, 3) - scene.camera.eye
     travel, distance = way_of(paths.lights[0], places)

@@ -221,7 +221,7 @@ class Shadows:
 
     @property
     def measured(self) -> bool:
-        """Whether anything is there."""
+        """True if anything is there."""
         return bool(self.cases or self.sky or self.caustics or self.media or self.sky_failure)
 
     @property

@@ -115,7 +115,7 @@ class DepthPeelingPass:
         return max(1, -(-layers // 2) if both else layers)
 
     def _found_any(self, job: FrameJob, found: moderngl.Framebuffer) -> bool:
-        """Whether a pass has found a crossing in any pixel."""
+        """True if a pass has found a crossing in any pixel."""
         job.targets.nothing().use()
         found.color_attachments[0].use(0)
         with self._any:

@@ -276,7 +276,7 @@ class ShadowMapsPass:
 
 
 def _resolves(scene: Scene) -> bool:
-    """Whether a depth buffer of 24 bits tells what is before what, and nothing is clipped that is before the camera."""
+    """True if a depth buffer of 24 bits tells what is before what, and nothing is clipped that is before the camera."""
     if scene.camera.fov_y is None:
         return True
     near, far = depth_range(scene.boxes, scene.camera, scene.diagonal)

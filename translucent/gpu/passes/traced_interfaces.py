@@ -240,7 +240,7 @@ def blurred_share(samples: int) -> float:
 
 
 def all_closed(scene: Scene) -> bool:
-    """Whether rays can leave each solid only through its surface."""
+    """True if rays can leave each solid only through its surface."""
     return all(body.mesh.diagnosis.sound for body in scene.bodies if body.sheet_thickness is None)
 
 

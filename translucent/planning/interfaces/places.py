@@ -15,7 +15,7 @@ def with_interfaces(scene: Scene) -> tuple[int, ...]:
 
 
 def starts_inside(scene: Scene, body: Object) -> bool:
-    """Whether rays of the camera may start inside a body."""
+    """True if rays of the camera may start inside a body."""
     if scene.camera.fov_y is None:
         return picture_cuts(scene, body)
     low, high = body.bounds - scene.camera.eye
@@ -25,7 +25,7 @@ def starts_inside(scene: Scene, body: Object) -> bool:
 
 
 def picture_cuts(scene: Scene, body: Object) -> bool:
-    """Whether an orthographic picture's plane, where its rays start, cuts the bounds of a body."""
+    """True if an orthographic picture's plane, where its rays start, cuts the bounds of a body."""
     if scene.camera.fov_y is not None:
         return False
     low, high = body.bounds - scene.camera.eye

@@ -83,7 +83,7 @@ class Method:
 
     @property
     def counts_from_camera(self) -> bool:
-        """Whether distances count from the camera, and lose digits with distance."""
+        """True if distances count from the camera, and lose digits with distance."""
         return False
 
     def check(self, scene: Scene) -> None:

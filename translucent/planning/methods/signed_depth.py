@@ -33,7 +33,7 @@ class SignedDepth(Method):
 
     @property
     def counts_from_camera(self) -> bool:
-        """Whether distances count from the camera, and lose digits with distance."""
+        """True if distances count from the camera, and lose digits with distance."""
         return not self.anchored
 
     @classmethod

@@ -52,12 +52,12 @@ class GivenBack:
     refusals: tuple[tuple[int, str], ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether there are any."""
+        """True if there are any."""
         return bool(self.diffused or self.layered or self.volumes)
 
     @property
     def solved(self) -> bool:
-        """Whether light is solved for on a grid."""
+        """True if light is solved for on a grid."""
         return bool(self.diffused or self.volumes)
 
     def __str__(self) -> str:
@@ -150,7 +150,7 @@ def given_back(
 
 
 def _volumes(scene: Scene, solved: list[int], wanted: Diffusion) -> tuple[int, ...]:
-    """Those of the bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
+    """The bodies into whose rays light is scattered, as far as each can have winding numbers of its own."""
     varying = tuple(i for i in solved if _is_cloud(scene.objects[i]))
     even = tuple(i for i in solved if scene.objects[i].density is None and _is_volume(scene.objects[i], wanted))
     if not (fogs := tuple(sorted(varying + even))):
@@ -169,7 +169,7 @@ def _is_deep(body: Object, medium: Medium) -> bool:
 
 
 def _is_volume(body: Object, wanted: Diffusion) -> bool:
-    """Whether rays gather light in a body of one density: where they see more than a skin beneath all cells."""
+    """True if rays gather light in a body of one density: where they see more than a skin beneath all cells."""
     if body.has_interface:
         return False
     medium = _medium(body)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from imgui_bundle import ImVec2, imgui
 
-from translucent.preview.desk import FAINT, WARNING, Desk, begin_rows, em, slider, tooltip, wrapped
+from translucent.preview.desk import FAINT, WARNING, Desk, begin_rows, slider, tooltip, wrapped
 from translucent.preview.environments import BUILT_IN, title
+from translucent.preview.panels.cards import draw_cards, draw_frame
 from translucent.preview.picturing import draw_panorama, panorama_key
 
-#: Widths of a card and the space between two, in ems.
-CARD, GAP = 8.0, 0.5
-
-CHOSEN, HOVERED, PLAIN = 0xFFFFB050, 0xFFC0C0C0, 0x40FFFFFF
+#: Width of a card in ems.
+CARD = 8.0
 
 
 def environments_panel(desk: Desk) -> None:
@@ -47,17 +48,8 @@ def environments_panel(desk: Desk) -> None:
 
 
 def _cards(desk: Desk, names: list[str]) -> None:
-    room = imgui.get_content_region_avail().x
-    across = max(int((room + em(GAP)) / em(CARD + GAP)), 1)
-    width = (room - em(GAP) * (across - 1)) / across
-    size = ImVec2(width, 0.5 * width + 1.2 * imgui.get_text_line_height())
-    for i, name in enumerate(names):
-        if i % across:
-            imgui.same_line(0.0, em(GAP))
-        if imgui.is_rect_visible(size):
-            _card(desk, name, size)
-        else:
-            imgui.dummy(size)
+    line = imgui.get_text_line_height()
+    draw_cards(names, CARD, lambda width: 0.5 * width + 1.2 * line, partial(_card, desk))
 
 
 def _card(desk: Desk, name: str, size: ImVec2) -> None:
@@ -74,7 +66,7 @@ def _card(desk: Desk, name: str, size: ImVec2) -> None:
     else:
         over.add_rect_filled(low, high, 0xFF303030)
     chosen = desk.get("look.environment") == name
-    over.add_rect(low, high, CHOSEN if chosen else HOVERED if hovered else PLAIN, 0.0, em(0.12) if chosen else 1.0)
+    draw_frame(over, low, high, chosen=chosen, hovered=hovered)
     over.push_clip_rect(ImVec2(low.x, high.y), ImVec2(high.x, low.y + size.y), True)
     faint = imgui.get_color_u32(imgui.ImVec4(*FAINT))
     over.add_text(ImVec2(low.x, high.y), imgui.get_color_u32(imgui.Col_.text) if chosen else faint, title(name))

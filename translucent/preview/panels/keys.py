@@ -93,7 +93,7 @@ def handle_keys(desk: Desk) -> None:
 
 
 def _closes_itself(desk: Desk) -> bool:
-    """Whether Escape is for a menu, a list or a field that is being typed in, which see to it themselves."""
+    """True if Escape is for a menu, a list or a field that is being typed in, which see to it themselves."""
     own = desk.browser is not None or desk.keys_shown
     typing = imgui.get_io().want_text_input
     return not own and (typing or imgui.is_popup_open("", imgui.PopupFlags_.any_popup))

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from imgui_bundle import ImVec2, imgui
 
 from translucent.media.preset import Preset
 from translucent.preview.answers import save_preset
 from translucent.preview.desk import FAINT, Desk, em, tooltip, wrapped
+from translucent.preview.panels.cards import draw_cards, draw_frame
 from translucent.preview.picturing import ball_key, draw_ball
 
-#: Widths of a card and the space between two, in ems.
-CARD, GAP = 5.0, 0.5
+#: Width of a card in ems.
+CARD = 5.0
 
 #: Type of what is dragged.
 PRESET = "preset"
-
-CHOSEN, HOVERED, PLAIN = 0xFFFFB050, 0xFFC0C0C0, 0x40FFFFFF
 
 SAVE_TIP = "Saves the medium, ior and roughness as a .toml file to be shared: others put it into this folder of theirs."
 
@@ -49,17 +50,8 @@ def library_panel(desk: Desk) -> None:
 
 
 def _cards(desk: Desk, members: list[Preset]) -> None:
-    room = imgui.get_content_region_avail().x
-    across = max(int((room + em(GAP)) / em(CARD + GAP)), 1)
-    width = (room - em(GAP) * (across - 1)) / across
-    size = ImVec2(width, width + 2.2 * imgui.get_text_line_height())
-    for i, one in enumerate(members):
-        if i % across:
-            imgui.same_line(0.0, em(GAP))
-        if imgui.is_rect_visible(size):
-            _card(desk, one, size)
-        else:
-            imgui.dummy(size)
+    line = imgui.get_text_line_height()
+    draw_cards(members, CARD, lambda width: width + 2.2 * line, partial(_card, desk))
 
 
 def _card(desk: Desk, one: Preset, size: ImVec2) -> None:
@@ -82,7 +74,7 @@ def _card(desk: Desk, one: Preset, size: ImVec2) -> None:
     else:
         _swatch(over, one, low, high)
     chosen = desk.material.preset == one.name
-    over.add_rect(low, high, CHOSEN if chosen else HOVERED if hovered else PLAIN, 0.0, em(0.12) if chosen else 1.0)
+    draw_frame(over, low, high, chosen=chosen, hovered=hovered)
     line = imgui.get_text_line_height()
     over.push_clip_rect(ImVec2(low.x, high.y), ImVec2(high.x, high.y + 2.2 * line), True)
     text = imgui.get_color_u32(imgui.Col_.text)

@@ -1,0 +1,68 @@
+// What branches of a tree of rays see where they end: the environment, or an opaque object. Needs <View>, <Surfaces>,
+// <TracedBody>, shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl and opaque_objects.glsl.
+
+vec3 environment_seen(vec3 point, vec3 direction, bool reflected, float blur) {
+#if MICROFACETS
+    float roughness = sqrt(sqrt(min(blur, 1.0)));
+    return reflected ? environment_light(direction, roughness) : environment_beyond(point, direction, roughness);
+#elif SEEN_LIGHTS
+    return mirrored_environment(direction);
+#else
+    return reflected ? mirrored_environment(direction) : environment_beyond(point, direction, 0.0);
+#endif
+}
+
+// The end of a branch: what is seen there is found for all rays of a group together, apart from following them.
+struct Glimpse {
+    int object;        // that is opaque; AIR for the environment
+    vec3 normal;       // of the object
+    vec3 origin;       // of the ray
+    vec3 point;        // of the object
+    vec3 direction;
+    vec3 share;        // of the light that reaches the eye
+    bool reflected;
+    float blur;
+};
+
+#if OPAQUE
+// How much the axial depth of a surface may differ between the centers of neighboring pixels.
+float depth_within_pixel(vec3 point, vec3 normal) {
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    float spread = surface_right.w == 1.0 ? dot(from_eye, ray_forward.xyz) : 1.0;
+    vec3 view = surface_right.w == 1.0 ? normalize(from_eye) : ray_forward.xyz;
+    float facing = abs(dot(view, normal));
+    return 2.0 * length(surface_up.xyz) * spread / frame_size.y * sqrt(1.0 - min(facing * facing, 1.0)) / max(facing, 1e-3);
+}
+
+// Opaque objects as the picture shows them: with their textures, and blurred behind rough interfaces. False where it does not.
+bool opaque_shown(Glimpse end, out vec3 light) {
+    vec3 shown = seen_at(end.point);
+    if (!in_picture(shown.xy)) { return false; }
+    ivec2 texel = stored(texel_of(shown.xy));
+    float there = texelFetch(opaque_axial_depth, texel, 0).r;
+    if (abs(there - shown.z) * surface_ahead.y >= 1e-2 * surface_reach + depth_within_pixel(end.point, end.normal)) { return false; }
+#if MICROFACETS
+    if (end.blur > 0.0) {
+        vec4 blurred = blurred_opaque(shown.xy, blur_width(sqrt(end.blur), length(end.point - end.origin), end.point));
+        light = blurred.rgb + (1.0 - blurred.a) * environment_seen(end.origin, end.direction, end.reflected, end.blur);
+        return true;
+    }
+#endif
+    vec4 found = texelFetch(opaque_radiance, texel, 0);
+#if ADAPTIVE
+    light = found.rgb / max(found.a, 1e-3);  // the mean of samples some of which may pass it
+#else
+    light = found.rgb;
+#endif
+    return true;
+}
+#endif
+
+vec3 light_at(Glimpse end) {
+    if (end.object == AIR) { return environment_seen(end.origin, end.direction, end.reflected, end.blur); }
+#if OPAQUE
+    vec3 light;
+    if (opaque_shown(end, light)) { return light; }
+#endif
+    return opaque_light(traced_body(end.object), end.normal, end.direction, end.point);
+}
