@@ -84,17 +84,17 @@ class Atlas:
         low, high = np.full(len(face), np.inf), np.full(len(face), -np.inf)
         for i in range(3):
             a, b = start[:, i], start[:, (i + 1) % 3]
-            rise = b[:, 1] - a[:, 1]
+            rise, run = b[:, 1] - a[:, 1], b[:, 0] - a[:, 0]
             level = rise == 0
+            divisor = np.where(level, 1.0, rise)
             # Where the edge meets the upper and lower edge of the row, as a share of its length.
             with np.errstate(over="ignore", under="ignore"):
-                ends = (row[:, None] + (0.0, 1.0) - a[:, 1:]) / np.where(level, 1.0, rise)[:, None]
-            ends = np.where(level[:, None], (0.0, 1.0), np.clip(ends, 0.0, 1.0))
+                upper, lower = (np.clip((row + side - a[:, 1]) / divisor, 0.0, 1.0) for side in (0.0, 1.0))
+                upper = a[:, 0] + np.where(level, 0.0, upper) * run
+                lower = a[:, 0] + np.where(level, 1.0, lower) * run
             meets = (np.minimum(a[:, 1], b[:, 1]) <= row + 1) & (np.maximum(a[:, 1], b[:, 1]) >= row)
-            with np.errstate(under="ignore"):
-                across = a[:, :1] + ends * (b[:, :1] - a[:, :1])
-            low = np.where(meets, np.minimum(low, across.min(axis=1)), low)
-            high = np.where(meets, np.maximum(high, across.max(axis=1)), high)
+            np.minimum(low, np.minimum(upper, lower), out=low, where=meets)
+            np.maximum(high, np.maximum(upper, lower), out=high, where=meets)
         met = low <= high
         left, right = _cells(np.where(met, low, 0.0), np.where(met, high, 0.0))
         return left, np.where(met, right, left)
@@ -164,7 +164,9 @@ def _areas(corners: Array, point: Array) -> tuple[Array, Mask]:
         for i, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
             area[:, i] = _cross(corners[:, b] - corners[:, a], point - corners[:, a])
         total = area[:, 0] + area[:, 1] + area[:, 2]
-    least, most = area.min(axis=1), area.max(axis=1)
+    # Much faster than reductions along an axis of three.
+    least = np.minimum(np.minimum(area[:, 0], area[:, 1]), area[:, 2])
+    most = np.maximum(np.maximum(area[:, 0], area[:, 1]), area[:, 2])
     return area, ((least >= 0) & (total > 0)) | ((most <= 0) & (total < 0))
 
 
