@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy.typing as npt
 from translucent.arrays import Array, Floats
 from translucent.bake.settings import BakeSettings
 from translucent.bake.surface import Points
+from translucent.formulas.sobol import sobol_points
 from translucent.geometry.normals import CREASE
 
 #: Number of independently scrambled sets, and largest number of values in all of them.
@@ -90,16 +90,10 @@ class Directions:
 def _sobol(count: int, sets: int, seed: int) -> Array:
     """(sets, count, 2): the first points of the Sobol sequence in 0..1, scrambled independently (Owen 1995).
 
-    SciPy scrambles by a linear map and a shift, which leave blocks of the sequence so alike that they may have equal
+    A linear map and a shift, which `sobol_points` has, leave blocks of the sequence so alike that they may have equal
     means; nested scrambling, in which each digit is turned or not by a coin of all digits before it, does not.
     """
-    from scipy.stats import qmc
-
-    with warnings.catch_warnings():
-        # SciPy warns that numbers other than powers of 2 lose the balance of the sequence; they are still well spread.
-        warnings.simplefilter("ignore", UserWarning)
-        plain = qmc.Sobol(2, scramble=False, bits=DIGITS).random(count)
-    digits = np.round(plain * 2**DIGITS).astype(np.uint64)
+    digits = np.round(sobol_points(count) * 2**DIGITS).astype(np.uint64)
     keys = _mix(np.arange(2 * sets, dtype=np.uint64) + _mix(np.full(2 * sets, seed, dtype=np.uint64)))
     coins = keys.reshape(sets, 1, 2)
     scrambled = np.zeros((sets, count, 2), dtype=np.uint64)

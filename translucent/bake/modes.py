@@ -133,8 +133,9 @@ def block_edges(begin: int, end: int, blocks: int) -> Integers:
 
 
 def _ratio(values: Array, counted: npt.NDArray[np.bool_] | None, edges: Integers) -> tuple[Array, Array]:
-    """Mean (k,) of the counted `values` (k, n), 0 where others stand, and its standard error (k,) from blocks. None: all
-    are counted.
+    """Mean (k,) of the counted `values` (k, n), 0 where others stand, and its standard error (k,) from blocks.
+
+    None: all are counted.
     """
     blocks = edges.shape[1]
     sums = _block_sums(values, edges)

@@ -78,9 +78,7 @@ class Rays:
             distance[ray] = walk.length
         return np.maximum(distance, 0.0, out=distance).reshape(-1, rays), traced
 
-    def first(
-        self, points: Points, directions: Floats
-    ) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.int32]]:
+    def first(self, points: Points, directions: Floats) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.int32]]:
         """(k, r): distance to the plane of the first face, whether the ray leaves through it for certain, and the face.
 
         Any number, False and -1 where there is none.

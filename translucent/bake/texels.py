@@ -101,7 +101,7 @@ class Atlas:
 
     def _nearest(self, face: Integers, row: Integers, column: Integers, begin: int, end: int) -> Texels:
         """Best face for each texel, of all pairs of a face and a texel of the strip that it touches."""
-        center = np.stack([column, row], axis=1) + 0.5
+        center = np.stack([column, row], axis=1).astype(np.float64) + 0.5
         area, inside = _areas(self.corners[face], center)
         texel = (row % self.height - begin) * self.width + column % self.width
         pairs = np.flatnonzero(inside)
@@ -171,7 +171,7 @@ def _areas(corners: Array, point: Array) -> tuple[Array, Mask]:
 
 
 def _closest_on_edges(corners: Array, point: Array) -> tuple[Array, Array]:
-    """Squared distance (n,) of points (n, 2) outside triangles (n, 3, 2), and barycentric weights of the nearest point."""
+    """Squared distance (n,) of points (n, 2) outside triangles (n, 3, 2), and barycentric weights of the nearest."""
     distance, barycentric = np.full(len(point), np.inf), np.zeros((len(point), 3))
     for i in range(3):
         j = (i + 1) % 3

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import lru_cache
 
 import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.formulas.color import luminance
+from translucent.formulas.sobol import sobol_points
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 
@@ -96,12 +96,7 @@ def _shares(light: Array, solid_angles: Array) -> Array:
 
 def _drawn(share: Array, count: int) -> Integers:
     """(count,): pixels by their shares, row first and then column, from low-discrepancy points."""
-    from scipy.stats import qmc
-
-    with warnings.catch_warnings():
-        # SciPy warns that numbers other than powers of 2 lose the balance of the sequence; they are still well spread.
-        warnings.simplefilter("ignore", UserWarning)
-        points = qmc.Sobol(2, scramble=True, seed=_SEED).random(count)
+    points = sobol_points(count, _SEED)
     table = share.reshape(SIZE)
     rows = np.cumsum(table.sum(axis=1))
     row = np.minimum(np.searchsorted(rows, points[:, 0] * rows[-1], side="right"), SIZE[0] - 1)
