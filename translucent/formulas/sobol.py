@@ -1,6 +1,6 @@
 """Sobol points in the unit square (Sobol 1967; direction numbers as those of Joe and Kuo 2008).
 
-They are those of `scipy.stats.qmc.Sobol`, digit by digit, whose import would take as long as the first picture.
+They are those of `scipy.stats.qmc.Sobol`, digit by digit, whose import takes most of a second.
 """
 
 from __future__ import annotations
