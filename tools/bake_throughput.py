@@ -64,18 +64,23 @@ def throughput(
     dict of str to float
         ``embree``: Embree alone, first hits in float32, on every so many of the bake's texels with all their rays,
         made ready beforehand, in as many threads. ``bake``: the whole call but for the texture coordinates, from the
-        preparation of the mesh to the padded map. ``share``: of the second in the first.
+        preparation of the mesh to the padded map. ``share``: of the second in the first. ``processor_share``: of
+        processor time.
     """
     threads = threads or processors()
     unwrapped = unwrap(mesh, size, None)
     trace = _embree_alone(unwrapped, size, rays, threads)
-    found: dict[str, list[float]] = {"embree": [], "bake": []}
+    found: dict[str, list[float]] = {"embree": [], "bake": [], "share": [], "processor_share": []}
     for _ in range(rounds):
-        found["embree"].append(trace()[0])
+        clock, processor = trace()
+        used = time.process_time()
         report = bake_thickness(unwrapped.mesh, size, rays=rays, threads=threads).report
+        used = time.process_time() - used
+        found["embree"].append(clock)
         found["bake"].append(report.mrays_per_second)
-    medians = {name: float(np.median(rates)) for name, rates in found.items()}
-    return {**medians, "share": medians["bake"] / medians["embree"], "rays": float(report.rays)}
+        found["share"].append(report.mrays_per_second / clock)
+        found["processor_share"].append(report.rays / 1e6 / used / processor)
+    return {**{name: float(np.median(each)) for name, each in found.items()}, "rays": float(report.rays)}
 
 
 def _embree_alone(unwrapped: Unwrapped, size: int, rays: int, threads: int) -> Callable[[], tuple[float, float]]:

@@ -83,6 +83,8 @@ class RayMean:
         if distance.shape[1] == 1:
             length = np.minimum(distance[:, 0], self.reach)
             return np.where(np.isfinite(length), length, 0.0), np.zeros(len(length))
+        if self.mode != "local" and self.extinction is None and self.reach == np.inf and np.isfinite(distance).all():
+            return _ratio(distance, None, edges)
         counted = np.isfinite(distance) if self.reach == np.inf else np.ones(distance.shape, dtype=bool)
         length = np.where(counted, np.minimum(distance, self.reach), 0.0)
         if self.mode == "local":
@@ -130,10 +132,15 @@ def block_edges(begin: int, end: int, blocks: int) -> Integers:
     return (begin + np.arange(blocks) * (end - begin) // blocks)[None]
 
 
-def _ratio(values: Array, counted: npt.NDArray[np.bool_], edges: Integers) -> tuple[Array, Array]:
-    """Mean (k,) of the counted `values` (k, n), 0 where others stand, and its standard error (k,) from blocks."""
+def _ratio(values: Array, counted: npt.NDArray[np.bool_] | None, edges: Integers) -> tuple[Array, Array]:
+    """Mean (k,) of the counted `values` (k, n), 0 where others stand, and its standard error (k,) from blocks.
+
+    None: all are counted.
+    """
     blocks = edges.shape[1]
-    sums, counts = _block_sums(values, edges), _block_sums(counted.astype(np.float64), edges)
+    sums = _block_sums(values, edges)
+    all_counted = np.ones((1, values.shape[1]))
+    counts = _block_sums(all_counted if counted is None else counted.astype(np.float64), edges)
     total = np.maximum(counts.sum(axis=1), 1.0)
     mean = sums.sum(axis=1) / total
     with np.errstate(under="ignore"):

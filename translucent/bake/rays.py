@@ -31,6 +31,10 @@ GRAZING = 1e-6
 BEHIND = 1e-10
 
 
+#: Number of rays whose distances are computed at a time: their arrays stay in the cache of a processor.
+CACHED_RAYS = 1 << 13
+
+
 @dataclass(frozen=True, eq=False)
 class Rays:
     """Rays into a surface, followed to their exits. Any number of threads may ask at once.
@@ -62,43 +66,58 @@ class Rays:
         In radii; infinite where a ray finds no exit. What lies beyond `reach` is some number at least as large.
         """
         rays = directions.shape[2]
-        shaped, cosines, faces = self.first(points, directions)
-        distance, cosine, face = shaped.reshape(-1), cosines.reshape(-1), faces.reshape(-1)
-        # NaN, where no face was found, is not above it either.
-        doubtful = ~(cosine > GRAZING)
-        ray = np.flatnonzero(doubtful if self.gaps == "first-exit" else ~(distance >= self.reach))
+        shaped, leaving, faces = self.first(points, directions)
+        distance, leaves, face = shaped.reshape(-1), leaving.reshape(-1), faces.reshape(-1)
+        settled = leaves if self.gaps == "first-exit" else (distance >= self.reach) & (face >= 0)
+        ray = np.flatnonzero(~settled)
         traced = len(face)
         if ray.size:
             walk = _Walk.of(points.start[ray // rays], directions.reshape(3, -1)[:, ray].T.astype(np.float64))
-            walk.pass_exit(~doubtful[ray], distance[ray], face[ray])
+            walk.pass_exit(leaves[ray], distance[ray], face[ray])
             traced += self._follow(walk)
             distance[ray] = walk.length
         return np.maximum(distance, 0.0, out=distance).reshape(-1, rays), traced
 
-    def first(self, points: Points, directions: Floats) -> tuple[Array, Array, npt.NDArray[np.int32]]:
-        """(k, r): distance to the plane of the first face, cosine at it, above 0 where the ray leaves, and the face.
+    def first(self, points: Points, directions: Floats) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.int32]]:
+        """(k, r): distance to the plane of the first face, whether the ray leaves through it for certain, and the face.
 
-        NaN and -1 where there is none.
+        Any number, False and -1 where there is none.
         """
         count, rays = directions.shape[1:]
         origins = np.empty((3, count, rays), dtype=np.float32)
         origins[:] = self.starts(points).T[:, :, None]
         face = self._trace(origins.reshape(3, -1), directions.reshape(3, -1)).reshape(count, rays)
-        # Index -1 takes some face; the ray is doubtful all the same.
+        distance, leaves = np.empty((count, rays)), np.empty((count, rays), dtype=bool)
+        step = max(1, CACHED_RAYS // rays)
+        with np.errstate(all="ignore"):
+            for begin in range(0, count, step):
+                some = slice(begin, begin + step)
+                self._meet(points.start[some], directions[:, some], face[some], distance[some], leaves[some])
+        leaves &= face >= 0
+        return distance, leaves, face
+
+    def _meet(
+        self,
+        start: Array,
+        directions: Floats,
+        face: npt.NDArray[np.int32],
+        distance: Array,
+        leaves: npt.NDArray[np.bool_],
+    ) -> None:
+        """Write distances (k, r) to the planes of faces (k, r), and whether rays leave there."""
+        # Index -1 takes some face.
         plane = np.take(self.surface.planes, face, axis=0, mode="clip")
-        distance, cosine = plane[..., 3].copy(), np.empty((count, rays))
-        np.multiply(plane[..., 0], directions[0], out=cosine)
-        product = np.multiply(plane[..., 0], points.start[:, 0, None])
+        np.copyto(distance, plane[..., 3])
+        cosine = plane[..., 0] * directions[0]
+        product = np.multiply(plane[..., 0], start[:, 0, None])
         distance -= product
         for axis in (1, 2):
             np.multiply(plane[..., axis], directions[axis], out=product)
             cosine += product
-            np.multiply(plane[..., axis], points.start[:, axis, None], out=product)
+            np.multiply(plane[..., axis], start[:, axis, None], out=product)
             distance -= product
-        cosine[face < 0] = np.nan
-        with np.errstate(all="ignore"):
-            distance /= cosine
-        return distance, cosine, face
+        distance /= cosine
+        np.greater(cosine, GRAZING, out=leaves)
 
     def starts(self, points: Points) -> Floats:
         """(k, 3): where rays from points (k) begin, a little below the surface."""

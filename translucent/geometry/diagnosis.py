@@ -169,7 +169,7 @@ def diagnose(vertices: Array, faces: npt.NDArray[np.int32], one_closed_part: boo
         nonfinite_vertices=_found(~finite),
         unreferenced_vertices=_found(~used),
         degenerate_faces=_found(_degenerate(filled, faces)),
-        duplicate_faces=none if edges is None and len(faces) > 2 else _duplicates(shared),
+        duplicate_faces=none if _is_one_sheet(faces, edges, components) else _duplicates(shared),
         open_edges=open_edges,
         mixed_edges=mixed_edges,
         nonmanifold_edges=none if edges is None else edges.found(edges.sizes > 2),
@@ -199,6 +199,8 @@ class _Edges:
         )
 
     def found(self, mask: Mask) -> Finding:
+        if not mask.any():
+            return Finding(0)
         first = self.sides.ends(np.flatnonzero(mask)[:FIRST]).tolist()
         return Finding(int(mask.sum()), tuple((a, b) for a, b in first))
 
@@ -211,13 +213,20 @@ class _Edges:
         return int(label.max()) + 1 - int((~use_mask(self.faces, count)).sum())
 
 
+def _is_one_sheet(faces: npt.NDArray[np.integer], edges: _Edges | None, components: int) -> bool:
+    """Whether edges join all faces, and none has more than two: a face twice would be a part of its own."""
+    if edges is None:
+        return len(faces) > 2
+    return components == 1 and len(edges.faces) > 2 and bool((edges.sizes <= 2).all())
+
+
 def _is_convex(vertices: Array, faces: npt.NDArray[np.integer], edges: _Edges | None, orientation: float) -> bool:
     """True if all edges of one closed component are convex; with genus 0 that means a convex body."""
     if orientation == 0:
         return False
     faces = faces if edges is None else edges.faces
     # A dent among the first faces answers for most meshes.
-    if not _all_convex(vertices, faces, sorted_sides(faces[:CHUNK]), orientation):
+    if len(faces) > CHUNK and not _all_convex(vertices, faces, sorted_sides(faces[:CHUNK]), orientation):
         return False
     sides = sorted_sides(faces) if edges is None else edges.sides
     if not (sides.sizes == 2).all():
@@ -236,11 +245,13 @@ def _all_convex(vertices: Array, faces: npt.NDArray[np.integer], sides: SortedSi
     for begin in range(0, len(first), CHUNK):
         one, other = first[begin : begin + CHUNK], first[begin : begin + CHUNK] + 1
         a, b, c = (vertices.take(faces[face[one], i], axis=0) for i in range(3))
-        normals = np.cross(b - a, c - a) * orientation
-        opposite = vertices.take(faces[face[other], (number[other] + 2) % 3], axis=0)
-        height = np.einsum("ij,ij->i", normals, opposite - a)
-        if (height > dent * np.linalg.norm(normals, axis=1)).any():
-            return False
+        (px, py, pz), (qx, qy, qz) = (b - a).T, (c - a).T
+        x, y, z = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+        opposite = (vertices.take(faces[face[other], (number[other] + 2) % 3], axis=0) - a).T
+        with np.errstate(under="ignore"):
+            height = orientation * (x * opposite[0] + y * opposite[1] + z * opposite[2])
+            if (height > dent * np.sqrt(x * x + y * y + z * z)).any():
+                return False
     return True
 
 
@@ -285,6 +296,8 @@ def _collapsed(faces: npt.NDArray[np.integer]) -> Mask:
 
 
 def _found(mask: Mask) -> Finding:
+    if not mask.any():
+        return Finding(0)
     return Finding(int(mask.sum()), tuple(int(i) for i in np.flatnonzero(mask)[:FIRST]))
 
 
